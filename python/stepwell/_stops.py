@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from . import _checks, engine
 from ._brief import counted, first_of, share
 from ._checks import Array, Shape
+from ._positive import name_of, places_of
 from .errors import ToleranceWarning
 from .result import Run, Status
 from .systems import System
@@ -134,7 +134,6 @@ def _left_for_below_zero(run: Run, index: Shape) -> str:
 
     Several may be kept: it is the one that would be at zero first.
     """
-    from .adaptive_runs import places_of  # which import this
     from .reference.adaptive import OUTSIDE
 
     assert run.stand is not None
@@ -145,9 +144,7 @@ def _left_for_below_zero(run: Run, index: Shape) -> str:
     kept = np.array(places_of(run.system, run.stand.options["positive"]))
     with np.errstate(all="ignore"):
         left = np.where(rate[kept] < 0.0, state[kept] / -rate[kept], np.inf)
-    place, n_v = int(kept[left.argmin()]), prod(run.system.v_shape)
-    name, shape, number = ("v", run.system.v_shape, place) if place < n_v else ("y", run.system.y_shape, place - n_v)
-    return _component(name, tuple(map(int, np.unravel_index(number, shape))) if shape else ())
+    return name_of(run.system, int(kept[left.argmin()]))
 
 
 def _roundings_of_the_time(run: Run, index: Shape) -> float:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import _checks, _going_on, engine
+from . import _checks, _going_on, _positive, engine
 from ._brief import of_member, share
 from ._checks import Array, Shape
 from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
@@ -97,7 +97,7 @@ def adaptive_run(
     sign = -1.0 if backward else 1.0
     backend = _checks.known("backend", backend, BACKENDS)
     budget = MOST_STEPS if options.max_steps is None else _checks.count("max_steps", options.max_steps, 1)
-    acceptance = Acceptance(system.groups, positive=_positive(system, options.positive, v, y))
+    acceptance = Acceptance(system.groups, positive=_positive.checked_places(system, options.positive, v, y))
     numbers = prod(system.v_shape) + prod(system.y_shape)
     groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))
     carry = None
@@ -298,67 +298,6 @@ def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:
     if not len(together):
         return None
     return np.unique(together) if together.ndim == 1 else np.sort(together, axis=0)
-
-
-def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]:
-    """Places of the components that must not become negative, among the numbers of v and then of y."""
-    places = places_of(system, given)
-    if not places:
-        return ()
-    rows = [row for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))) for row in _rows_of(block, axes)]
-    for place in places:
-        if (rows[place] < 0.0).any():
-            raise ArgumentError(
-                f"positive: expected a start at which {_name_of(system, place)} is not negative, got {rows[place].min():g}"
-            )
-    return tuple(places)
-
-
-def places_of(system: System, given: Any) -> list[int]:
-    """The same, whatever the start is."""
-    if given is None or given is False:
-        return []
-    n_v, n_y = prod(system.v_shape), prod(system.y_shape)
-    if given is True:
-        return list(range(n_v, n_v + n_y))
-    parts = given if isinstance(given, (list, np.ndarray)) else [given]
-    return sorted({_place(system, part) for part in parts})
-
-
-def _rows_of(block: Array, axes: int) -> list[Array]:
-    return list(block.reshape((prod(block.shape[:axes]), *block.shape[axes:])))
-
-
-def _place(system: System, part: Any) -> int:
-    """The place of a component that is given as an index of y, or as ("v", …) or ("y", …)."""
-    block, index = (
-        ("y", part) if not isinstance(part, tuple) or not part or isinstance(part[0], (int, np.integer)) else (part[0], part[1:])
-    )
-    block = _checks.known("positive", block, ["v", "y"])
-    shape = system.v_shape if block == "v" else system.y_shape
-    index = index if isinstance(index, tuple) else (index,)
-    fits = len(index) == len(shape) and all(
-        isinstance(i, (int, np.integer)) and not isinstance(i, bool) and 0 <= i < n for i, n in zip(index, shape, strict=True)
-    )
-    if shape == () and index == (0,):
-        index, fits = (), True
-    if not fits:
-        raise ArgumentError(
-            f"positive: expected True, or components of {block}, whose shape is {shape}: an index of y, or as ('y', 0), got "
-            f"{_checks.short(part)}"
-        )
-    return (
-        int(np.ravel_multi_index(index, shape)) + (prod(system.v_shape) if block == "y" else 0)
-        if shape
-        else (prod(system.v_shape) if block == "y" else 0)
-    )
-
-
-def _name_of(system: System, place: int) -> str:
-    """A component as it is written."""
-    n_v = prod(system.v_shape)
-    block, shape, number = ("v", system.v_shape, place) if place < n_v else ("y", system.y_shape, place - n_v)
-    return f"{block}[{', '.join(map(str, np.unravel_index(number, shape)))}]" if shape else block
 
 
 def _aimed(paces: Array, target: float) -> Array:
