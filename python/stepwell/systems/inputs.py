@@ -110,13 +110,17 @@ class Sampled(Fixed, Value):
         self.interval = _checks.number("interval", interval, positive=True, unit="units of time")
         self.start = _checks.number("start", start, unit="units of time")
         self.interpolation = _checks.known("interpolation", interpolation, INTERPOLATIONS)
-        self.batch: Shape = self.values.shape[1:]
 
     def __repr__(self) -> str:
         if len(self.values) == 1:
             return f"constant({brief(self.values[0])})"
         between = "" if self.interpolation == "hold" else f", interpolation={self.interpolation!r}"
         return f"Sampled({len(self.values)} values, interval={self.interval}, start={self.start}{between})"
+
+    @property
+    def batch(self) -> Shape:
+        """The axes of the samples' own batch."""
+        return self.values.shape[1:]
 
     @property
     def constant(self) -> bool:
@@ -161,7 +165,7 @@ class Sampled(Fixed, Value):
         means = np.diff(_at(until, at, batch) + _at(off, at, batch) * since, axis=0) / dt + self.values[0]
         values = np.concatenate([means, np.broadcast_to(self.values[-1:], (1, *batch))])
         if own:
-            return changed(self, values=values, interval=dt, start=0.0, batch=batch, _origin=ends[0])
+            return changed(self, values=values, interval=dt, start=0.0, _origin=ends[0])
         return Sampled(values, dt, float(ends[0]))
 
     def check(self, last: float) -> None:
