@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from cases import Case
 
 
 @sw.system
@@ -198,3 +199,10 @@ def test_lengths_whose_squares_are_no_floats_are_told_too(start: float, steps: i
     with pytest.warns(sw.AccuracyWarning, match=r"the run grew \de\+\d+-fold in \d+ steps"):
         run = sw.integrate(sw.Oscillator(1.0), "rk4", v=0.0, y=start, dt=3.2, steps=steps, dtype=dtype)
     assert run.status == sw.Status.OK
+
+
+def test_members_with_samples_of_their_own_are_told_too() -> None:
+    """The limit of one member is sought with its own samples, at many steps at a time."""
+    case = Case("merson", "top, damped, torques of its own", "direct", None)
+    with pytest.warns(sw.AccuracyWarning, match="1 of 5 members grew"), pytest.warns(sw.DivergenceWarning):
+        case.run(5, 0, dt=3.0, steps=9)

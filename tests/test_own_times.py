@@ -381,6 +381,7 @@ USES: dict[str, tuple[Callable[[sw.Run, Path], Any], str]] = {
     "quantity": (lambda run, _: run.quantity("energy"), "has no energy of its own"),
     "energy": (lambda run, _: run.energy, "has no energy of its own"),
     "dtype": (lambda run, _: run.dtype, ""),
+    "changed_by": (lambda run, _: run.changed_by, ""),
     "z": (lambda run, _: run.z, "has no auxiliary outputs"),
     "collisions": (lambda run, _: run.collisions, "has no bodies that collide|expected a run with fixed steps"),
     "encounters": (lambda run, _: run.encounters, "has no bodies that meet|expected a run with fixed steps"),

@@ -103,10 +103,11 @@ class Held:
         i = np.clip(i, 0, len(self.values) - 1).astype(np.int64)
         if i.ndim == 0:  # one time for all members
             return np.asarray(self.values[i])
-        own = np.broadcast_to(
-            self.values.reshape((len(self.values), *_aligned(self.values, i.ndim))), (len(self.values), *i.shape)
-        )
-        return np.asarray(np.take_along_axis(own, i[np.newaxis], axis=0)[0])
+        own = self.values.shape[1:]
+        batch = np.broadcast_shapes(i.shape, own)
+        rows = self.values.reshape((len(self.values), *(len(batch) - len(own)) * (1,), *own))
+        i = np.broadcast_to(i, batch)[np.newaxis]
+        return np.asarray(np.take_along_axis(np.broadcast_to(rows, (len(rows), *batch)), i, axis=0)[0])
 
     def scaled(self, factor: Array) -> Held:
         """The same input, times a factor."""
@@ -193,9 +194,3 @@ class Curve:
         other = copy(self)
         other.factor = factor
         return other
-
-
-def _aligned(values: Array, axes: int) -> tuple[int, ...]:
-    """The batch axes of samples, with ones before them until there are as many."""
-    own = values.shape[1:]
-    return (*(1,) * (axes - len(own)), *own)
