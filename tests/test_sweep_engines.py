@@ -169,7 +169,7 @@ def test_what_happens_in_another_process_is_told_here(client: Any) -> None:
 
     for engine in (client, None):
         with pytest.raises(
-            ArgumentError, match="outcomes: wrong: expected an array whose last axis has one number for each of the"
+            ArgumentError, match="outcomes: wrong: expected an array whose last axis has one number for each member of the run, "
         ):
             small(engine=engine, outcomes=wrong)
     with pytest.warns(sw.DivergenceWarning, match=r"1 of 2 members diverged, that at omega = 30"):
