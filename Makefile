@@ -12,7 +12,7 @@ SOURCES := $(shell find rust python -type f \( -name "*.rs" -o -name "*.toml" -o
            Cargo.toml Cargo.lock pyproject.toml README.md LICENSE
 
 # Files that build.rs finds, so that cargo does not tell rustfmt of them.
-LISTED := $(shell find rust/core/src/steppers rust/core/src/systems -name "*.rs")
+LISTED := $(shell find rust/core/src/model/steppers rust/core/src/model/systems -name "*.rs")
 
 # What `make wheels` builds for. zig links for a glibc of 2014 (manylinux2014) on any machine, and for AArch64 as well.
 WHEELS := x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
@@ -66,6 +66,7 @@ lint-rust: rust-build
 	cargo fmt --all --check
 	rustfmt --edition 2024 --check $(LISTED)
 	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
 
 lint-python: .venv/test
 	$(BIN)/ruff format --check --quiet .
@@ -100,7 +101,7 @@ CAMPAIGN_SECONDS ?= 600
 campaign: .venv/test ## look for faults: fuzzed calls for CAMPAIGN_SECONDS, random systems, memory, threads, processes
 	mkdir -p $(OUT)
 	cd tests && ../$(BIN)/python -m campaign.fuzz --seconds $(CAMPAIGN_SECONDS) --seed $$(date +%s) --report $(abspath $(OUT))/campaign.json
-	STEPWELL_FUZZ=2000000 cargo test --release -p stepwell-core --test kernels --test random_systems -- --nocapture random packed trail
+	STEPWELL_FUZZ=2000000 cargo test --release -p stepwell-core --test kernels --test random_systems -- --nocapture random packed unrolled
 	cd tests && ../$(BIN)/python -m campaign.memory --runs 100000
 	cd tests && ../$(BIN)/python -m campaign.threads --seconds 60
 	cd tests && ../$(BIN)/python -m campaign.processes --times 100

@@ -48,8 +48,8 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "python/stepwell/reference/steppers/midpoint.py",
         "python/stepwell/reference/systems/van_der_pol.py",
         "python/stepwell/systems/van_der_pol.py",
-        "rust/core/src/steppers/midpoint.rs",
-        "rust/core/src/systems/van_der_pol.rs",
+        "rust/core/src/model/steppers/midpoint.rs",
+        "rust/core/src/model/systems/van_der_pol.rs",
     ]
     for name, text in added:
         (tree / name).write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-//! Lists `src/steppers/*.rs` and `src/systems/*.rs`, so that a new file in either folder is its whole registration.
+//! Lists `src/model/steppers/*.rs` and `src/model/systems/*.rs`, so that a new file in either folder is its whole registration.
 //!
 //! A file in `steppers/` holds a `RECORD`, one in `systems/` a `KIND` and a `make`.
 
@@ -11,6 +11,7 @@ fn names(folder: &Path) -> io::Result<Vec<String>> {
         let path = entry?.path();
         if path.extension().is_some_and(|e| e == "rs")
             && let Some(stem) = path.file_stem().and_then(|s| s.to_str())
+            && stem != "mod"
         {
             names.push(stem.to_owned());
         }
@@ -21,17 +22,18 @@ fn names(folder: &Path) -> io::Result<Vec<String>> {
 
 const MAKE: &str = "
 /// What makes the system of that name over any numbers: generic, so that those which only tests ask for are not in the library.
-pub fn make<N: equations::Operand>(name: &str) -> Option<crate::system::Make<N>> {
+pub fn make<N: equations::Operand>(name: &str) -> Option<crate::model::system::Make<N>> {
     Some(match name {
 ";
 
 fn main() -> io::Result<()> {
     let root = env::current_dir()?;
     let out = env::var("OUT_DIR").map_err(io::Error::other)?;
-    for (folder, list, kind, constant) in
-        [("steppers", "RECORDS", "crate::method::Record", "RECORD"), ("systems", "KINDS", "crate::system::Kind", "KIND")]
-    {
-        let from = Path::new("src").join(folder);
+    for (folder, list, kind, constant) in [
+        ("steppers", "RECORDS", "crate::model::method::Record", "RECORD"),
+        ("systems", "KINDS", "crate::model::system::Kind", "KIND"),
+    ] {
+        let from = Path::new("src/model").join(folder);
         let names = names(&from)?;
         let mut text = String::new();
         for name in &names {

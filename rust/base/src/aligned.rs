@@ -1,7 +1,7 @@
 //! Numbers that begin at a cache line.
 //!
-//! A vector of eight numbers across two cache lines takes two loads, and store forwarding fails for it. Without alignment the same kernel
-//! was up to a fifth slower, depending on the allocator.
+//! A vector of eight numbers across two cache lines takes two loads, and store forwarding fails for it. Without alignment the
+//! same kernel was up to a fifth slower, depending on the allocator.
 
 use std::ops::{Deref, DerefMut};
 

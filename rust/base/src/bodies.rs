@@ -34,9 +34,10 @@ impl Law {
     }
 }
 
-/// Sums over bodies are kept in this many parts, body i in part i mod `LANES`; distances that are taken together are so far apart.
+/// Sums over bodies are kept in this many parts, body i in part i mod `LANES`; distances that are taken together are so far
+/// apart.
 pub const LANES: usize = 8;
-/// Bodies from which on the distances are cut into slabs.
+/// From this many bodies on, distances are split into slabs.
 const SLABBED_FROM: usize = 64;
 /// Bodies for each slab, and how many slabs there are at most.
 const SLAB: usize = 256;

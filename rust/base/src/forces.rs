@@ -10,8 +10,8 @@ use crate::{
     isa::{Level, Task, with_isa},
 };
 
-/// A group of distances k, from one to another, `LANES` apart. All pairs of a chunk of bodies in a group are computed before those of
-/// the next chunk.
+/// A group of distances k, from one to another, `LANES` apart. All pairs of a chunk of bodies in a group are computed before
+/// those of the next chunk.
 pub type Distances = (usize, usize);
 
 type Chunk = [f64; SIDE];
@@ -300,8 +300,8 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
                 return;
             }
             let many = (last - first) / SIDE + 1;
-            // The others meet at all distances but the last. This is for 32 bodies only, so `count` is whole chunks. A loop, so that
-            // the sweep is compiled once.
+            // The others meet at all distances but the last. This is for 32 bodies only, so `count` is whole chunks. A loop, so
+            // that the sweep is compiled once.
             let count = meeting(n, last);
             let (mut start, mut end, mut distances) = (0, count, many);
             while start < end && distances > 0 {

@@ -1,8 +1,8 @@
 //! Functions of one number, the same to the last bit in Rust and in the reference: sine, cosine and natural logarithm.
 //!
-//! **Sine.** That of libm differs between machines. This one reduces by π in two parts (Cody and Waite) to [−π/2, π/2], where one odd
-//! polynomial suffices. Up to 10⁶ rad the error is within 1 ulp of 1; beyond, it stays below the effect of rounding the argument.
-//! For arguments past 2⁵⁰ the result is meaningless and may be huge; callers refuse them.
+//! **Sine.** That of libm differs between machines. This one reduces by π in two parts (Cody and Waite) to [−π/2, π/2], where one
+//! odd polynomial suffices. Up to 10⁶ rad the error is within 1 ulp of 1; beyond, it stays below the effect of rounding the
+//! argument. For arguments past 2⁵⁰ the result is meaningless and may be huge; callers refuse them.
 //!
 //! **Logarithm.** A normal number above zero is 2ᵏ·(1 + f) with 1 + f between √½ and √2; ln(1 + f) is fdlibm's polynomial in
 //! s = f/(2 + f). The error stays below 1 ulp. For zero, subnormal numbers, infinity and NaN the result is meaningless: callers
@@ -59,15 +59,16 @@ fn half_turn<N: Number>(r: N, y: N) -> N {
     let s = |i: usize| N::of(S[i]);
     let z = r * r;
     let w = z * z;
-    // Separate sums of odd and even powers have half the latency of one chain. The largest term is added last; otherwise the error
-    // would be a sixth larger.
+    // Separate sums of odd and even powers have half the latency of one chain. The largest term is added last; otherwise the
+    // error would be a sixth larger.
     let odd = s(1) + w * (s(3) + w * (s(5) + w * s(7)));
     let even = s(2) + w * (s(4) + w * s(6));
     let sine = r + (r * z) * (s(0) + z * (odd + z * even));
     sine.xor_bits(y.shift_up(63))
 }
 
-/// 2^r on [−½, ½], and log₂(1 + f)/f for 1 + f between √½ and √2: fitted at Chebyshev's nodes, wrong by 3.5e-6 and, times f, by 2.9e-5.
+/// 2^r on [−½, ½], and log₂(1 + f)/f for 1 + f between √½ and √2: fitted at Chebyshev's nodes, wrong by 3.5e-6 and, times f, by
+/// 2.9e-5.
 const ROUGH_EXP2: [f64; 5] = [1.0, 0.693121045203, 0.24022349038, 0.0559219758423, 0.00966636851538];
 const ROUGH_LOG2: [f64; 5] = [1.44264046428, -0.72062921586, 0.485737842443, -0.389675223792, 0.250287846961];
 

@@ -1,8 +1,8 @@
 //! Run-time CPU dispatch. The project's `unsafe` code is here and in the core's `kernel/pages.rs`.
 //!
-//! A wheel is built for the oldest CPU of its platform. Loops that are not written at run time, such as those of the interpreter, are
-//! therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA by itself or reorders, so all
-//! give the same bits.
+//! A wheel is built for the oldest CPU of its platform. Loops that are not written at run time, such as those of the interpreter,
+//! are therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA by itself or
+//! reorders, so all give the same bits.
 
 use std::{ffi::OsString, fmt};
 
@@ -83,15 +83,15 @@ impl Level {
         }
     }
 
-    /// Whether this machine has it. How a program may execute what it has written differs between systems; for AArch64 it is known here
-    /// for Linux.
+    /// Whether this machine has it. How a program may execute what it has written differs between systems; for AArch64 it is
+    /// known here for Linux.
     #[cfg(not(target_arch = "x86_64"))]
     pub fn here(self) -> bool {
         self == Level::Baseline || self == Level::Neon && cfg!(all(target_arch = "aarch64", target_os = "linux"))
     }
 
-    /// The level whose instructions the interpreter's own loops use: of `Baseline`, which says that no machine code is written, the best
-    /// that this machine has.
+    /// The level whose instructions the interpreter's own loops use: of `Baseline`, which says that no machine code is written,
+    /// the best that this machine has.
     pub fn of_loops(self) -> Level {
         match self {
             Level::Baseline => Level::available().pop().unwrap_or(self),
@@ -104,7 +104,8 @@ impl Level {
         Level::ALL.into_iter().filter(|l| l.here()).collect()
     }
 
-    /// The level whose kernels `STEPWELL_KERNELS` names, or else the one that `STEPWELL_ISA` does, or else the best of this machine.
+    /// The level whose kernels `STEPWELL_KERNELS` names, or else the one that `STEPWELL_ISA` does, or else the best of this
+    /// machine.
     pub fn choose() -> Result<Level, UnknownLevel> {
         Level::asked(std::env::var_os(KERNELS), std::env::var_os(ISA))
     }

@@ -1,14 +1,15 @@
 //! The numbers over which a step is written.
 //!
-//! A step, a system, a control are written once, over any [`Number`]. With `f64` they compute; with the core's symbols they write the
-//! tape.
+//! A step, a system, a control are written once, over any [`Number`]. With `f64` they compute; with the core's symbols they write
+//! the tape.
 
 use std::{
     fmt::Debug,
     ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign},
 };
 
-/// A function of one number that is made of roundings and operations on bits, which have no derivative: a series must know its name.
+/// A function of one number that is made of roundings and operations on bits, which have no derivative: a series must know its
+/// name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
     /// sin x
@@ -28,8 +29,8 @@ pub struct Series<N> {
     pub branches: Vec<Branch<N>>,
 }
 
-/// A function with several branches, such as a root: its start and its coefficients, none where it is known to be zero, and the bounds of
-/// the values of its branch.
+/// A function with several branches, such as a root: its start and its coefficients, none where it is known to be zero, and the
+/// bounds of the values of its branch.
 #[derive(Clone, Debug)]
 pub struct Branch<N> {
     /// The value at the start of the step, and the coefficients.
@@ -102,9 +103,9 @@ pub trait Number:
         self
     }
 
-    /// The Taylor coefficients, from the first to the one of that order, of a solution that starts so and whose rates a function makes
-    /// of the start and of the time. The time is its value, the unit in powers of which the coefficients are, and this over the one of the
-    /// rates. Only symbols have a record of how rates were made, so of numbers there is no series.
+    /// The Taylor coefficients, from the first to the one of that order, of a solution that starts so and whose rates a function
+    /// makes of the start and of the time. The time is its value, the unit in powers of which the coefficients are, and this over
+    /// the one of the rates. Only symbols have a record of how rates were made, so of numbers there is no series.
     fn series(_order: u32, _start: &[Self], _time: [Self; 3], _rates: &mut dyn FnMut() -> Vec<Self>) -> Option<Series<Self>> {
         None
     }

@@ -1,7 +1,7 @@
 //! `World::step` allocates nothing.
 //!
-//! Allocations of all threads are counted, so this test is a program of its own (`harness = false`): the thread of the test harness
-//! allocates, too, just after it has started a test.
+//! Allocations of all threads are counted, so this test is a program of its own (`harness = false`): the thread of the test
+//! harness allocates, too, just after it has started a test.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -11,10 +11,13 @@ use common::{Of, model, oscillators, spec};
 use stepwell_core::{
     error::Error,
     isa::Level,
-    method::Record,
-    run::{Machine, Model, stage::Clock, world::World},
-    spec::{Row, Table},
-    steppers::RECORDS,
+    model::{
+        method::Record,
+        spec::{Row, Table},
+        steppers::RECORDS,
+    },
+    run::{Model, world::World},
+    stage::{Clock, Machine},
 };
 
 #[global_allocator]

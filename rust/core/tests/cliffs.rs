@@ -16,12 +16,17 @@ use stepwell_core::{
         pack::{self, Make},
         writer::{Shape, Written, choose, write, write_if_it_gains},
     },
-    pace::Acceptance,
+    model::{
+        spec::{Row, Table},
+        steppers::RECORDS,
+    },
     run::Model,
-    spec::{Row, Table},
-    steppers::RECORDS,
+    step::{
+        key::{StepKind, TapeKey},
+        pace::Acceptance,
+        tapes::Tapes,
+    },
     tape::{Op, split::Body},
-    trace::{How, Scene, Tapes},
 };
 
 /// What one turn of the innermost loop does, by numbers of instructions.
@@ -183,8 +188,9 @@ fn no_kernel_computes_more_than_its_step_or_in_narrower_vectors() {
         if method.estimate.is_some() {
             // Adaptive steps.
             let attempts = |model: Model<'static>| {
-                let how = How::Attempts { name: name.to_owned(), order: 0, acceptance: Acceptance::default(), backward: false };
-                Model { scene: Scene { how, ..model.scene }, ..model }
+                let how =
+                    StepKind::Attempts { name: name.to_owned(), order: 0, acceptance: Acceptance::default(), backward: false };
+                Model { key: TapeKey { how, ..model.key }, ..model }
             };
             models.extend([pendulum(name, true), restricted(name), three_bodies(name)].map(attempts));
         }
@@ -195,7 +201,7 @@ fn no_kernel_computes_more_than_its_step_or_in_narrower_vectors() {
             for (level, members) in levels().flat_map(|level| MEMBERS.map(|members| (level, members))) {
                 let (shape, turn, arithmetic) = written(&model, level, members);
                 let what = (turn.arithmetic, turn.narrower);
-                assert_eq!(what, (shape.block_vectors * arithmetic, 0), "{:?}, {shape:?}: {turn:?}", model.scene);
+                assert_eq!(what, (shape.block_vectors * arithmetic, 0), "{:?}, {shape:?}: {turn:?}", model.key);
                 seen += 1;
             }
         }
@@ -203,7 +209,8 @@ fn no_kernel_computes_more_than_its_step_or_in_narrower_vectors() {
     assert!(seen == 0 || seen > 200, "{seen}");
 }
 
-/// One member whose operations are packed: as many instructions of arithmetic as the packing has vectors of it, and so few beside them.
+/// One member whose operations are packed: as many instructions of arithmetic as the packing has vectors of it, and so few beside
+/// them.
 #[test]
 fn packed_kernels_compute_what_their_vectors_do() {
     for (model, most) in [(three_bodies("leapfrog"), 0.5), (three_bodies("rk4"), 0.5), (planar_bodies("false_euler"), 0.6)] {
@@ -215,10 +222,11 @@ fn packed_kernels_compute_what_their_vectors_do() {
             let turn = turn(&kernel);
             let is = |op: &Op| matches!(op, Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) | Op::Sqrt(_));
             let vectors = packed.unwrap().vectors.iter().filter(|vector| matches!(&vector.make, Make::Op(op) if is(op))).count();
-            assert_eq!(turn.arithmetic + turn.narrower, vectors, "{:?}, {level:?}", model.scene);
+            assert_eq!(turn.arithmetic + turn.narrower, vectors, "{:?}, {level:?}", model.key);
             assert!((vectors as f64) < most * arithmetic(body) as f64, "{vectors} of {}", arithmetic(body));
             assert!(verdict.gains() && verdict.packed.unwrap() >= verdict.chain, "{verdict:?}");
-            // Beside them: moves between lanes, the count of steps, and what 32 registers do not hold: with RK4 13 % of the vectors.
+            // Beside them: moves between lanes, the count of steps, and what 32 registers do not hold: with RK4 13 % of the
+            // vectors.
             if level == Level::Avx512 {
                 assert!(turn.all <= vectors + verdict.moves + turn.spilled + 4, "{turn:?}, {verdict:?}");
                 assert!(100 * turn.spilled <= 16 * vectors, "{turn:?}");
@@ -233,8 +241,8 @@ fn a_step_that_is_a_chain_is_not_packed() {
         for level in levels() {
             let tapes = tapes(&model);
             let body = &tapes.step.split.body;
-            assert!(write_if_it_gains(body, choose(body, level, 1).unwrap()).is_none(), "{:?}", model.scene);
-            assert!(write_if_it_gains(body, choose(body, level, 8).unwrap()).is_none(), "{:?}", model.scene);
+            assert!(write_if_it_gains(body, choose(body, level, 1).unwrap()).is_none(), "{:?}", model.key);
+            assert!(write_if_it_gains(body, choose(body, level, 8).unwrap()).is_none(), "{:?}", model.key);
         }
     }
 }
@@ -264,7 +272,7 @@ fn few_members_spill_nothing_where_there_are_32_registers() {
             if Level::Avx512.here() {
                 let (shape, turn, _) = written(&model, Level::Avx512, members);
                 let memory = (turn.state_read, turn.state_written, turn.spilled);
-                assert_eq!(memory, (0, 0, 0), "{:?}, {shape:?}: {turn:?}", model.scene);
+                assert_eq!(memory, (0, 0, 0), "{:?}, {shape:?}: {turn:?}", model.key);
             }
         }
     }
@@ -305,7 +313,8 @@ fn roots_of_some_vectors_are_found_beside_sums_of_others() {
         let turn: Vec<_> = innermost(kernel.code()).into_iter().filter(|i| is_arithmetic(i.mnemonic()).is_some()).collect();
         let places: Vec<_> = (0..turn.len()).filter(|at| is_slow(&turn[*at])).collect();
         assert_eq!(places.len(), 8 * 6, "a root and a quotient for each pair");
-        // Side by side, all vectors have what is before the first root outside, and what is after the last quotient: that is more than half.
+        // Side by side, all vectors have what is before the first root outside, and what is after the last quotient: that is more
+        // than half.
         let outside = turn.len() - (places[places.len() - 1] - places[0]);
         assert!(4 * outside < turn.len(), "{level:?}: {outside} of {} operations leave the unit idle", turn.len());
     }
@@ -320,7 +329,7 @@ fn a_state_that_streams_is_written_once_a_step() {
             let numbers = shape.block_vectors * (traced.shape.v + traced.shape.y);
             // Where the state is resident as far as there are registers, some of it is not written at all.
             let is_once = turn.state_written == numbers || shape.resident && turn.state_written < numbers;
-            assert!(is_once, "{:?}, {shape:?}: {turn:?}", model.scene);
+            assert!(is_once, "{:?}, {shape:?}: {turn:?}", model.key);
         }
     }
 }
@@ -332,7 +341,7 @@ fn what_all_members_have_in_common_is_in_no_loop() {
     for (method, nodes) in [("false_euler", 1), ("standard_heun", 2), ("rk4", 3)] {
         let of = |driven: bool| arithmetic(&tapes(&pendulum(method, driven)).step.split.body);
         let (free, driven) = (of(false), of(true));
-        let evaluations = stepwell_core::method::record(method).unwrap().program().evaluations();
+        let evaluations = stepwell_core::model::steppers::method(method).unwrap().program().evaluations();
         assert!(driven - free <= nodes + evaluations, "{method}: {driven} against {free}");
     }
 }
@@ -345,7 +354,7 @@ fn kernels_are_a_few_kilobytes() {
             let tapes = tapes(&model);
             let body = &tapes.step.split.body;
             let code = write(body, choose(body, level, UNLIMITED).unwrap()).unwrap().code().len();
-            assert!(code < 32 << 10, "{:?}, {level:?}: {code}", model.scene);
+            assert!(code < 32 << 10, "{:?}, {level:?}: {code}", model.key);
         }
     }
 }

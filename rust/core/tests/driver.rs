@@ -9,14 +9,16 @@ use proptest::prelude::*;
 use stepwell_core::{
     error::Error,
     isa::{Level, UnknownLevel},
+    model::{
+        spec::{Row, Spec, Table},
+        steppers::RECORDS,
+    },
     run::{
-        Machine, Model,
-        batch::{Arrays, Plan, Steppable, kept, run, save},
-        stage::{Clock, PreparedStage, Stage},
+        Model,
+        fixed::{Arrays, FixedRun, Steppable, kept, run, save},
         world::World,
     },
-    spec::{Row, Spec, Table},
-    steppers::RECORDS,
+    stage::{Clock, Machine, PreparedStage, Stage},
     tape::{Op, Tape, split::split},
 };
 
@@ -28,20 +30,20 @@ fn machine(threads: usize) -> Machine {
     Machine { level: Level::choose().unwrap(), threads }
 }
 
-fn plan(model: Model<'_>, h: f64, steps: i64, members: usize, threads: usize) -> Plan<'_> {
+fn plan(model: Model<'_>, h: f64, steps: i64, members: usize, threads: usize) -> FixedRun<'_> {
     let (v, y) = (vec![Row(&[0.0])], vec![Row(&[1.0])]);
-    Plan { model, clock: clock(h), machine: machine(threads), first: 0, steps, every: None, v, y, members, carried: false }
+    FixedRun { model, clock: clock(h), machine: machine(threads), first: 0, steps, every: None, v, y, members, carried: false }
 }
 
 type Last<T = f64> = (Vec<T>, Vec<T>, Vec<i64>);
 
 /// The last v and y from v = 0 and y = 1, and the steps at which members diverged.
-fn last(plan: &Plan) -> Result<Last, Error> {
+fn last(plan: &FixedRun) -> Result<Last, Error> {
     last_of(plan)
 }
 
 /// The same, of either precision.
-fn last_of<T: Steppable>(plan: &Plan) -> Result<Last<T>, Error> {
+fn last_of<T: Steppable>(plan: &FixedRun) -> Result<Last<T>, Error> {
     let [mut v, mut y] = [(); 2].map(|()| vec![T::of(0.0); plan.members]);
     let mut bad = vec![-1; plan.members];
     let arrays =
@@ -77,8 +79,8 @@ fn every_method_is_the_same_for_every_number_of_threads() {
 
 #[test]
 fn a_batch_of_any_size_is_its_members() {
-    // Tiles of several interleaved vectors, narrow ones of one vector, and single members, one or several after another: sizes around
-    // each.
+    // Tiles of several interleaved vectors, narrow ones of one vector, and single members, one or several after another: sizes
+    // around each.
     let omega: Vec<f64> = (0..385).map(|i| 0.5 + f64::from(i) / 200.0).collect();
     let pendulums = |members: usize| driven_pendulums(&omega[..members]);
     let (v, y, _) = last(&plan(pendulums(385), 0.1, 50, 385, 1)).unwrap();
@@ -113,7 +115,7 @@ fn machine_code_has_the_bits_of_the_interpreter_in_both_precisions() {
         let at = |level: Level, members: usize, fused: bool| {
             let mut plan = plan(driven_pendulums(&omega[..members]), 0.1, steps, members, 1);
             plan.machine.level = level;
-            (plan.model.scene.precision, plan.model.scene.fused) = (T::PRECISION, fused);
+            (plan.model.key.precision, plan.model.key.fused) = (T::PRECISION, fused);
             last_of::<T>(&plan).unwrap()
         };
         for fused in [false, true] {
@@ -220,8 +222,8 @@ fn kept_steps() {
     assert_eq!(kept(2, Some(7)), [0, 2]);
 }
 
-/// A stage whose state is, after a step, the sampled input 0 at that step's time; or, `own`, at the time that the member has in its
-/// second number.
+/// A stage whose state is, after a step, the sampled input 0 at that step's time; or, `own`, at the time that the member has in
+/// its second number.
 fn sampled(common: bool, own: bool) -> Stage {
     let mut tape = Tape::default();
     let time = tape.push(if own { Op::State(1) } else { Op::Time });
@@ -232,8 +234,8 @@ fn sampled(common: bool, own: bool) -> Stage {
 
 const LANES: usize = 8;
 
-/// The samples that members find: `rows` holds one number for all or one each, `t0` is the time of step 0, and `own` says that members
-/// are at times of their own. What a step and its time give.
+/// The samples that members find: `rows` holds one number for all or one each, `t0` is the time of step 0, and `own` says that
+/// members are at times of their own. What a step and its time give.
 fn found(rows: &[Vec<f64>], h: f64, own: bool, t0: f64, steps: std::ops::RangeInclusive<i64>) -> Vec<(i64, Vec<f64>)> {
     let table = Table { samples: rows.iter().map(|row| Row(row)).collect(), start: 0.0, interval: h };
     let spec = Spec { tables: vec![table], ..Spec::default() };
@@ -251,8 +253,8 @@ fn found(rows: &[Vec<f64>], h: f64, own: bool, t0: f64, steps: std::ops::RangeIn
 }
 
 proptest! {
-    /// A held input gives sample k at t0 + k·h for every k, however h and t0 round, and holds in between: whether members have it in
-    /// common or not, and whether they are at the same time or not.
+    /// A held input gives sample k at t0 + k·h for every k, however h and t0 round, and holds in between: whether members have it
+    /// in common or not, and whether they are at the same time or not.
     #[test]
     fn every_sample_is_found(h in 1e-6..1e3f64, n in 1usize..200, later in 0.0..0.999f64) {
         for (width, own) in [(1, false), (LANES, false), (1, true), (LANES, true)] {

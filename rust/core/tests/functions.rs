@@ -1,5 +1,5 @@
-//! The functions that both languages share, beside those of the machine. Here and not beside their code, or the whole core would be
-//! compiled twice for the tests.
+//! The functions that both languages share, beside those of the machine. Here and not beside their code, or the whole core would
+//! be compiled twice for the tests.
 
 mod trig {
     use stepwell_core::functions::sin;
@@ -53,8 +53,10 @@ mod log {
 mod symbols {
     use stepwell_core::{
         functions::{log, sin},
-        number::{Symbol, record},
-        tape::{Op, Tape, eval},
+        tape::{
+            Op, Tape, eval,
+            number::{Symbol, record},
+        },
     };
 
     /// A function's tape makes the bits that the function makes.

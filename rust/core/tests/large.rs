@@ -3,37 +3,44 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use stepwell_core::{
-    controls,
     error::Error,
+    group::{AdaptiveBatch, Group, adaptive_lanes::AdaptiveLanes, lanes::Lanes},
     isa::Level,
     large::{
-        Asked, Facts, Rates,
         adaptive::LargeAdaptive,
-        course::{Act, Course, Goal},
+        blocks::Schedules,
         group::LargeGroup,
+        hand_written::{kernel_of, single},
         matrix::Matrix,
-        single,
-        tapes::TapeRates,
+        rates::{RateTraits, Rates, RatesRequest},
+        schedule::{Action, BlockSchedule, Goal},
+        tapes::{RateTapes, TapeRates},
     },
-    method,
-    pace::{Acceptance, Pace},
-    real::Precision,
-    run::{
-        Machine,
-        adaptive::{AdaptiveBatch, AdaptiveLanes},
-        group::{Group, Lanes},
-        stage::Clock,
+    model::{
+        around::controls,
+        spec::{Row, Signature, Spec, Table},
+        steppers::{RECORDS, method},
+        system::Shape,
+        systems::kind,
     },
-    spec::{Given, Row, Spec, Table},
-    steppers::RECORDS,
-    system::{self, Shape},
-    trace::{How, Scene},
+    stage::{Clock, Machine},
+    step::{
+        key::{StepKind, TapeKey},
+        pace::{Acceptance, Pace},
+    },
+    tape::real::Precision,
 };
 
 const CLOCK: Clock = Clock { t0: 0.3, h: 0.0123 };
 
-fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &[(&str, usize)], tables: &[&str]) -> Given {
-    Given {
+fn signature(
+    system: &str,
+    words: &[(&str, &str)],
+    wholes: &[(&str, usize)],
+    rows: &[(&str, usize)],
+    tables: &[&str],
+) -> Signature {
+    Signature {
         system: system.to_owned(),
         words: words.iter().map(|(name, word)| (name.to_string(), word.to_string())).collect(),
         wholes: wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
@@ -53,19 +60,19 @@ const CONTROLS: [&[(&str, &str)]; 5] = [
     &[("control", "projection"), ("control.way", "nacozy")],
 ];
 
-fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Given {
+fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Signature {
     let mut rows = vec![("masses", n), ("strength", n), ("softening", 1)];
     match control.first() {
         Some((_, "energy")) => rows.extend([("control.gain", 1), ("control.target", 1)]),
         Some(_) => rows.push(("control.target", 1)),
         None => {}
     }
-    given("nbody", &[&[("force", force)], control].concat(), &[("dim", dim)], &rows, &[])
+    signature("nbody", &[&[("force", force)], control].concat(), &[("dim", dim)], &rows, &[])
 }
 
-/// A net in so many dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across, which do
-/// not. The first particle is fixed if there is more than one row.
-fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], control: &[(&str, &str)]) -> Given {
+/// A net in so many dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across,
+/// which do not. The first particle is fixed if there is more than one row.
+fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], control: &[(&str, &str)]) -> Signature {
     let n = rows * columns;
     let mut pairs: Vec<[usize; 2]> = (0..n).filter(|i| i % columns + 1 < columns).map(|i| [i, i + 1]).collect();
     pairs.extend((columns..n).map(|i| [i, i - columns]));
@@ -83,11 +90,11 @@ fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], contr
     }
     let list = |numbers: Vec<usize>| numbers.into_iter().map(|number| number as u32).collect();
     let lists = vec![("pairs".to_owned(), list(pairs.concat())), ("fixed".to_owned(), list(fixed))];
-    Given { lists, ..given("springs", control, &[("n", n), ("dim", dim)], &parameters, &[]) }
+    Signature { lists, ..signature("springs", control, &[("n", n), ("dim", dim)], &parameters, &[]) }
 }
 
 /// Nets of springs: a pair, and those of every kind; 0 stands for as many numbers as there are springs.
-fn nets() -> Vec<Given> {
+fn nets() -> Vec<Signature> {
     let damped = [("masses", 12), ("stiffness", 0), ("rest", 0), ("damping", 0), ("gravity", 3), ("drag", 12)];
     vec![
         net(1, 2, 1, &[], &[]),
@@ -99,18 +106,18 @@ fn nets() -> Vec<Given> {
     ]
 }
 
-fn systems() -> Vec<Given> {
+fn systems() -> Vec<Signature> {
     let sine = [("x.amplitude", 1), ("x.omega", 1), ("x.phase", 1)];
     let mut all = vec![
-        given("oscillator", &[("form", "physical")], &[], &[&[("omega", 1), ("damping", 1)], &sine[..]].concat(), &["a"]),
-        given("pendulum", &[], &[], &[("omega", 1)], &[]),
-        given("restricted_three_body", &[], &[], &[("mu", 1)], &[]),
-        given("linear", &[("kind", "acceleration")], &[("n_v", 3)], &[("rows", 36)], &[]),
-        given("linear", &[], &[("n_v", 0)], &[("rows", 25)], &[]),
-        given("linear", &[], &[("n_v", 4)], &[("rows", 16)], &[]),
-        given("linear", &[], &[("n_v", 7), ("inputs", 2)], &[("rows", 19 * 21), ("inputs[0]", 1)], &["inputs[1]"]),
+        signature("oscillator", &[("form", "physical")], &[], &[&[("omega", 1), ("damping", 1)], &sine[..]].concat(), &["a"]),
+        signature("pendulum", &[], &[], &[("omega", 1)], &[]),
+        signature("restricted_three_body", &[], &[], &[("mu", 1)], &[]),
+        signature("linear", &[("kind", "acceleration")], &[("n_v", 3)], &[("rows", 36)], &[]),
+        signature("linear", &[], &[("n_v", 0)], &[("rows", 25)], &[]),
+        signature("linear", &[], &[("n_v", 4)], &[("rows", 16)], &[]),
+        signature("linear", &[], &[("n_v", 7), ("inputs", 2)], &[("rows", 19 * 21), ("inputs[0]", 1)], &["inputs[1]"]),
     ];
-    all.extend([1, 2, 19].map(|n| given("chain", &[], &[], &[("stiffness", n + 1), ("mass", n)], &[])));
+    all.extend([1, 2, 19].map(|n| signature("chain", &[], &[], &[("stiffness", n + 1), ("mass", n)], &[])));
     for force in ["logarithmic", "newton", "printed"] {
         for (n, dim) in [(1, 2), (2, 3), (9, 2), (17, 3)] {
             all.extend(CONTROLS.map(|control| bodies(n, dim, force, control)));
@@ -135,10 +142,10 @@ fn numbers(count: usize, seed: u64) -> Vec<f64> {
 }
 
 /// Rows of parameters and samples of so many members.
-fn spec<'a>(given: &Given, numbers: &'a [f64], members: usize) -> Spec<'a> {
+fn spec<'a>(signature: &Signature, numbers: &'a [f64], members: usize) -> Spec<'a> {
     let rows: Vec<Row> = numbers.chunks(members).map(Row).collect();
-    let tables = given.tables.iter().map(|_| Table { samples: rows[..9].to_vec(), start: 0.29, interval: 0.011 }).collect();
-    Spec { given: given.clone().into(), rows: rows[..given.parameters()].to_vec(), tables }
+    let tables = signature.tables.iter().map(|_| Table { samples: rows[..9].to_vec(), start: 0.29, interval: 0.011 }).collect();
+    Spec { signature: signature.clone().into(), rows: rows[..signature.parameters()].to_vec(), tables }
 }
 
 /// What a group makes of members: states, quantities and sums after some steps, by bits, its lane's first for each row.
@@ -168,11 +175,11 @@ fn made(group: &mut dyn Group, spec: &Spec, member: usize, count: usize, state: 
     seen
 }
 
-fn scene(given: &Given, how: How) -> Scene {
-    let kind = system::kind(&given.system).unwrap();
-    let record = if matches!(how, How::Method { .. }) { (kind.quantities)(given) } else { Vec::new() };
-    Scene {
-        given: given.clone().into(),
+fn key(signature: &Signature, how: StepKind) -> TapeKey {
+    let kind = kind(signature).unwrap();
+    let record = if matches!(how, StepKind::Method { .. }) { (kind.quantities)(signature) } else { Vec::new() };
+    TapeKey {
+        signature: signature.clone().into(),
         how,
         record: record.into_iter().map(|(name, _)| name.to_owned()).collect(),
         fused: false,
@@ -191,47 +198,46 @@ fn same(of_all: &[Vec<u64>], of_each: &[Vec<Vec<u64>>], what: &str) {
 #[test]
 fn a_program_over_rows_is_its_tape() {
     let mut tried = 0;
-    for (seed, given) in systems().into_iter().enumerate() {
-        let kind = system::kind(&given.system).unwrap();
-        let parameters = numbers(13 * (given.parameters() + 9), seed as u64 + 1);
-        let spec = spec(&given, &parameters, 13);
+    for (seed, signature) in systems().into_iter().enumerate() {
+        let parameters = numbers(13 * (signature.parameters() + 9), seed as u64 + 1);
+        let spec = spec(&signature, &parameters, 13);
         for record in RECORDS.iter().filter(|record| record.program().series_order() == 0) {
             let ways = record.carry.as_ref().map_or(1, |carry| carry.starts.len().max(1));
             // Of what is long to trace some methods are enough.
-            if given.count("masses") > 17 && !["rk4", "verlet", "false_euler"].contains(&record.name) {
+            if signature.count("masses") > 17 && !["rk4", "verlet", "false_euler"].contains(&record.name) {
                 continue;
             }
             for choice in 0..ways {
-                let scene = scene(&given, How::Method { name: record.name.to_owned(), choice });
-                let traced = match scene.traced() {
+                let key = key(&signature, StepKind::Method { name: record.name.to_owned(), choice });
+                let traced = match key.traced() {
                     Err(Error::VelocityDependent { .. }) => continue,
                     traced => traced.unwrap(),
                 };
                 let Shape { v, y } = traced.shape;
                 let state = numbers(13 * (v + y), 99);
-                let what = format!("{} {choice} on {given:?}", record.name);
+                let what = format!("{} {choice} on {signature:?}", record.name);
                 let level = Level::choose().unwrap();
                 let mut tape = Lanes::new(&traced, &spec, level, 1, &CLOCK).unwrap();
                 let of_each: Vec<_> = (2..7).map(|member| made(&mut tape, &spec, member, 1, &state)).collect();
                 let large = |rates: Box<dyn Rates>| {
-                    let courses = traced.courses(rates.facts()).unwrap();
-                    LargeGroup::new(courses, rates, traced.shape, traced.recorded, level, &CLOCK)
+                    let schedules = Schedules::of(&key.how, rates.traits(), traced.shape).unwrap();
+                    LargeGroup::new(schedules, rates, traced.shape, traced.recorded, level, &CLOCK)
                 };
                 for lanes in [8, 1] {
-                    let rates = Box::new(TapeRates::new(traced.rated().unwrap(), &spec, level, lanes, &CLOCK));
+                    let rates = Box::new(TapeRates::new(RateTapes::of(&key).unwrap(), &spec, level, lanes, &CLOCK));
                     let mut group = large(rates);
                     for (at, of_each) in of_each.chunks(lanes.min(5)).enumerate() {
                         let of_all = made(&mut group, &spec, 2 + lanes * at, of_each.len(), &state);
                         same(&of_all, of_each, &format!("tapes of {lanes} lanes, {what}"));
                     }
                 }
-                if let Some(long) = kind.long {
+                if let Some(long) = kernel_of(&signature.system) {
                     for threads in [1, 2] {
                         let machine = Machine { level, threads };
-                        let asked = Asked {
-                            given: &given,
+                        let asked = RatesRequest {
+                            signature: &signature,
                             shape: traced.shape,
-                            record: &scene.record,
+                            record: &key.record,
                             machine,
                             h: CLOCK.h,
                             attempts: false,
@@ -251,44 +257,51 @@ fn a_program_over_rows_is_its_tape() {
 
 #[test]
 fn every_level_makes_the_same_of_a_large_member() {
-    for given in [
+    for signature in [
         bodies(100, 3, "newton", CONTROLS[3]),
         systems().remove(6),
-        given("chain", &[], &[], &[("stiffness", 301), ("mass", 300)], &[]),
+        signature("chain", &[], &[], &[("stiffness", 301), ("mass", 300)], &[]),
         net(13, 31, 3, &[("stiffness", 0), ("damping", 0), ("gravity", 3), ("drag", 1)], &[]),
         net(17, 24, 2, &[("rest", 0), ("masses", 17 * 24)], CONTROLS[4]),
     ] {
-        let parameters = numbers(13 * (given.parameters() + 9), 7);
-        let spec = spec(&given, &parameters, 13);
-        let scene = scene(&given, How::Method { name: "rk4".to_owned(), choice: 0 });
-        let traced = scene.traced().unwrap();
+        let parameters = numbers(13 * (signature.parameters() + 9), 7);
+        let spec = spec(&signature, &parameters, 13);
+        let key = key(&signature, StepKind::Method { name: "rk4".to_owned(), choice: 0 });
+        let traced = key.traced().unwrap();
         let state = numbers(13 * (traced.shape.v + traced.shape.y), 8);
         let of_level = |level: Level| {
             let machine = Machine { level, threads: 1 };
-            let asked = Asked { given: &given, shape: traced.shape, record: &scene.record, machine, h: CLOCK.h, attempts: false };
-            let rates = single(system::kind(&given.system).unwrap().long.unwrap(), &asked);
-            let courses = traced.courses(rates.facts()).unwrap();
-            made(&mut LargeGroup::new(courses, rates, traced.shape, traced.recorded, level, &CLOCK), &spec, 3, 1, &state)
+            let asked = RatesRequest {
+                signature: &signature,
+                shape: traced.shape,
+                record: &key.record,
+                machine,
+                h: CLOCK.h,
+                attempts: false,
+            };
+            let rates = single(kernel_of(&signature.system).unwrap(), &asked);
+            let schedules = Schedules::of(&key.how, rates.traits(), traced.shape).unwrap();
+            made(&mut LargeGroup::new(schedules, rates, traced.shape, traced.recorded, level, &CLOCK), &spec, 3, 1, &state)
         };
         let all: Vec<_> = Level::available().into_iter().map(of_level).collect();
-        assert!(all.iter().all(|one| *one == all[0]), "{given:?}");
+        assert!(all.iter().all(|one| *one == all[0]), "{signature:?}");
     }
 }
 
 #[test]
 fn attempts_of_a_large_member_are_those_of_its_tape() {
-    for (seed, given) in systems().into_iter().enumerate() {
-        if given.count("masses") > 17 {
+    for (seed, signature) in systems().into_iter().enumerate() {
+        if signature.count("masses") > 17 {
             continue;
         }
-        let parameters = numbers(13 * (given.parameters() + 9), seed as u64 + 1);
-        let spec = spec(&given, &parameters, 13);
+        let parameters = numbers(13 * (signature.parameters() + 9), seed as u64 + 1);
+        let spec = spec(&signature, &parameters, 13);
         for record in RECORDS.iter().filter(|record| record.estimate.is_some() && record.program().series_order() == 0) {
-            let scene = scene(
-                &given,
-                How::Attempts { name: record.name.to_owned(), order: 0, acceptance: Acceptance::default(), backward: false },
+            let key = key(
+                &signature,
+                StepKind::Attempts { name: record.name.to_owned(), order: 0, acceptance: Acceptance::default(), backward: false },
             );
-            let traced = scene.traced().unwrap();
+            let traced = key.traced().unwrap();
             let (level, shape) = (Level::choose().unwrap(), traced.shape);
             let state = numbers(shape.v + shape.y, 98);
             let run = |adaptive: &mut dyn AdaptiveBatch| {
@@ -318,16 +331,16 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
             let clock = Clock { t0: 0.0, h: 1.0 };
             // Tapes of rates are scaled to a step of 1, on which a push depends.
             let mut rates: Vec<Box<dyn Rates>> = Vec::new();
-            if !controls::pushes(&given) {
-                rates.push(Box::new(TapeRates::new(traced.rated().unwrap(), &spec, level, 1, &clock)));
+            if !controls::pushes(&signature) {
+                rates.push(Box::new(TapeRates::new(RateTapes::of(&key).unwrap(), &spec, level, 1, &clock)));
             }
             let machine = Machine { level, threads: 1 };
-            let asked = Asked { given: &given, shape, record: &[], machine, h: 1.0, attempts: true };
-            rates.extend(system::kind(&given.system).unwrap().long.map(|long| single(long, &asked)));
+            let asked = RatesRequest { signature: &signature, shape, record: &[], machine, h: 1.0, attempts: true };
+            rates.extend(kernel_of(&signature.system).map(|long| single(long, &asked)));
             for (kind, rates) in rates.into_iter().enumerate() {
-                let courses = traced.courses(rates.facts()).unwrap();
-                let mut large = LargeAdaptive::new(courses, rates, &traced, level, 30.0).unwrap();
-                assert_eq!(run(&mut large), of_tape, "{} on {given:?}, rates {kind}", record.name);
+                let schedules = Schedules::of(&key.how, rates.traits(), traced.shape).unwrap();
+                let mut large = LargeAdaptive::new(schedules, rates, &traced, level, 30.0).unwrap();
+                assert_eq!(run(&mut large), of_tape, "{} on {signature:?}, rates {kind}", record.name);
             }
         }
     }
@@ -336,24 +349,29 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
 #[test]
 fn the_matrix_form_of_a_large_member_is_its_tape() {
     for (n, inputs) in [(1, 0), (3, 1), (8, 2), (33, 1), (57, 0)] {
-        let how = How::Matrix { nodes: [0.0, 0.5, 1.0].map(f64::to_bits).to_vec() };
+        let how = StepKind::Matrix { nodes: [0.0, 0.5, 1.0].map(f64::to_bits).to_vec() };
         let rows =
             [("p", n * n), ("q", 3 * inputs * n), ("inputs[0].amplitude", 1), ("inputs[0].omega", 1), ("inputs[0].phase", 1)];
         let tables: &[&str] = if inputs == 2 { &["inputs[1]"] } else { &[] };
-        let mut given = given(
+        let mut signature = signature(
             "matrix",
             &[],
             &[("n", n), ("n_v", n / 3), ("inputs", inputs)],
             &rows[..if inputs > 0 { 5 } else { 2 }],
             tables,
         );
-        given.rows.retain(|(_, rows)| !rows.is_empty());
-        let parameters = numbers(13 * (given.parameters() + 9), n as u64);
-        let spec = spec(&given, &parameters, 13);
-        let traced =
-            Scene { given: given.into(), how: how.clone(), record: Vec::new(), fused: false, precision: Precision::Double }
-                .traced()
-                .unwrap();
+        signature.rows.retain(|(_, rows)| !rows.is_empty());
+        let parameters = numbers(13 * (signature.parameters() + 9), n as u64);
+        let spec = spec(&signature, &parameters, 13);
+        let traced = TapeKey {
+            signature: signature.into(),
+            how: how.clone(),
+            record: Vec::new(),
+            fused: false,
+            precision: Precision::Double,
+        }
+        .traced()
+        .unwrap();
         let (level, state) = (Level::choose().unwrap(), numbers(13 * n, 3));
         let mut tape = Lanes::new(&traced, &spec, level, 1, &CLOCK).unwrap();
         let of_each: Vec<_> = (2..7).map(|member| made(&mut tape, &spec, member, 1, &state)).collect();
@@ -365,25 +383,25 @@ fn the_matrix_form_of_a_large_member_is_its_tape() {
 }
 
 /// How many rows the arena of a method has, how often it asks for rates and how many passes it makes.
-fn course(name: &str, facts: Facts) -> (usize, usize, usize) {
-    let program = method::record(name).unwrap().program();
-    let course = Course::new(&program, &program.results, Goal::State, facts, Shape { v: 9, y: 9 });
-    let passes = course.acts.iter().filter(|act| matches!(act, Act::Pass(_))).count();
-    (course.rows, course.acts.len() - passes, passes)
+fn schedule(name: &str, traits: RateTraits) -> (usize, usize, usize) {
+    let program = method(name).unwrap().program();
+    let schedule = BlockSchedule::new(&program, &program.results, Goal::State, traits, Shape { v: 9, y: 9 });
+    let passes = schedule.actions.iter().filter(|action| matches!(action, Action::Pass(_))).count();
+    (schedule.rows, schedule.actions.len() - passes, passes)
 }
 
 #[test]
 fn no_row_is_kept_and_no_pass_is_made_that_is_not_needed() {
-    let bodies = Facts { second_order: true, reads_v: false, stretched: false };
-    let any = Facts { second_order: false, reads_v: true, stretched: false };
+    let bodies = RateTraits { second_order: true, reads_v: false, stretched: false };
+    let any = RateTraits { second_order: false, reads_v: true, stretched: false };
     // v is replaced in its row, and y by way of it.
-    assert_eq!(course("false_euler", bodies), (3, 1, 1));
-    assert_eq!(course("false_euler", any), (3, 2, 2));
-    assert_eq!(course("standard_euler", any), (4, 1, 1));
-    assert_eq!(course("leapfrog", bodies), (3, 1, 1));
-    assert_eq!(course("verlet", bodies), (3, 1, 1));
+    assert_eq!(schedule("false_euler", bodies), (3, 1, 1));
+    assert_eq!(schedule("false_euler", any), (3, 2, 2));
+    assert_eq!(schedule("standard_euler", any), (4, 1, 1));
+    assert_eq!(schedule("leapfrog", bodies), (3, 1, 1));
+    assert_eq!(schedule("verlet", bodies), (3, 1, 1));
     // Four forces and two places to look from: forces do not depend on v, so two of them can be asked for at a time.
-    assert_eq!(course("rk4", bodies), (8, 4, 3));
+    assert_eq!(schedule("rk4", bodies), (8, 4, 3));
     // Two blocks of increments for each stage and two to look from.
-    assert_eq!(course("rk4", any), (12, 4, 4));
+    assert_eq!(schedule("rk4", any), (12, 4, 4));
 }

@@ -1,5 +1,5 @@
-//! Random systems through the whole core: own rates made of random operations, stepped by every method, in every way that promises the same
-//! bits. `STEPWELL_FUZZ` says how many runs are compared.
+//! Random systems through the whole core: own rates made of random operations, stepped by every method, in every way that
+//! promises the same bits. `STEPWELL_FUZZ` says how many runs are compared.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
 
@@ -8,19 +8,19 @@ use std::sync::Arc;
 use stepwell_core::{
     error::Error,
     isa::Level,
-    method::{Needs, Record},
-    real::Precision,
+    model::{
+        method::{Needs, Record},
+        spec::{Row, Signature, Spec},
+        steppers::RECORDS,
+    },
     run::{
-        Machine, Model,
-        batch::{Arrays, Plan, kept, run, save},
-        stage::Clock,
+        Model,
+        fixed::{Arrays, FixedRun, kept, run, save},
         world::World,
     },
-    spec::{Given, Row, Spec},
-    steppers::RECORDS,
-    systems::equations::Equations,
-    tape::{Id, Op},
-    trace::{How, Scene},
+    stage::{Clock, Machine},
+    step::key::{StepKind, TapeKey},
+    tape::{Id, Op, equations::Equations, real::Precision},
 };
 
 /// SplitMix64.
@@ -161,7 +161,7 @@ fn bits(numbers: &[f64]) -> Vec<u64> {
 
 /// How a run is made.
 #[derive(Clone, Debug)]
-struct Way {
+struct StepStrategy {
     level: Level,
     threads: usize,
     every: Option<i64>,
@@ -174,22 +174,22 @@ impl Case {
     fn model(&self, method: &str, of: &std::ops::Range<usize>) -> Model<'_> {
         let rows = self.parameters.iter().map(|row| if row.len() == 1 { Row(&row[..]) } else { Row(&row[of.clone()]) });
         let rows: Vec<Row> = rows.collect();
-        let given = Given {
+        let signature = Signature {
             system: "equations".to_owned(),
             rows: vec![("p".to_owned(), rows.iter().map(Row::is_common).collect())],
             equations: Some(Arc::clone(&self.equations)),
             watched: self.watched.clone(),
-            ..Given::default()
+            ..Signature::default()
         };
-        let how = How::Method { name: method.to_owned(), choice: 0 };
-        let scene = Scene {
-            given: given.clone().into(),
+        let how = StepKind::Method { name: method.to_owned(), choice: 0 };
+        let key = TapeKey {
+            signature: signature.clone().into(),
             how,
             record: vec!["quantity".to_owned()],
             fused: self.fused,
             precision: Precision::Double,
         };
-        Model { scene, spec: Spec { given: given.into(), rows, tables: Vec::new() } }
+        Model { key, spec: Spec { signature: signature.into(), rows, tables: Vec::new() } }
     }
 
     /// Rows of the members of a range.
@@ -202,7 +202,7 @@ impl Case {
         &self,
         method: &Record,
         of: std::ops::Range<usize>,
-        way: &Way,
+        way: &StepStrategy,
         from: Option<(&[f64], &[f64], &[i64])>,
     ) -> Result<(Filled, Vec<f64>, Vec<f64>), Error> {
         let model = self.model(method.name, &of);
@@ -212,7 +212,7 @@ impl Case {
         let (mut recorded, mut tally) = (vec![0.0; saved * traced.recorded * b], vec![0.0; traced.tally * b]);
         let mut carry = vec![0.0; p * b];
         let mut first_bad = from.map_or(vec![-1; b], |(_, _, bad)| bad.to_vec());
-        let plan = Plan {
+        let plan = FixedRun {
             model,
             clock: Clock { t0: 0.25, h: self.dt },
             machine: Machine { level: way.level, threads: way.threads },
@@ -257,8 +257,8 @@ fn near(recorded: &[f64], members: usize, member: usize, steps: usize) -> f64 {
     pairs.count() as f64
 }
 
-/// Compares all ways of making a run of a random system with the interpreter, one member after the other, that keeps every state; returns
-/// how many were compared, or what refuses the system.
+/// Compares all ways of making a run of a random system with the interpreter, one member after the other, that keeps every state;
+/// returns how many were compared, or what refuses the system.
 fn one_case(seed: u64, method: &Record) -> Result<usize, Error> {
     let case = case(seed);
     if method.needs == Needs::Acceleration && !case.is_second_order {
@@ -267,7 +267,7 @@ fn one_case(seed: u64, method: &Record) -> Result<usize, Error> {
     let about = || format!("seed {seed}, {}, {} members, {} steps, fused: {}", method.name, case.members, case.steps, case.fused);
     let [p, q] = case.sizes;
     let (b, steps) = (case.members, case.steps);
-    let slow = Way { level: Level::Baseline, threads: 1, every: Some(1), first: 3, steps };
+    let slow = StepStrategy { level: Level::Baseline, threads: 1, every: Some(1), first: 3, steps };
     // The members one by one, put together.
     let alone: Vec<Filled> = (0..b).map(|i| Ok(case.run(method, i..i + 1, &slow, None)?.0)).collect::<Result<_, Error>>()?;
     let together = |part: fn(&Filled) -> &Vec<u64>| -> Vec<u64> {
@@ -292,7 +292,7 @@ fn one_case(seed: u64, method: &Record) -> Result<usize, Error> {
     let mut seen = 0;
     let level = *Level::available().last().expect("a level");
     for (every, threads) in [(None, 1), (Some(1), 1), (Some(1), 3), (Some(7), 2), (Some(64), 1)] {
-        let way = Way { level, threads, every, ..slow.clone() };
+        let way = StepStrategy { level, threads, every, ..slow.clone() };
         let (got, ..) = case.run(method, 0..b, &way, None)?;
         let expected = Filled {
             v: thinned(&want.v, p * b, steps, every),
@@ -310,9 +310,9 @@ fn one_case(seed: u64, method: &Record) -> Result<usize, Error> {
     }
     // In two pieces, the second from the carry of the first.
     if steps > 1 {
-        let half = Way { level, threads: 1, every: None, first: 3, steps: steps / 2 };
+        let half = StepStrategy { level, threads: 1, every: None, first: 3, steps: steps / 2 };
         let (first, carry, y) = case.run(method, 0..b, &half, None)?;
-        let rest = Way { first: 3 + steps / 2, steps: steps - steps / 2, ..half };
+        let rest = StepStrategy { first: 3 + steps / 2, steps: steps - steps / 2, ..half };
         let (got, ..) = case.run(method, 0..b, &rest, Some((&carry, &y, &first.first_bad)))?;
         let expected = thinned(&want.y, q * b, steps, None);
         assert_eq!(got.first_bad, want.first_bad, "{}: in pieces", about());
@@ -361,7 +361,7 @@ fn random_systems_have_the_same_bits_in_every_way() {
 fn another_number_is_noticed() {
     let mut case = case(1);
     let rk4 = RECORDS.iter().find(|record| record.name == "rk4").expect("a method");
-    let way = Way { level: Level::Baseline, threads: 1, every: Some(1), first: 3, steps: case.steps };
+    let way = StepStrategy { level: Level::Baseline, threads: 1, every: Some(1), first: 3, steps: case.steps };
     let (want, ..) = case.run(rk4, 0..case.members, &way, None).expect("a run");
     case.y[0] = f64::from_bits(case.y[0].to_bits() + 1);
     let (got, ..) = case.run(rk4, 0..case.members, &way, None).expect("a run");

@@ -7,19 +7,24 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use stepwell_core::{
     bodies,
-    contact::{self, Contacts},
-    controls,
     error::Error,
-    method::{self, Needs, Record},
-    number::{Number, Symbol, record},
-    spec::{Given, Parameters},
-    steppers::RECORDS,
-    system::{self, Make, Shape, System},
-    systems::{
-        self, KINDS,
-        equations::{Equations, Invariant},
+    model::{
+        around::{
+            self,
+            contact::{self, Contacts},
+        },
+        method::{Needs, Record},
+        spec::{Parameters, Signature},
+        steppers::{RECORDS, method},
+        system::{Make, Shape, System},
+        systems::{self, KINDS},
     },
-    tape::{Counts, Id, Op, Tape, eval},
+    tape::{
+        Counts, Id, Op, Tape,
+        equations::{Equations, Invariant},
+        eval,
+        number::{Number, Symbol, record},
+    },
 };
 
 /// Evaluations of each method, and the times within a step at which they are made.
@@ -67,7 +72,7 @@ fn asked() -> Vec<(&'static str, usize, Vec<f64>)> {
 fn methods_ask_as_often_and_when_they_should() {
     assert_eq!(asked().len(), RECORDS.len());
     for (name, evaluations, nodes) in asked() {
-        let record = method::record(name).unwrap();
+        let record = method(name).unwrap();
         let program = record.program();
         assert_eq!((program.evaluations(), program.nodes(record.needs == Needs::Rates)), (evaluations, nodes), "{name}");
     }
@@ -99,8 +104,14 @@ fn a_program_has_no_entry_of_which_nothing_is_made() {
 }
 
 /// What is given to a system: words and whole numbers, numbers of rows, sampled inputs, all by name.
-fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &[(&str, usize)], tables: &[&str]) -> Given {
-    Given {
+fn signature(
+    system: &str,
+    words: &[(&str, &str)],
+    wholes: &[(&str, usize)],
+    rows: &[(&str, usize)],
+    tables: &[&str],
+) -> Signature {
+    Signature {
         system: system.to_owned(),
         words: words.iter().map(|(name, word)| (name.to_string(), word.to_string())).collect(),
         wholes: wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
@@ -112,7 +123,7 @@ fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &
     }
 }
 
-fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Given {
+fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Signature {
     let mut words = vec![("force", force)];
     words.extend(control);
     let mut rows = vec![("masses", n), ("strength", n), ("softening", 1)];
@@ -121,7 +132,7 @@ fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Given 
         Some(_) => rows.push(("control.target", 1)),
         None => {}
     }
-    given("nbody", &words, &[("dim", dim)], &rows, &[])
+    signature("nbody", &words, &[("dim", dim)], &rows, &[])
 }
 
 const SINE_A: [(&str, usize); 3] = [("a.amplitude", 1), ("a.omega", 1), ("a.phase", 1)];
@@ -132,9 +143,9 @@ const CONTROLS: [[(&str, &str); 2]; 4] = [
     [("control", "projection"), ("control.way", "nacozy")],
 ];
 
-/// A net in so many dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across, which do
-/// not. The first particle is fixed if there is more than one row.
-fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], control: &[(&str, &str)]) -> Given {
+/// A net in so many dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across,
+/// which do not. The first particle is fixed if there is more than one row.
+fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], control: &[(&str, &str)]) -> Signature {
     let n = rows * columns;
     let mut pairs: Vec<[usize; 2]> = (0..n).filter(|i| i % columns + 1 < columns).map(|i| [i, i + 1]).collect();
     pairs.extend((columns..n).map(|i| [i, i - columns]));
@@ -152,11 +163,11 @@ fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], contr
     }
     let list = |numbers: Vec<usize>| numbers.into_iter().map(|number| number as u32).collect();
     let lists = vec![("pairs".to_owned(), list(pairs.concat())), ("fixed".to_owned(), list(fixed))];
-    Given { lists, ..given("springs", control, &[("n", n), ("dim", dim)], &parameters, &[]) }
+    Signature { lists, ..signature("springs", control, &[("n", n), ("dim", dim)], &parameters, &[]) }
 }
 
 /// Nets of springs: a pair, and those of every kind; 0 stands for as many numbers as there are springs.
-fn nets() -> Vec<Given> {
+fn nets() -> Vec<Signature> {
     let damped = [("masses", 12), ("stiffness", 0), ("rest", 0), ("damping", 0), ("gravity", 3), ("drag", 12)];
     vec![
         net(1, 2, 1, &[], &[]),
@@ -169,47 +180,47 @@ fn nets() -> Vec<Given> {
 }
 
 /// Systems of every kind, in every form.
-fn systems() -> Vec<Given> {
+fn systems() -> Vec<Signature> {
     let mut all = Vec::new();
     for form in ["canonical", "physical"] {
-        let oscillator = |rows: &[(&str, usize)], tables: &[&str]| given("oscillator", &[("form", form)], &[], rows, tables);
+        let oscillator = |rows: &[(&str, usize)], tables: &[&str]| signature("oscillator", &[("form", form)], &[], rows, tables);
         all.push(oscillator(&[("omega", 1)], &[]));
         all.push(oscillator(&[("omega", 1), ("damping", 1)], &[]));
         all.push(oscillator(&[("omega", 1), ("x", 1)], &["a"]));
         all.push(oscillator(&[&[("omega", 1), ("damping", 1)], &SINE_A[..]].concat(), &["x"]));
     }
-    all.push(given("pendulum", &[], &[], &[("omega", 1)], &[]));
-    all.push(given("pendulum", &[], &[], &[("omega", 1), ("damping", 1), ("a", 1)], &[]));
-    all.push(given("pendulum", &[], &[], &[&[("omega", 1)], &SINE_A[..]].concat(), &[]));
+    all.push(signature("pendulum", &[], &[], &[("omega", 1)], &[]));
+    all.push(signature("pendulum", &[], &[], &[("omega", 1), ("damping", 1), ("a", 1)], &[]));
+    all.push(signature("pendulum", &[], &[], &[&[("omega", 1)], &SINE_A[..]].concat(), &[]));
     let points = [("masses", 2), ("gravity", 2)];
     let plane = [("contact_0_normal", 2), ("contact_0_offset", 1), ("contact_0_restitution", 1), ("contact_0_friction", 1)];
-    all.push(given("particles", &[], &[("dim", 2)], &points, &[]));
-    all.push(given("particles", &[], &[("dim", 2)], &[&points[..], &[("drag", 1)]].concat(), &[]));
+    all.push(signature("particles", &[], &[("dim", 2)], &points, &[]));
+    all.push(signature("particles", &[], &[("dim", 2)], &[&points[..], &[("drag", 1)]].concat(), &[]));
     let words = [("contact_0", "plane"), ("contact_0_way", "safe")];
-    all.push(given("particles", &words, &[("dim", 2), ("contacts", 1)], &[&points[..], &plane].concat(), &[]));
-    all.push(given("restricted_three_body", &[], &[], &[("mu", 1)], &[]));
+    all.push(signature("particles", &words, &[("dim", 2), ("contacts", 1)], &[&points[..], &plane].concat(), &[]));
+    all.push(signature("restricted_three_body", &[], &[], &[("mu", 1)], &[]));
     let inertia = ("inertia", 3);
-    all.push(given("rigid_body", &[], &[], &[inertia], &[]));
-    all.push(given("rigid_body", &[("keeps", "control")], &[], &[inertia, ("damping", 3), ("strength", 1)], &["torque[1]"]));
+    all.push(signature("rigid_body", &[], &[], &[inertia], &[]));
+    all.push(signature("rigid_body", &[("keeps", "control")], &[], &[inertia, ("damping", 3), ("strength", 1)], &["torque[1]"]));
     let heavy = [inertia, ("weight", 1), ("centre", 3), ("space_torque[2]", 1)];
-    all.push(given("rigid_body", &[("keeps", "projection")], &[("space_torque", 3)], &heavy, &[]));
+    all.push(signature("rigid_body", &[("keeps", "projection")], &[("space_torque", 3)], &heavy, &[]));
     for (words, strength) in [(&[][..], 0), (&[("keeps", "control")], 1), (&[("keeps", "projection")], 0)] {
         let numbers = [("length", 1), ("gravity", 1), ("strength", strength)];
-        all.push(given("pendulum_3d", words, &[], if strength == 1 { &numbers } else { &numbers[..2] }, &[]));
+        all.push(signature("pendulum_3d", words, &[], if strength == 1 { &numbers } else { &numbers[..2] }, &[]));
         // Three points: the first on an anchor, a chain of two from it, and a loop between the last two and the first.
         let ends = [[3, 0], [0, 1], [2, 1], [0, 2]];
         let names: Vec<[String; 2]> = (0..4).map(|k| [0, 1].map(|end| format!("rods[{k}][{end}]"))).collect();
         let mut wholes = vec![("dim", 3), ("rods", 4)];
         wholes.extend(names.iter().flatten().map(String::as_str).zip(ends.into_iter().flatten()));
         let numbers = [("masses", 3), ("lengths", 4), ("anchors", 3), ("gravity", 1), ("strength", strength)];
-        all.push(given("rods", words, &wholes, if strength == 1 { &numbers } else { &numbers[..4] }, &[]));
+        all.push(signature("rods", words, &wholes, if strength == 1 { &numbers } else { &numbers[..4] }, &[]));
     }
     for n in [1, 4] {
-        all.push(given("chain", &[], &[], &[("stiffness", n + 1), ("mass", n)], &[]));
+        all.push(signature("chain", &[], &[], &[("stiffness", n + 1), ("mass", n)], &[]));
     }
-    all.push(given("linear", &[("kind", "acceleration")], &[("n_v", 2)], &[("rows", 16)], &[]));
-    all.push(given("linear", &[], &[("n_v", 0)], &[("rows", 9)], &[]));
-    all.push(given("linear", &[], &[("n_v", 2), ("inputs", 2)], &[("rows", 8), ("inputs[0]", 1)], &["inputs[1]"]));
+    all.push(signature("linear", &[("kind", "acceleration")], &[("n_v", 2)], &[("rows", 16)], &[]));
+    all.push(signature("linear", &[], &[("n_v", 0)], &[("rows", 9)], &[]));
+    all.push(signature("linear", &[], &[("n_v", 2), ("inputs", 2)], &[("rows", 8), ("inputs[0]", 1)], &["inputs[1]"]));
     for force in ["logarithmic", "newton", "printed"] {
         for (n, dim) in [(1, 2), (2, 2), (2, 3), (3, 3), (4, 2), (9, 3)] {
             all.push(bodies(n, dim, force, &[]));
@@ -223,12 +234,13 @@ fn systems() -> Vec<Given> {
     all
 }
 
-/// Equations of a user's own: a force p·x(t) − p·y, the same with a rate of y, with a choice that depends on v, and with an invariant.
-fn own() -> [Given; 4] {
+/// Equations of a user's own: a force p·x(t) − p·y, the same with a rate of y, with a choice that depends on v, and with an
+/// invariant.
+fn own() -> [Signature; 4] {
     let system = |control: &[(&str, &str)], equations: Equations| {
         let rows = [("p", 1), ("control.target", 1)];
-        let given = given("equations", control, &[], &rows[..if control.is_empty() { 1 } else { 2 }], &["x"]);
-        Given { equations: Some(Arc::new(equations)), ..given }
+        let signature = signature("equations", control, &[], &rows[..if control.is_empty() { 1 } else { 2 }], &["x"]);
+        Signature { equations: Some(Arc::new(equations)), ..signature }
     };
     let leaves = [Op::State(0), Op::State(1), Op::Param(0), Op::Time, Op::Sample(0, 3)];
     let force = [&leaves[..], &[Op::Sub(4, 1), Op::Mul(2, 5)]].concat();
@@ -249,7 +261,7 @@ fn own() -> [Given; 4] {
 
 /// What a step makes: the state, then the tally.
 fn step<N: Number>(method: &Record, make: Make<N>, p: &Parameters<N>, shape: Shape, t: N, state: &[N], tally: N) -> Vec<N> {
-    let system = controls::wrap(p, contact::wrap(p, make(p)), tally);
+    let system = around::wrap(p, make(p), tally);
     let (v, y) = state.split_at(shape.v);
     let (v0, y0) = (DVector::from_column_slice(v), DVector::from_column_slice(y));
     let next = method.program().run(&*system, t, p.h, &v0, &y0);
@@ -262,13 +274,13 @@ fn step<N: Number>(method: &Record, make: Make<N>, p: &Parameters<N>, shape: Sha
 }
 
 /// The step as a tape, and what it makes.
-fn trace(method: &Record, given: &Given) -> (Tape, Vec<Id>) {
-    let kind = system::kind(&given.system).unwrap();
-    let shape = kind.fit(given, method).unwrap();
+fn trace(method: &Record, signature: &Signature) -> (Tape, Vec<Id>) {
+    let kind = systems::kind(signature).unwrap();
+    let shape = around::fit(kind, signature, method).unwrap();
     let state = shape.v + shape.y;
     let (tape, made) = record(Tape::default(), || {
-        let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
-        let p = Parameters { given, h: Symbol::new(Op::Step), numbers, sample: |i, t| Symbol::new(Op::Sample(i, t.0)) };
+        let numbers = (0..signature.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
+        let p = Parameters { signature, h: Symbol::new(Op::Step), numbers, sample: |i, t| Symbol::new(Op::Sample(i, t.0)) };
         let symbols: Vec<Symbol> = (0..=state as u32).map(|i| Symbol::new(Op::State(i))).collect();
         step(method, kind.make, &p, shape, Symbol::new(Op::Time), &symbols[..state], symbols[state])
     });
@@ -313,22 +325,22 @@ fn numbers(count: usize, seed: u64) -> Vec<f64> {
 fn a_tape_makes_what_the_step_makes() {
     let (h, t) = (0.0123, 1.7);
     let mut seen = 0;
-    for given in systems() {
-        let (kind, make) = (system::kind(&given.system).unwrap(), systems::make(&given.system).unwrap());
-        let parameters = numbers(given.parameters(), 1);
+    for signature in systems() {
+        let (kind, make) = (systems::kind(&signature).unwrap(), systems::make(&signature.system).unwrap());
+        let parameters = numbers(signature.parameters(), 1);
         for method in RECORDS.iter().filter(|method| method.program().series_order() == 0) {
-            let shape = match kind.fit(&given, method) {
+            let shape = match around::fit(kind, &signature, method) {
                 Ok(shape) => shape,
                 Err(Error::VelocityDependent { .. }) => continue,
                 Err(error) => panic!("{error}"),
             };
             let state = numbers(shape.v + shape.y + 1, 2);
-            let (tape, roots) = trace(method, &given);
-            let p = Parameters { given: &given, h, numbers: parameters.clone(), sample };
+            let (tape, roots) = trace(method, &signature);
+            let p = Parameters { signature: &signature, h, numbers: parameters.clone(), sample };
             let stepped = step(method, make, &p, shape, t, &state[..shape.v + shape.y], state[shape.v + shape.y]);
             let stepped: Vec<u64> = stepped.into_iter().map(f64::to_bits).collect();
-            assert_eq!(evaluate(&tape, &roots, h, t, &parameters, &state), stepped, "{} on {given:?}", method.name);
-            assert!(stepped.iter().all(|bits| f64::from_bits(*bits).is_finite()), "{} on {given:?}", method.name);
+            assert_eq!(evaluate(&tape, &roots, h, t, &parameters, &state), stepped, "{} on {signature:?}", method.name);
+            assert!(stepped.iter().all(|bits| f64::from_bits(*bits).is_finite()), "{} on {signature:?}", method.name);
             seen += 1;
         }
     }
@@ -338,7 +350,7 @@ fn a_tape_makes_what_the_step_makes() {
 #[test]
 fn every_kind_of_system_is_tried() {
     let tried = systems();
-    assert!(KINDS.iter().all(|kind| tried.iter().any(|given| given.system == kind.name)));
+    assert!(KINDS.iter().all(|kind| tried.iter().any(|signature| signature.system == kind.name)));
 }
 
 /// How many operations of each kind depend on the state.
@@ -359,8 +371,8 @@ fn of_the_state(tape: &Tape, roots: &[Id]) -> Counts {
 #[test]
 fn false_euler_on_an_oscillator_is_four_operations() {
     for form in ["canonical", "physical"] {
-        let given = given("oscillator", &[("form", form)], &[], &[("omega", 1)], &[]);
-        let (tape, roots) = trace(method::record("false_euler").unwrap(), &given);
+        let signature = signature("oscillator", &[("form", form)], &[], &[("omega", 1)], &[]);
+        let (tape, roots) = trace(method("false_euler").unwrap(), &signature);
         assert_eq!(of_the_state(&tape, &roots), Counts { additions: 2, multiplications: 2, ..Counts::default() }, "{form}");
     }
 }
@@ -371,7 +383,7 @@ fn zeros_that_begin_the_sums_of_a_few_bodies_cost_nothing() {
     // from the body before it taken from zero; then the step itself.
     for (n, pairs, additions) in [(2, 1, 1), (3, 3, 2)] {
         for dim in [2, 3] {
-            let (tape, roots) = trace(method::record("false_euler").unwrap(), &bodies(n, dim, "newton", &[]));
+            let (tape, roots) = trace(method("false_euler").unwrap(), &bodies(n, dim, "newton", &[]));
             let most = pairs * (2 * dim) + additions * n * dim + 2 * n * dim;
             assert!(of_the_state(&tape, &roots).additions as usize <= most, "{n} bodies in {dim} dimensions");
         }
@@ -402,18 +414,18 @@ fn quantity<N: Number>(make: Make<N>, p: &Parameters<N>, name: &str, v: &[N], y:
 #[test]
 fn quantities_of_bodies_are_what_they_are_said_to_be() {
     for (n, dim, force) in [(1, 2, "newton"), (3, 2, "printed"), (4, 3, "logarithmic"), (11, 3, "newton")] {
-        let given = bodies(n, dim, force, &[]);
-        let kind = system::kind("nbody").unwrap();
-        let (parameters, state) = (numbers(given.parameters(), 3), numbers(2 * n * dim, 4));
+        let signature = bodies(n, dim, force, &[]);
+        let kind = systems::kind(&signature).unwrap();
+        let (parameters, state) = (numbers(signature.parameters(), 3), numbers(2 * n * dim, 4));
         let (v, y) = state.split_at(n * dim);
-        for (name, size) in (kind.quantities)(&given) {
-            let p = Parameters { given: &given, h: 0.5, numbers: parameters.clone(), sample };
+        for (name, size) in (kind.quantities)(&signature) {
+            let p = Parameters { signature: &signature, h: 0.5, numbers: parameters.clone(), sample };
             let made = quantity(systems::make(kind.name).unwrap(), &p, &name, v, y);
             assert_eq!(made.len(), size, "{name}");
             let (tape, symbols) = record(Tape::default(), || {
-                let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
+                let numbers = (0..signature.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
                 let p = Parameters {
-                    given: &given,
+                    signature: &signature,
                     h: Symbol::new(Op::Step),
                     numbers,
                     sample: |i, t| Symbol::new(Op::Sample(i, t.0)),
@@ -435,55 +447,64 @@ fn quantities_of_bodies_are_what_they_are_said_to_be() {
 
 #[test]
 fn what_cannot_be_made_is_refused() {
-    let standard_euler = method::record("standard_euler").unwrap();
-    let fit = |given: &Given| system::kind(&given.system).unwrap().fit(given, standard_euler);
-    let unknown = |given: Given| assert!(matches!(fit(&given), Err(Error::Options { .. })), "{given:?}");
-    let misshapen = |given: Given| assert!(matches!(fit(&given), Err(Error::Shape { .. })), "{given:?}");
-    unknown(given("oscillator", &[("form", "square")], &[], &[("omega", 1)], &[]));
+    let standard_euler = method("standard_euler").unwrap();
+    let fit = |signature: &Signature| around::fit(systems::kind(signature).unwrap(), signature, standard_euler);
+    let unknown = |signature: Signature| assert!(matches!(fit(&signature), Err(Error::Options { .. })), "{signature:?}");
+    let misshapen = |signature: Signature| assert!(matches!(fit(&signature), Err(Error::Shape { .. })), "{signature:?}");
+    unknown(signature("oscillator", &[("form", "square")], &[], &[("omega", 1)], &[]));
     unknown(bodies(3, 4, "newton", &[]));
     unknown(bodies(3, 2, "magnetic", &[]));
     unknown(bodies(3, 2, "newton", &[("control", "energy"), ("control.form", "loose")]));
     unknown(bodies(3, 2, "newton", &[("control", "projection"), ("control.way", "up")]));
     unknown(bodies(3, 2, "newton", &[("control", "cruise")]));
-    unknown(given("linear", &[("kind", "odd")], &[("n_v", 1)], &[("rows", 4)], &[]));
-    unknown(given("linear", &[("kind", "acceleration")], &[("n_v", 1)], &[("rows", 9)], &[]));
+    unknown(signature("linear", &[("kind", "odd")], &[("n_v", 1)], &[("rows", 4)], &[]));
+    unknown(signature("linear", &[("kind", "acceleration")], &[("n_v", 1)], &[("rows", 9)], &[]));
     let controlled = [("form", "physical"), ("control", "energy"), ("control.form", "limited")];
-    unknown(given("oscillator", &controlled, &[], &[("omega", 1), ("control.gain", 1), ("control.target", 1)], &[]));
-    misshapen(given("oscillator", &[("form", "physical")], &[], &[], &[]));
-    misshapen(given("pendulum", &[], &[], &[("omega", 2)], &[]));
-    misshapen(given("restricted_three_body", &[], &[], &[], &[]));
-    unknown(given("rigid_body", &[("keeps", "length")], &[], &[("inertia", 3)], &[]));
-    misshapen(given("rigid_body", &[], &[], &[("inertia", 2)], &[]));
-    misshapen(given("rigid_body", &[], &[], &[("inertia", 3), ("damping", 1)], &[]));
-    misshapen(given("rigid_body", &[], &[], &[("inertia", 3), ("weight", 1)], &[]));
-    misshapen(given("rigid_body", &[("keeps", "control")], &[], &[("inertia", 3)], &[]));
-    misshapen(given("chain", &[], &[], &[], &[]));
-    misshapen(given("chain", &[], &[], &[("stiffness", 3), ("mass", 3)], &[]));
-    misshapen(given("linear", &[], &[("n_v", 0)], &[], &[]));
-    misshapen(given("linear", &[], &[("n_v", usize::MAX)], &[("rows", 4)], &[]));
-    misshapen(given("linear", &[], &[("n_v", 1), ("inputs", 1)], &[("rows", 6)], &[]));
-    misshapen(given("linear", &[], &[("n_v", 1)], &[("rows", 5)], &[]));
-    misshapen(given("nbody", &[("force", "newton")], &[("dim", 2)], &[("masses", 2), ("strength", 3), ("softening", 1)], &[]));
-    misshapen(given("nbody", &[("force", "newton")], &[("dim", 2)], &[("softening", 1)], &[]));
+    unknown(signature("oscillator", &controlled, &[], &[("omega", 1), ("control.gain", 1), ("control.target", 1)], &[]));
+    misshapen(signature("oscillator", &[("form", "physical")], &[], &[], &[]));
+    misshapen(signature("pendulum", &[], &[], &[("omega", 2)], &[]));
+    misshapen(signature("restricted_three_body", &[], &[], &[], &[]));
+    unknown(signature("rigid_body", &[("keeps", "length")], &[], &[("inertia", 3)], &[]));
+    misshapen(signature("rigid_body", &[], &[], &[("inertia", 2)], &[]));
+    misshapen(signature("rigid_body", &[], &[], &[("inertia", 3), ("damping", 1)], &[]));
+    misshapen(signature("rigid_body", &[], &[], &[("inertia", 3), ("weight", 1)], &[]));
+    misshapen(signature("rigid_body", &[("keeps", "control")], &[], &[("inertia", 3)], &[]));
+    misshapen(signature("chain", &[], &[], &[], &[]));
+    misshapen(signature("chain", &[], &[], &[("stiffness", 3), ("mass", 3)], &[]));
+    misshapen(signature("linear", &[], &[("n_v", 0)], &[], &[]));
+    misshapen(signature("linear", &[], &[("n_v", usize::MAX)], &[("rows", 4)], &[]));
+    misshapen(signature("linear", &[], &[("n_v", 1), ("inputs", 1)], &[("rows", 6)], &[]));
+    misshapen(signature("linear", &[], &[("n_v", 1)], &[("rows", 5)], &[]));
+    misshapen(signature(
+        "nbody",
+        &[("force", "newton")],
+        &[("dim", 2)],
+        &[("masses", 2), ("strength", 3), ("softening", 1)],
+        &[],
+    ));
+    misshapen(signature("nbody", &[("force", "newton")], &[("dim", 2)], &[("softening", 1)], &[]));
     misshapen(net(2, 3, 2, &[("masses", 5)], &[]));
     misshapen(net(2, 3, 2, &[("drag", 2)], &[]));
     misshapen(net(2, 3, 2, &[("stiffness", 2)], &[]));
     misshapen(net(2, 3, 2, &[("gravity", 3)], &[]));
     unknown(net(2, 3, 4, &[], &[]));
     for pairs in [vec![], vec![0, 1, 2], vec![0, 6]] {
-        unknown(Given { lists: vec![("pairs".to_owned(), pairs.into())], ..net(2, 3, 2, &[], &[]) });
+        unknown(Signature { lists: vec![("pairs".to_owned(), pairs.into())], ..net(2, 3, 2, &[], &[]) });
     }
 }
 
 #[test]
 fn forces_of_the_velocity_are_refused_where_they_do_harm() {
-    let term =
-        |given: &Given, method: &str| match system::kind(&given.system).unwrap().fit(given, method::record(method).unwrap()) {
-            Err(Error::VelocityDependent { term, .. }) => Some(term),
-            _ => None,
-        };
-    let damped = given("pendulum", &[], &[], &[("omega", 1), ("damping", 1)], &[]);
-    let turning = given("restricted_three_body", &[], &[], &[("mu", 1)], &[]);
+    let term = |signature: &Signature, name: &str| match around::fit(
+        systems::kind(signature).unwrap(),
+        signature,
+        method(name).unwrap(),
+    ) {
+        Err(Error::VelocityDependent { term, .. }) => Some(term),
+        _ => None,
+    };
+    let damped = signature("pendulum", &[], &[], &[("omega", 1), ("damping", 1)], &[]);
+    let turning = signature("restricted_three_body", &[], &[], &[("mu", 1)], &[]);
     for method in ["verlet", "leapfrog", "pefrl"] {
         assert_eq!(term(&damped, method), Some("damping"));
         assert_eq!(term(&turning, method), Some("the Coriolis force"));
@@ -499,8 +520,8 @@ fn forces_of_the_velocity_are_refused_where_they_do_harm() {
 
 #[test]
 fn what_is_carried_turns_back_into_the_velocity() {
-    let given = bodies(3, 3, "newton", &[]);
-    let p = Parameters { given: &given, h: 0.01, numbers: numbers(given.parameters(), 5), sample };
+    let signature = bodies(3, 3, "newton", &[]);
+    let p = Parameters { signature: &signature, h: 0.01, numbers: numbers(signature.parameters(), 5), sample };
     let system: Box<dyn System<f64>> = systems::make("nbody").unwrap()(&p);
     let (v, y) = (DVector::from_vec(numbers(9, 6)), DVector::from_vec(numbers(9, 7)));
     for record in RECORDS {

@@ -14,18 +14,19 @@ use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
     error::Error,
     isa::Level,
-    method::{Fact, Record},
-    program::{Entry, Program},
-    real::Precision,
-    run::{
-        Machine,
-        batch::{self, Arrays, Plan, Steppable},
-        chosen,
-        stage::Clock,
+    model::{
+        method::{Fact, Record},
+        program::{Entry, Program},
+        steppers, systems as kinds,
     },
-    steppers, systems as kinds,
+    run::{
+        adaptive,
+        fixed::{self, Arrays, FixedRun, Steppable},
+    },
+    stage::{Clock, Machine},
     tape::{
         Counts,
+        real::Precision,
         split::{self, Body, Split},
     },
 };
@@ -70,7 +71,8 @@ fn sound(value: &Bound<'_, PyAny>, finite: bool, positive: bool) -> bool {
     (!finite || all(numbers, |x| x.abs() < f64::INFINITY)) && (!positive || all(numbers, |x| x > 0.0))
 }
 
-/// Whether something is true of all numbers. Those of which it is not are counted, without an early end: so the loop is over vectors.
+/// Whether something is true of all numbers. Those of which it is not are counted, without an early end: so the loop is over
+/// vectors.
 fn all<T: Copy>(numbers: &[T], is: impl Fn(T) -> bool) -> bool {
     numbers.iter().map(|x| u64::from(!is(*x))).sum::<u64>() == 0
 }
@@ -120,8 +122,8 @@ struct ArraysOf<'py, T: Element + 'py> {
     first_bad: PyReadwriteArray1<'py, i64>,
 }
 
-/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills the arrays of saved states. Returns whether
-/// some member diverged, now or before.
+/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills the arrays of saved states. Returns
+/// whether some member diverged, now or before.
 #[pyfunction]
 fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, arrays: Bound<'_, PyAny>) -> PyResult<bool> {
     match model.precision {
@@ -138,7 +140,7 @@ fn run_with<T: Steppable + Element>(
 ) -> PyResult<bool> {
     let (rows, tables) = (model.rows(py)?, model.tables(py)?);
     let (v, y) = (readable(&arrays.v)?, readable(&arrays.y)?);
-    let plan_of_core = Plan {
+    let run = FixedRun {
         model: model.model(model.started(plan.choice), &rows, &tables)?,
         clock: Clock { t0: plan.t0, h: plan.dt },
         machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
@@ -158,7 +160,7 @@ fn run_with<T: Steppable + Element>(
         carry: filled(&mut arrays.carry)?,
         first_bad: arrays.first_bad.as_slice_mut()?,
     };
-    interruptible(py, plan.progress, |monitor| batch::run(&plan_of_core, to_fill, monitor))?;
+    interruptible(py, plan.progress, |monitor| fixed::run(&run, to_fill, monitor))?;
     Ok(!all(arrays.first_bad.as_slice()?, |step| step < 0))
 }
 
@@ -208,13 +210,13 @@ struct AdaptiveArraysOf<'py> {
     trail: Option<PyReadwriteArrayDyn<'py, f64>>,
 }
 
-/// Makes a run of adaptive steps from the rows of `v` and `y`, and fills what is kept at the times of the pacing. Returns whether it did:
-/// see `chosen::run`.
+/// Makes a run of adaptive steps from the rows of `v` and `y`, and fills what is kept at the times of the pacing. Returns whether
+/// it did: see `adaptive::run`.
 #[pyfunction]
 fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut arrays: AdaptiveArraysOf<'_>) -> PyResult<bool> {
     let (rows, tables) = (model.rows(py)?, model.tables(py)?);
     let (v, y) = (readable(&arrays.v)?, readable(&arrays.y)?);
-    let plan_of_core = chosen::Plan {
+    let run = adaptive::AdaptiveRun {
         model: model.model(model.attempts(), &rows, &tables)?,
         machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
         at: by_row(&pacing.at)?,
@@ -226,15 +228,15 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
         y: by_row(&y)?,
         members: arrays.status.as_array().len(),
     };
-    let to_fill = chosen::Arrays {
+    let to_fill = adaptive::Arrays {
         saved_v: arrays.saved_v.as_slice_mut()?,
         saved_y: arrays.saved_y.as_slice_mut()?,
         state: arrays.last_state.as_slice_mut()?,
         paces: arrays.last_paces.as_slice_mut()?,
         status: arrays.status.as_slice_mut()?,
-        trail: filled(&mut arrays.trail)?,
+        attempt_log: filled(&mut arrays.trail)?,
     };
-    interruptible(py, plan.progress, |monitor| chosen::run(&plan_of_core, to_fill, monitor))
+    interruptible(py, plan.progress, |monitor| adaptive::run(&run, to_fill, monitor))
 }
 
 thread_local! {
@@ -304,14 +306,14 @@ fn body_of(body: &Body) -> (Vec<Operation>, Vec<usize>) {
 
 /// A cut tape: see `compiled` in `_core.pyi`.
 fn split_of<'py>(py: Python<'py>, split: &Split) -> PyResult<Bound<'py, PyDict>> {
-    let given = |given: &split::Given| match *given {
-        split::Given::Step => ("step", 0),
-        split::Given::Param(i) => ("parameter", i),
-        split::Given::Start(table) => ("start", table),
-        split::Given::Interval(table) => ("interval", table),
-        split::Given::Last(table) => ("last", table),
-        split::Given::First(table) => ("first", table),
-        split::Given::Lanes => ("lanes", 0),
+    let source = |source: &split::UniformSource| match *source {
+        split::UniformSource::Step => ("step", 0),
+        split::UniformSource::Param(i) => ("parameter", i),
+        split::UniformSource::Start(table) => ("start", table),
+        split::UniformSource::Interval(table) => ("interval", table),
+        split::UniformSource::Last(table) => ("last", table),
+        split::UniformSource::First(table) => ("first", table),
+        split::UniformSource::Lanes => ("lanes", 0),
     };
     let entry = |entry: &split::Entry| match *entry {
         split::Entry::Value => ("value", 0),
@@ -319,7 +321,7 @@ fn split_of<'py>(py: Python<'py>, split: &Split) -> PyResult<Bound<'py, PyDict>>
         split::Entry::Row(table) => ("row", table),
     };
     let d = PyDict::new(py);
-    d.set_item("given", split.given.iter().map(given).collect::<Vec<_>>())?;
+    d.set_item("given", split.sources.iter().map(source).collect::<Vec<_>>())?;
     d.set_item("params", &split.params)?;
     d.set_item("entries", split.entries.iter().map(entry).collect::<Vec<_>>())?;
     for (name, body) in [("run", &split.run), ("member", &split.member), ("step", &split.step), ("body", &split.body)] {
@@ -335,8 +337,8 @@ type BlockOperation = (&'static str, Vec<usize>, f64);
 #[pyfunction]
 #[pyo3(signature = (method, *, attempts=false))]
 fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<usize>)> {
-    let record =
-        stepwell_core::method::record(method).ok_or_else(|| model::argument_error(format!("method: there is no {method:?}")))?;
+    let record = stepwell_core::model::steppers::method(method)
+        .map_err(|_| model::argument_error(format!("method: there is no {method:?}")))?;
     let made = if attempts { record.attempt() } else { Some(record.program()) };
     let Program { entries, results } = made.ok_or_else(|| core_error(Error::NoEstimate))?;
     let entry = |entry: &Entry| {
@@ -453,10 +455,10 @@ fn in_parts(
     model.model(how, &rows, &tables)?.in_parts(Machine { level, threads: 1 }, members, attempts).map_err(core_error)
 }
 
-/// Begins with new caches: see `stepwell_core::trace::forget`.
+/// Begins with new caches: see `stepwell_core::step::cache::forget`.
 #[pyfunction]
 fn forget() {
-    stepwell_core::trace::forget();
+    stepwell_core::step::cache::forget();
 }
 
 #[pymodule]

@@ -8,14 +8,17 @@ use pyo3::{
     types::{PyBytes, PyString, PyTuple, PyType},
 };
 use stepwell_core::{
-    controls::force,
     error::Error,
-    pace::Acceptance,
-    real::Precision,
+    model::{
+        around::force,
+        spec::{Row, Signature, Spec, Table},
+    },
     run::Model,
-    spec::{Given, Row, Spec, Table},
-    systems::equations,
-    trace::{How, Scene},
+    step::{
+        key::{StepKind, TapeKey},
+        pace::Acceptance,
+    },
+    tape::{equations, real::Precision},
 };
 
 /// The name of quantities whose changes of sign are noticed.
@@ -24,12 +27,12 @@ const WATCHED: &str = "watched()";
 const STEP: &str = "step()";
 
 /// A message as an argument error of the package.
-pub fn argument_error(message: String) -> PyErr {
+pub(crate) fn argument_error(message: String) -> PyErr {
     error_of("ArgumentError", message)
 }
 
 /// A message as the package's own error of that name.
-pub fn error_of(name: &str, message: String) -> PyErr {
+pub(crate) fn error_of(name: &str, message: String) -> PyErr {
     let class = Python::attach(|py| Ok(py.import("stepwell.errors")?.getattr(name)?.cast_into::<PyType>()?.unbind()));
     match class {
         Ok(class) => Python::attach(|py| PyErr::from_type(class.into_bound(py), message)),
@@ -38,7 +41,7 @@ pub fn error_of(name: &str, message: String) -> PyErr {
 }
 
 /// Of an array that another thread uses just now, whatever NumPy's words are.
-pub fn in_use<E>(_: E) -> PyErr {
+pub(crate) fn in_use<E>(_: E) -> PyErr {
     error_of(
         "BusyError",
         "an array is being stepped by a world in another thread; give a copy of it, or let one thread at a time use it"
@@ -47,12 +50,12 @@ pub fn in_use<E>(_: E) -> PyErr {
 }
 
 /// Borrows an array of a user.
-pub fn readable<'py>(array: &Bound<'py, PyArray2<f64>>) -> PyResult<PyReadonlyArray2<'py, f64>> {
+pub(crate) fn readable<'py>(array: &Bound<'py, PyArray2<f64>>) -> PyResult<PyReadonlyArray2<'py, f64>> {
     array.try_readonly().map_err(in_use)
 }
 
 /// The core's words as a Python error; Python has checked nearly everything before.
-pub fn core_error(error: Error) -> PyErr {
+pub(crate) fn core_error(error: Error) -> PyErr {
     let name = match error {
         Error::Memory { .. } => "TooLargeError",
         Error::TooLongForSeries { .. } | Error::TooLongForTimes { .. } => "UnsupportedError",
@@ -62,7 +65,7 @@ pub fn core_error(error: Error) -> PyErr {
 }
 
 /// That of 32 bits, or that of 64.
-pub fn precision(single: bool) -> Precision {
+pub(crate) fn precision(single: bool) -> Precision {
     if single { Precision::Single } else { Precision::Double }
 }
 
@@ -91,8 +94,8 @@ impl Equations {
     }
 }
 
-/// The value of a name: a word, a whole number, a list of whole numbers (as bytes, four for each), rows of a parameter, samples with
-/// their start and interval, or rates.
+/// The value of a name: a word, a whole number, a list of whole numbers (as bytes, four for each), rows of a parameter, samples
+/// with their start and interval, or rates.
 enum Value {
     Word(String),
     Whole(usize),
@@ -102,7 +105,8 @@ enum Value {
     Equations(Arc<equations::Equations>),
 }
 
-// By the type that it has: a derived one would try each, and an exception for what it is not takes longer than all else in a short call.
+// By the type that it has: a derived one would try each, and an exception for what it is not takes longer than all else in a
+// short call.
 impl<'py> FromPyObject<'_, 'py> for Value {
     type Error = PyErr;
 
@@ -127,8 +131,8 @@ impl<'py> FromPyObject<'_, 'py> for Value {
 /// A system and what makes its steps.
 #[pyclass(module = "stepwell._core", frozen)]
 pub struct ModelSpec {
-    pub given: Arc<Given>,
-    pub how: How,
+    pub signature: Arc<Signature>,
+    pub how: StepKind,
     rows: Vec<Py<PyArray2<f64>>>,
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
     record: Vec<String>,
@@ -140,12 +144,12 @@ pub struct ModelSpec {
 }
 
 /// The parameters, borrowed for a run.
-pub type Rows<'py> = Vec<PyReadonlyArray2<'py, f64>>;
+pub(crate) type Rows<'py> = Vec<PyReadonlyArray2<'py, f64>>;
 /// The tables, borrowed for a run: start, interval, samples.
-pub type Tables<'py> = Vec<(f64, f64, PyReadonlyArray2<'py, f64>)>;
+pub(crate) type Tables<'py> = Vec<(f64, f64, PyReadonlyArray2<'py, f64>)>;
 
 /// The rows of an array, each of one number or one for each member.
-pub fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>> {
+pub(crate) fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>> {
     let mut rows = Vec::new();
     add_rows(array, &mut rows)?;
     Ok(rows)
@@ -162,9 +166,10 @@ fn add_rows<'a>(array: &'a PyReadonlyArray2<'_, f64>, rows: &mut Vec<Row<'a>>) -
 
 #[pymethods]
 impl ModelSpec {
-    /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the number of rows
-    /// in its v slot, if it is asked for; `order` is that of a series with adaptive steps; `single` is whether steps are computed with
-    /// numbers of 32 bits; `acceptance` is that of `reference/adaptive.py`, and `backward` whether adaptive steps go back in time.
+    /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the
+    /// number of rows in its v slot, if it is asked for; `order` is that of a series with adaptive steps; `single` is whether
+    /// steps are computed with numbers of 32 bits; `acceptance` is that of `reference/adaptive.py`, and `backward` whether
+    /// adaptive steps go back in time.
     #[new]
     #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, order=0, single=false, acceptance=None, backward=false))]
     #[allow(clippy::too_many_arguments, reason = "in Python they have names")]
@@ -181,7 +186,7 @@ impl ModelSpec {
         acceptance: Option<(Vec<u32>, bool, Vec<u32>)>,
         backward: bool,
     ) -> Self {
-        let mut names = Given { system, ..Given::default() };
+        let mut names = Signature { system, ..Signature::default() };
         let (mut rows, mut tables, mut step) = (Vec::new(), Vec::new(), None);
         for (name, value) in given {
             match value {
@@ -205,14 +210,14 @@ impl ModelSpec {
             }
         }
         let how = match (matrix, step) {
-            (None, Some(step)) => How::Step(step),
-            (None, None) => How::Method { name: method, choice: 0 },
-            (Some((nodes, _)), _) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
+            (None, Some(step)) => StepKind::Step(step),
+            (None, None) => StepKind::Method { name: method, choice: 0 },
+            (Some((nodes, _)), _) => StepKind::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
         let acceptance =
             acceptance.map_or_else(Acceptance::default, |(groups, own, positive)| Acceptance { groups, own, positive });
         ModelSpec {
-            given: Arc::new(names),
+            signature: Arc::new(names),
             how,
             rows,
             tables,
@@ -238,17 +243,17 @@ impl ModelSpec {
     }
 
     /// Steps of fixed length, by a method that is started in its `choice`-th way.
-    pub fn started(&self, choice: usize) -> How {
+    pub fn started(&self, choice: usize) -> StepKind {
         match &self.how {
-            How::Method { name, .. } => How::Method { name: name.clone(), choice },
+            StepKind::Method { name, .. } => StepKind::Method { name: name.clone(), choice },
             other => other.clone(),
         }
     }
 
     /// Adaptive steps.
-    pub fn attempts(&self) -> How {
+    pub fn attempts(&self) -> StepKind {
         match &self.how {
-            How::Method { name, .. } => How::Attempts {
+            StepKind::Method { name, .. } => StepKind::Attempts {
                 name: name.clone(),
                 order: self.order,
                 acceptance: self.acceptance.clone(),
@@ -259,21 +264,21 @@ impl ModelSpec {
     }
 
     /// What the core steps.
-    pub fn model<'a>(&'a self, how: How, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
+    pub fn model<'a>(&'a self, how: StepKind, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
         let mut all = Vec::new();
         rows.iter().try_for_each(|array| add_rows(array, &mut all))?;
         let spec = Spec {
-            given: self.given.clone(),
+            signature: self.signature.clone(),
             rows: all,
             tables: tables
                 .iter()
                 .map(|(start, interval, t)| Ok(Table { samples: by_row(t)?, start: *start, interval: *interval }))
                 .collect::<PyResult<_>>()?,
         };
-        let Self { given, record, fused, precision, .. } = self;
+        let Self { signature, record, fused, precision, .. } = self;
         Ok(Model {
             spec,
-            scene: Scene { given: given.clone(), how, record: record.clone(), fused: *fused, precision: *precision },
+            key: TapeKey { signature: signature.clone(), how, record: record.clone(), fused: *fused, precision: *precision },
         })
     }
 }

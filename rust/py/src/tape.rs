@@ -9,10 +9,15 @@ use pyo3::{
     types::{PyDict, PyFloat, PyInt},
 };
 use stepwell_core::{
-    real::Precision,
-    systems::equations::{self, Invariant},
-    tape::{self, Id, Op, fuse::fuse, print},
-    trace,
+    step::trace,
+    tape::{
+        self, Id, Op,
+        equations::{self, Invariant},
+        fuse::fuse,
+        print,
+        real::Precision,
+        reserved::BUDGET,
+    },
 };
 
 use crate::{
@@ -23,10 +28,10 @@ use crate::{
 type Shared = Arc<Mutex<tape::Tape>>;
 
 /// A name, the places of operands, and what else is given.
-pub type Operation = (&'static str, Vec<usize>, u64);
+pub(crate) type Operation = (&'static str, Vec<usize>, u64);
 
 /// An operation, whose operands have these places.
-pub fn operation(op: Op, place: impl Fn(Id) -> usize) -> Operation {
+pub(crate) fn operation(op: Op, place: impl Fn(Id) -> usize) -> Operation {
     let (operands, n) = op.operands();
     let (name, given) = print::named(op);
     (name, operands[..n].iter().map(|operand| place(*operand)).collect(), given)
@@ -241,7 +246,7 @@ impl Tape {
 
     /// The most attempts of a member with adaptive steps.
     fn budget(&self) -> Symbol {
-        self.leaf(Op::Param(trace::BUDGET))
+        self.leaf(Op::Param(BUDGET))
     }
 
     /// The step h.
@@ -275,11 +280,12 @@ impl Tape {
         Ok(Symbol { tape: Arc::clone(&self.0), id })
     }
 
-    /// Traces what the core makes of a model: the next state of a "step", an "attempt" with its pace, the pace to "begin" with, or a "record".
+    /// Traces what the core makes of a model: the next state of a "step", an "attempt" with its pace, the pace to "begin" with,
+    /// or a "record".
     fn trace(&self, model: &ModelSpec, what: &str) -> PyResult<Vec<Symbol>> {
         let before = std::mem::take(&mut *lock(&self.0));
         let how = if what == "attempt" || what == "begin" { model.attempts() } else { model.how.clone() };
-        let traced = trace::trace(before.clone(), &model.given, &how, what);
+        let traced = trace::trace(before.clone(), &model.signature, &how, what);
         let (tape, next) = traced.inspect_err(|_| *lock(&self.0) = before).map_err(core_error)?;
         *lock(&self.0) = tape;
         Ok(next.into_iter().map(|id| Symbol { tape: Arc::clone(&self.0), id }).collect())
@@ -296,8 +302,8 @@ impl Tape {
         Ok(lines.map(|(id, op)| print::line(id as Id, *op, tape.precision()) + "\n").collect())
     }
 
-    /// The operations that these values are made of, and nothing else, in order: the name of each, the places of its operands, and what
-    /// else it is given; behind them the places of the values.
+    /// The operations that these values are made of, and nothing else, in order: the name of each, the places of its operands,
+    /// and what else it is given; behind them the places of the values.
     fn operations(&self, of: Vec<PyRef<'_, Symbol>>) -> PyResult<(Vec<Operation>, Vec<usize>)> {
         let (tape, roots) = self.with(&of)?;
         let needed = tape.needed(roots.iter().copied());
@@ -310,9 +316,9 @@ impl Tape {
         Ok((operations, roots.into_iter().map(|root| place[root as usize]).collect()))
     }
 
-    /// The rates of a user's own system: of v, and of y unless they are v itself; quantities of a state by name; and of the invariant that
-    /// a projection keeps its value, its derivatives by v and by y, and the square of their length.
-    /// `functions` are values with, for each that they depend on, the derivative by it; and, of one branch of several, its bounds.
+    /// The rates of a user's own system: of v, and of y unless they are v itself; quantities of a state by name; and of the
+    /// invariant that a projection keeps its value, its derivatives by v and by y, and the square of their length. `functions`
+    /// are values with, for each that they depend on, the derivative by it; and, of one branch of several, its bounds.
     #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None, functions=Vec::new()))]
     fn equations(
         &self,

@@ -13,8 +13,9 @@ use pyo3::{
 };
 use stepwell_core::{
     isa::Level,
-    real::Precision,
-    run::{Machine, batch::Steppable, stage::Clock, world},
+    run::{fixed::Steppable, world},
+    stage::{Clock, Machine},
+    tape::real::Precision,
 };
 
 use crate::{
@@ -82,8 +83,8 @@ impl<T: Of> ForceArray<T> {
 
 /// Arrays of up to so many numbers are copied.
 const COPIED_NUMBERS: usize = 256;
-/// Other threads of Python go on meanwhile, unless a call is shorter than this part of the time between two checks: then to let them
-/// would take longer than the call.
+/// Other threads of Python go on meanwhile, unless a call is shorter than this part of the time between two checks: then to let
+/// them would take longer than the call.
 const CALL_IS_SHORT: i64 = 64;
 /// Steps above this are no longer exact as floating-point numbers.
 const LAST_STEP: i64 = 1 << 53;
@@ -278,7 +279,8 @@ impl World {
 }
 
 impl World {
-    /// Does something unless another thread is stepping the world. Waiting could deadlock: that thread may be waiting for the GIL.
+    /// Does something unless another thread is stepping the world. Waiting could deadlock: that thread may be waiting for the
+    /// GIL.
     fn alone<R>(&self, act: impl FnOnce(&mut Loops) -> PyResult<R>) -> PyResult<R> {
         match self.loop_.try_lock() {
             Ok(mut of) => act(&mut of),

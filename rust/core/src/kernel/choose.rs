@@ -42,7 +42,7 @@ pub fn choose_long(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
 
 /// The shape for several steps of this body in one call, over rows of a given number of lanes; None as above. As many vectors are
 /// interleaved as hide the latency: such code is too long for the CPU to begin another vector before one has made its last step.
-pub fn choose_trail(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
+pub fn choose_unrolled(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
     let long = choose_long(body, level, lanes)?;
     let vectors = lanes / long.width;
     let together = (1..=interleaving(body, level).min(vectors)).rev().find(|n| vectors.is_multiple_of(*n))?;
@@ -80,7 +80,8 @@ fn fastest(body: &Body, level: Level, members: usize) -> Shape {
         return Shape { level, bytes, width, block_vectors, interleaved: 1, blocks, resident: false };
     }
     if interleaving == 1 {
-        // Two vectors in a turn, one after the other: the second begins while the first ends. State that has a register stays there.
+        // Two vectors in a turn, one after the other: the second begins while the first ends. State that has a register stays
+        // there.
         let block_vectors = evenly(vectors, most.min(2));
         let blocks = blocks(body, width, block_vectors).min(vectors.div_ceil(block_vectors));
         return Shape { level, bytes, width, block_vectors, interleaved: 1, blocks, resident: block_vectors > 1 };
@@ -118,8 +119,8 @@ fn interleaving(body: &Body, level: Level) -> usize {
         work += cost;
         longest = longest.max(after[id]);
     }
-    // Fitted to the fastest numbers on the scenes of the benchmarks. With 16 registers more than five vectors cause spills. NEON has as
-    // many registers as AVX-512 and is taken to be like it: it was not measured.
+    // Fitted to the fastest numbers on the scenes of the benchmarks. With 16 registers more than five vectors cause spills. NEON
+    // has as many registers as AVX-512 and is taken to be like it: it was not measured.
     match level {
         Level::Avx2 => (2.2 * longest / work).ceil().clamp(1.0, 5.0) as usize,
         _ => (3.8 * longest / work - 1.3).round().clamp(1.0, 6.0) as usize,

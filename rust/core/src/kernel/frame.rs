@@ -22,14 +22,14 @@ pub(super) mod place {
     use super::Arguments;
     use std::mem::offset_of;
 
-    pub const STATE: i32 = offset_of!(Arguments, state) as i32;
-    pub const ROWS: i32 = offset_of!(Arguments, rows) as i32;
-    pub const POOL: i32 = offset_of!(Arguments, pool) as i32;
-    pub const PER_STEP: i32 = offset_of!(Arguments, per_step) as i32;
-    pub const HELD: i32 = offset_of!(Arguments, held) as i32;
-    pub const SCRATCH: i32 = offset_of!(Arguments, scratch) as i32;
-    pub const STEPS: i32 = offset_of!(Arguments, steps) as i32;
-    pub const ROUNDING: i32 = offset_of!(Arguments, rounding) as i32;
+    pub(crate) const STATE: i32 = offset_of!(Arguments, state) as i32;
+    pub(crate) const ROWS: i32 = offset_of!(Arguments, rows) as i32;
+    pub(crate) const POOL: i32 = offset_of!(Arguments, pool) as i32;
+    pub(crate) const PER_STEP: i32 = offset_of!(Arguments, per_step) as i32;
+    pub(crate) const HELD: i32 = offset_of!(Arguments, held) as i32;
+    pub(crate) const SCRATCH: i32 = offset_of!(Arguments, scratch) as i32;
+    pub(crate) const STEPS: i32 = offset_of!(Arguments, steps) as i32;
+    pub(crate) const ROUNDING: i32 = offset_of!(Arguments, rounding) as i32;
 }
 
 /// What the code of a kernel may touch, in numbers.
@@ -49,7 +49,7 @@ pub struct Frame {
 
 impl Frame {
     /// For a body. Of its operations only those that name places matter.
-    pub fn new(body: &Body, lanes: usize) -> Frame {
+    pub(crate) fn new(body: &Body, lanes: usize) -> Frame {
         let ops = body.ops.iter().copied().filter(|op| matches!(op, crate::tape::Op::Held(_))).collect();
         Frame { body: Body { ops, ..body.clone() }, lanes, pool: 0, scratch: 0, aligned_pool: false }
     }

@@ -1,15 +1,14 @@
 //! The portable interpreter: operation after operation, each over all lanes of a tile.
 //!
-//! It is used where machine code is not allowed, where a run is too short for it to be worthwhile, and in the tests, which compare
-//! kernel writers with it.
+//! It is used where machine code is not allowed, where a run is too short for it to be worthwhile, and in the tests, which
+//! compare kernel writers with it.
 
 use std::cell::Cell;
 
 use super::{Kernel, Tile, check};
 use crate::{
     isa::{Level, Task, with_isa},
-    real::Real,
-    tape::{Id, Op, split::Body},
+    tape::{Id, Op, real::Real, split::Body},
 };
 
 /// A body with a place in the scratch for each value.
@@ -106,7 +105,7 @@ impl Interpreter {
 
 impl Interpreter {
     /// How many values it has at once.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 }
@@ -128,7 +127,8 @@ impl<T: Real> Kernel<T> for Interpreter {
     fn run(&self, tile: &mut Tile<T>, scratch: &mut Vec<T>) {
         check(&self.body, self.lanes, tile);
         assert!(tile.pool.len() >= self.body.uniforms, "pool");
-        // From the start of a line of the cache on, so that no vector lies across two: fewer numbers than a line has are before it.
+        // From the start of a line of the cache on, so that no vector lies across two: fewer numbers than a line has are before
+        // it.
         let enough = self.rows * self.lanes + 64 / size_of::<T>() - 1;
         if scratch.len() < enough {
             scratch.resize(enough, T::default());

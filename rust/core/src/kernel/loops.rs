@@ -1,17 +1,22 @@
 //! The whole function: what is kept in registers, and the loops over steps and blocks around one step.
 
 use super::{
-    machine::{Base, Counter, Machine, Place},
-    plan::{Plan, Source},
+    machine::{Base, Counter, Place},
+    plan::{KernelPlan, Source},
     registers::{Registers, Uses},
     schedule::Order,
     shape::Shape,
-    write::{Value, Where, Writer},
+    write::{MakeOperation, Value, Where, Writer},
 };
 
-/// The code of a plan in a shape, its operations in this order, and how many vectors of scratch it needs. None if it cannot be done with
-/// the registers there are.
-pub fn function<M: Machine>(plan: &Plan<M::Doing>, code: M, shape: Shape, order: &Order) -> Option<(Vec<u8>, usize)> {
+/// The code of a plan in a shape, its operations in this order, and how many vectors of scratch it needs. None if it cannot be
+/// done with the registers there are.
+pub(crate) fn function<M: MakeOperation>(
+    plan: &KernelPlan<M::Instruction>,
+    code: M,
+    shape: Shape,
+    order: &Order,
+) -> Option<(Vec<u8>, usize)> {
     let mut writer = Writer::new(plan, code, shape, order);
     let pinned = writer.share_out();
     writer.code.enter();
@@ -43,8 +48,8 @@ struct Pressure {
     reads: Vec<u32>,
 }
 
-impl<'a, M: Machine> Writer<'a, M> {
-    fn new(plan: &'a Plan<M::Doing>, code: M, shape: Shape, order: &Order) -> Writer<'a, M> {
+impl<'a, M: MakeOperation> Writer<'a, M> {
+    fn new(plan: &'a KernelPlan<M::Instruction>, code: M, shape: Shape, order: &Order) -> Writer<'a, M> {
         let values = plan.sources.len() * shape.block_vectors;
         let mut replaces = vec![None; plan.sources.len()];
         for (s, id) in plan.next.iter().enumerate() {

@@ -1,11 +1,12 @@
 //! Kernels: from the list of operations to code that runs them.
 //!
-//! A kernel makes a number of steps of a tile of lanes, one lane a member. It is interpreted ([`interpret`]) or written as machine
-//! code at run time ([`writer`], for x86-64 and AArch64); the bits are the same.
+//! A kernel makes a number of steps of a tile of lanes, one lane a member. It is interpreted ([`interpret`]) or written as
+//! machine code at run time ([`writer`], for x86-64 and AArch64); the bits are the same.
 
 pub mod aarch64;
 mod choose;
 mod frame;
+mod instruction_set;
 pub mod interpret;
 mod loops;
 mod machine;
@@ -13,7 +14,7 @@ pub mod pack;
 mod pages;
 mod plan;
 mod registers;
-pub mod runner;
+pub(crate) mod runner;
 mod schedule;
 mod shape;
 mod write;
@@ -23,7 +24,7 @@ mod x86;
 /// The kernel writer: chooses shapes, and writes machine code in them.
 pub mod writer {
     pub use super::{
-        choose::{choose, choose_long, choose_trail},
+        choose::{choose, choose_long, choose_unrolled},
         frame::Frame,
         schedule::{Order, Waits, in_turn},
         shape::Shape,
@@ -31,7 +32,7 @@ pub mod writer {
     };
 }
 
-use crate::{real::Real, tape::split::Body};
+use crate::tape::{real::Real, split::Body};
 
 /// How machine code goes through a tile, whatever the CPU: see the writer's `Shape`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,8 +60,8 @@ pub struct Tile<'a, T = f64> {
     pub pool: &'a [T],
     /// How many steps to make.
     pub steps: usize,
-    /// So many entries for each step as the body says: the bits of a number, or, for what is held, the place of the first number of a
-    /// row in `held`.
+    /// So many entries for each step as the body says: the bits of a number, or, for what is held, the place of the first number
+    /// of a row in `held`.
     pub per_step: &'a [u64],
     /// Rows of sampled inputs.
     pub held: &'a [T],
@@ -99,7 +100,7 @@ pub trait Kernel<T: Real = f64>: Send + Sync {
 
 /// Panics unless a tile has the rows that a body reads. Machine code relies on it.
 #[inline]
-pub fn check<T: Real>(body: &Body, lanes: usize, tile: &Tile<T>) {
+pub(crate) fn check<T: Real>(body: &Body, lanes: usize, tile: &Tile<T>) {
     assert!(body.precision == T::PRECISION, "precision");
     assert!(tile.state.len() >= body.next.len() * lanes, "state");
     assert!(tile.rows.len() >= body.rows * lanes, "rows");

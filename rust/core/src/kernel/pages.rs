@@ -1,13 +1,13 @@
 //! Pages of machine code. All unsafe code of the kernels is in this file.
 //!
-//! A page is writable first and executable then, never both. A system may refuse to make it executable (hardened ones do); then there
-//! is no kernel, and the interpreter is used.
+//! A page is writable first and executable then, never both. A system may refuse to make it executable (hardened ones do); then
+//! there is no kernel, and the interpreter is used.
 
 use super::{
     Tile, check,
     frame::{Arguments, Frame},
 };
-use crate::real::Real;
+use crate::tape::real::Real;
 
 /// The rounding that Rust and C start with.
 const TO_NEAREST: u32 = 0x1F80;
@@ -44,14 +44,14 @@ fn synchronise(code: &[u8]) {
 
 /// Code that can be run.
 #[derive(Debug)]
-pub struct Pages {
+pub(crate) struct Pages {
     map: memmap2::Mmap,
     frame: Frame,
 }
 
 impl Pages {
-    /// Code that was written for a frame, for this CPU. It must not access anything outside the frame, and must return: the writers ensure that, and
-    /// the tests check it. None if the system has no memory left or does not allow executable pages.
+    /// Code that was written for a frame, for this CPU. It must not access anything outside the frame, and must return: the
+    /// writers ensure that, and the tests check it. None if the system has no memory left or does not allow executable pages.
     pub(super) fn new(code: &[u8], frame: Frame) -> Option<Pages> {
         let mut map = memmap2::MmapMut::map_anon(code.len()).ok()?;
         map.copy_from_slice(code);
@@ -67,12 +67,12 @@ impl Pages {
     }
 
     /// The code.
-    pub fn code(&self) -> &[u8] {
+    pub(crate) fn code(&self) -> &[u8] {
         &self.map
     }
 
     /// What it may touch.
-    pub fn frame(&self) -> &Frame {
+    pub(crate) fn frame(&self) -> &Frame {
         &self.frame
     }
 
@@ -82,7 +82,7 @@ impl Pages {
     ///
     /// If the tile is smaller than its frame says.
     #[allow(unsafe_code, reason = "calls what was written at run time")]
-    pub fn run<T: Real>(&self, tile: &mut Tile<T>, scratch: &mut Vec<T>) {
+    pub(crate) fn run<T: Real>(&self, tile: &mut Tile<T>, scratch: &mut Vec<T>) {
         let frame = &self.frame;
         check(&frame.body, frame.lanes, tile);
         assert!(tile.pool.len() >= frame.pool, "pool");
@@ -90,7 +90,8 @@ impl Pages {
             return;
         }
         let copied = if frame.aligned_pool && !(tile.pool.as_ptr() as usize).is_multiple_of(32) { frame.pool } else { 0 };
-        // The vector's start is a multiple of a number's size, so that fewer numbers than 64 bytes have are before the next multiple of 64.
+        // The vector's start is a multiple of a number's size, so that fewer numbers than 64 bytes have are before the next
+        // multiple of 64.
         let enough = frame.scratch + copied + 64 / size_of::<T>() - 1;
         if scratch.len() < enough {
             scratch.resize(enough, T::default());
@@ -109,9 +110,9 @@ impl Pages {
             rounding: [0, TO_NEAREST],
         };
         // SAFETY: the map holds a whole function of this signature from its first byte on, and stays until `self` is dropped. It
-        // writes to the state, to `own` and to the first number of `rounding` only, and reads besides them the rows, the pool, the
-        // table of the steps and the rows held that it names: inside what was asserted above. Nobody else uses the state or `own`
-        // meanwhile, both are borrowed exclusively. It keeps the registers that its convention asks to keep.
+        // writes to the state, to `own` and to the first number of `rounding` only, and reads besides them the rows, the pool,
+        // the table of the steps and the rows held that it names: inside what was asserted above. Nobody else uses the state or
+        // `own` meanwhile, both are borrowed exclusively. It keeps the registers that its convention asks to keep.
         unsafe {
             let function: Function = std::mem::transmute(self.map.as_ptr());
             function(&raw mut arguments);

@@ -1,15 +1,15 @@
 //! Instruction selection: the instruction of each operation of a body, and the source of each leaf.
 //!
-//! Which instructions there are says the [`Machine`].
+//! An [`InstructionSet`] says which instructions there are.
 
 use std::collections::HashMap;
 
-use super::machine::Machine;
+use super::instruction_set::InstructionSet;
 use crate::tape::{Counts, Id, Op, split::Body};
 
 /// Where a value comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Source {
+pub(crate) enum Source {
     /// An instruction.
     Made,
     /// A row of the state, which the step may replace.
@@ -28,40 +28,40 @@ pub enum Source {
 
 impl Source {
     /// Whether it is the same in all lanes.
-    pub fn is_shared(self) -> bool {
+    pub(crate) fn is_shared(self) -> bool {
         matches!(self, Source::Pool(_) | Source::PerStep(_))
     }
 }
 
 /// An operation with its operands.
 #[derive(Clone, Copy, Debug)]
-pub struct Step<D> {
-    pub doing: D,
+pub(crate) struct Step<I> {
+    pub instruction: I,
     pub id: Id,
     of: [Id; 4],
     n: u8,
 }
 
-impl<D> Step<D> {
+impl<I> Step<I> {
     /// Of at most four operands.
-    pub fn new(doing: D, id: Id, operands: &[Id]) -> Step<D> {
+    pub(crate) fn new(instruction: I, id: Id, operands: &[Id]) -> Step<I> {
         let mut of = [0; 4];
         of[..operands.len()].copy_from_slice(operands);
-        Step { doing, id, of, n: operands.len() as u8 }
+        Step { instruction, id, of, n: operands.len() as u8 }
     }
 
     /// What it reads.
-    pub fn of(&self) -> &[Id] {
+    pub(crate) fn of(&self) -> &[Id] {
         &self.of[..self.n as usize]
     }
 }
 
 /// A body as machine instructions.
 #[derive(Debug)]
-pub struct Plan<D> {
+pub(crate) struct KernelPlan<I> {
     /// Of each value where it comes from.
     pub sources: Vec<Source>,
-    pub steps: Vec<Step<D>>,
+    pub steps: Vec<Step<I>>,
     /// What replaces each number of the state; none if it stays.
     pub next: Vec<Option<Id>>,
     /// The value of each number of the state before the step, if it is read.
@@ -73,10 +73,11 @@ pub struct Plan<D> {
     pub packing: Option<Packing>,
 }
 
-/// How the numbers of one member are kept where they are lanes of vectors of their own widths. What stays over all steps and what the step
-/// replaces is in homes: the first places of the scratch, each as long as the longest vector. A source's number is then that of its home.
+/// How the numbers of one member are kept where they are lanes of vectors of their own widths. What stays over all steps and what
+/// the step replaces is in homes: the first places of the scratch, each as long as the longest vector. A source's number is then
+/// that of its home.
 #[derive(Debug, Default)]
-pub struct Packing {
+pub(crate) struct Packing {
     /// Of each value how many numbers it has.
     pub widths: Vec<u8>,
     /// How many homes there are, of the state first.
@@ -87,13 +88,13 @@ pub struct Packing {
     pub returned: Vec<(usize, u32)>,
 }
 
-impl<D: Copy> Plan<D> {
+impl<I: Copy> KernelPlan<I> {
     /// None if it is not a valid body: everything here and in the writer relies on its form.
-    pub fn new<M: Machine<Doing = D>>(body: &Body, machine: &M) -> Option<Plan<D>> {
+    pub(crate) fn new<M: InstructionSet<Instruction = I>>(body: &Body, machine: &M) -> Option<KernelPlan<I>> {
         if !is_sound(body) {
             return None;
         }
-        let mut plan = Plan {
+        let mut plan = KernelPlan {
             sources: Vec::with_capacity(body.ops.len() + 1),
             steps: Vec::with_capacity(body.ops.len()),
             next: Vec::new(),
@@ -129,31 +130,31 @@ impl<D: Copy> Plan<D> {
         let joined = joined(body, machine);
         for (id, op) in body.ops.iter().enumerate().filter(|(id, op)| !op.is_leaf() && joined[*id].is_none()) {
             let ([a, b, c], n) = op.with(|operand| same[operand as usize]).operands();
-            let (doing, of, n) = match *op {
+            let (instruction, of, n) = match *op {
                 Op::Neg(_) => match machine.negate() {
-                    (doing, None) => (doing, [a, 0, 0, 0], 1),
-                    (doing, Some(bits)) => {
+                    (instruction, None) => (instruction, [a, 0, 0, 0], 1),
+                    (instruction, Some(bits)) => {
                         let source = plan.constant(bits, body.uniforms);
                         let constant = *known.entry(source).or_insert_with(|| {
                             plan.sources.push(source);
                             plan.sources.len() as Id - 1
                         });
-                        (doing, [a, constant, 0, 0], 2)
+                        (instruction, [a, constant, 0, 0], 2)
                     }
                 },
                 Op::Select(m, ..) => match joined[m as usize] {
-                    Some(Joined::Extreme(doing)) => (doing, [b, c, 0, 0], 2),
-                    Some(Joined::Pick(doing)) => {
+                    Some(Joined::Extreme(instruction)) => (instruction, [b, c, 0, 0], 2),
+                    Some(Joined::Pick(instruction)) => {
                         let [p, q, _] = body.ops[m as usize].with(|operand| same[operand as usize]).operands().0;
-                        (doing, [p, q, b, c], 4)
+                        (instruction, [p, q, b, c], 4)
                     }
                     None => (machine.select(masks[m as usize]), [a, b, c, 0], 3),
                 },
-                Op::Mul(..) if adds_doubles && is_two(body, a) => (machine.doing(Op::Add(b, b)), [b, b, 0, 0], 2),
-                Op::Mul(..) if adds_doubles && is_two(body, b) => (machine.doing(Op::Add(a, a)), [a, a, 0, 0], 2),
-                other => (machine.doing(other), [a, b, c, 0], n as u8),
+                Op::Mul(..) if adds_doubles && is_two(body, a) => (machine.instruction(Op::Add(b, b)), [b, b, 0, 0], 2),
+                Op::Mul(..) if adds_doubles && is_two(body, b) => (machine.instruction(Op::Add(a, a)), [a, a, 0, 0], 2),
+                other => (machine.instruction(other), [a, b, c, 0], n as u8),
             };
-            plan.steps.push(Step { doing, id: id as Id, of, n });
+            plan.steps.push(Step { instruction, id: id as Id, of, n });
         }
         // Uniforms stand behind the constants.
         for source in &mut plan.sources {
@@ -166,7 +167,7 @@ impl<D: Copy> Plan<D> {
     }
 
     /// A constant of the pool; until it is known how many there are, they are numbered behind the uniforms.
-    pub fn constant(&mut self, bits: u64, uniforms: usize) -> Source {
+    pub(crate) fn constant(&mut self, bits: u64, uniforms: usize) -> Source {
         let at = self.constants.iter().position(|known| *known == bits).unwrap_or_else(|| {
             self.constants.push(bits);
             self.constants.len() - 1
@@ -187,7 +188,7 @@ fn has_more_products(body: &Body) -> bool {
 }
 
 /// Whether it is what a [`Body`] says it is, and of operations that are known here.
-pub fn is_sound(body: &Body) -> bool {
+pub(crate) fn is_sound(body: &Body) -> bool {
     let is_known = |(id, op): (usize, &Op)| {
         let (operands, n) = op.operands();
         let is_in_range = match *op {
@@ -211,7 +212,7 @@ pub fn is_sound(body: &Body) -> bool {
 }
 
 /// Of each value whether all bits of a number are surely the same.
-pub fn masks(body: &Body) -> Vec<bool> {
+pub(crate) fn masks(body: &Body) -> Vec<bool> {
     let mut masks = Vec::with_capacity(body.ops.len());
     for op in &body.ops {
         let is = |id: Id| masks[id as usize];
@@ -229,15 +230,15 @@ pub fn masks(body: &Body) -> Vec<bool> {
 
 /// What a comparison and a choice by it are made by.
 #[derive(Clone, Copy, Debug)]
-enum Joined<D> {
+enum Joined<I> {
     /// It compares two numbers and chooses of two others.
-    Pick(D),
+    Pick(I),
     /// The lesser or the greater of the numbers that are chosen of.
-    Extreme(D),
+    Extreme(I),
 }
 
 /// For each value that is a comparison and used by one choice only: the instruction that does both, if there is one.
-fn joined<M: Machine>(body: &Body, machine: &M) -> Vec<Option<Joined<M::Doing>>> {
+fn joined<M: InstructionSet>(body: &Body, machine: &M) -> Vec<Option<Joined<M::Instruction>>> {
     let mut uses = vec![0u32; body.ops.len()];
     let mut chosen: Vec<Option<[Id; 2]>> = vec![None; body.ops.len()];
     for op in &body.ops {

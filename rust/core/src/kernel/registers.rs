@@ -3,11 +3,11 @@
 //! Nothing here knows a CPU.
 
 /// Never, or nothing.
-pub const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// When each value is needed.
 #[derive(Debug)]
-pub struct Uses {
+pub(crate) struct Uses {
     /// Of each value its next use, as a place in `uses`.
     first: Vec<u32>,
     /// When, and the place of the use after it.
@@ -16,13 +16,13 @@ pub struct Uses {
 
 impl Uses {
     /// Of so many values.
-    pub fn new(values: usize) -> Uses {
+    pub(crate) fn new(values: usize) -> Uses {
         Uses { first: vec![NONE; values], uses: Vec::new() }
     }
 
-    /// Adds a use of a value before those already added: uses are given from the last to the first. Returns whether it is the value's
-    /// last use.
-    pub fn add_earlier_use(&mut self, value: u32, when: u32) -> bool {
+    /// Adds a use of a value before those already added: uses are given from the last to the first. Returns whether it is the
+    /// value's last use.
+    pub(crate) fn add_earlier_use(&mut self, value: u32, when: u32) -> bool {
         let first = &mut self.first[value as usize];
         let is_last = *first == NONE;
         self.uses.push((when, *first));
@@ -31,7 +31,7 @@ impl Uses {
     }
 
     /// The next use after a time, or [`NONE`]. The times of successive calls must not decrease.
-    pub fn next(&mut self, value: u32, after: u32) -> u32 {
+    pub(crate) fn next(&mut self, value: u32, after: u32) -> u32 {
         let first = &mut self.first[value as usize];
         while *first != NONE {
             let (when, behind) = self.uses[*first as usize];
@@ -46,7 +46,7 @@ impl Uses {
 
 /// Registers and what they hold.
 #[derive(Debug)]
-pub struct Registers {
+pub(crate) struct Registers {
     /// Of each register the value that it holds.
     holds: [u32; 32],
     /// Of each value its register.
@@ -64,19 +64,19 @@ const NO_REGISTER: u8 = u8::MAX;
 
 impl Registers {
     /// So many registers for so many values.
-    pub fn new(count: u8, values: usize) -> Registers {
+    pub(crate) fn new(count: u8, values: usize) -> Registers {
         let free = if count == 32 { u32::MAX } else { (1 << count) - 1 };
         Registers { holds: [NONE; 32], of: vec![NO_REGISTER; values], free, kept: 0, locked: 0, count }
     }
 
     /// Where a value is.
-    pub fn of(&self, value: u32) -> Option<u8> {
+    pub(crate) fn of(&self, value: u32) -> Option<u8> {
         let register = self.of[value as usize];
         (register != NO_REGISTER).then_some(register)
     }
 
     /// Takes a register out of the game.
-    pub fn keep_one(&mut self) -> Option<u8> {
+    pub(crate) fn keep_one(&mut self) -> Option<u8> {
         let register = self.any_free()?;
         self.free &= !(1 << register);
         self.kept |= 1 << register;
@@ -84,23 +84,23 @@ impl Registers {
     }
 
     /// Whether a register was taken out of the game.
-    pub fn is_kept(&self, register: u8) -> bool {
+    pub(crate) fn is_kept(&self, register: u8) -> bool {
         self.kept >> register & 1 == 1
     }
 
     /// How many are free.
-    pub fn free(&self) -> u32 {
+    pub(crate) fn free(&self) -> u32 {
         self.free.count_ones()
     }
 
     /// A free one. It stays free until something is put there.
-    pub fn any_free(&self) -> Option<u8> {
+    pub(crate) fn any_free(&self) -> Option<u8> {
         let free = self.free & !self.locked;
         (free != 0).then(|| free.trailing_zeros() as u8)
     }
 
     /// Puts a value into a register, and forgets where it was.
-    pub fn put(&mut self, value: u32, register: u8) {
+    pub(crate) fn put(&mut self, value: u32, register: u8) {
         self.release(value);
         self.of[value as usize] = register;
         if !self.is_kept(register) {
@@ -110,7 +110,7 @@ impl Registers {
     }
 
     /// A value is not in a register any more.
-    pub fn release(&mut self, value: u32) {
+    pub(crate) fn release(&mut self, value: u32) {
         let register = std::mem::replace(&mut self.of[value as usize], NO_REGISTER);
         if register != NO_REGISTER && !self.is_kept(register) {
             self.holds[register as usize] = NONE;
@@ -120,17 +120,17 @@ impl Registers {
     }
 
     /// A register must stay as it is until `unlock`.
-    pub fn lock(&mut self, register: u8) {
+    pub(crate) fn lock(&mut self, register: u8) {
         self.locked |= 1 << register;
     }
 
     /// All may be changed again.
-    pub fn unlock(&mut self) {
+    pub(crate) fn unlock(&mut self) {
         self.locked = 0;
     }
 
     /// The value to give up: of those not locked the one with the highest price, which is above `least`.
-    pub fn victim(&self, least: u32, mut price: impl FnMut(u32) -> u32) -> Option<u32> {
+    pub(crate) fn victim(&self, least: u32, mut price: impl FnMut(u32) -> u32) -> Option<u32> {
         let mut best = None;
         let mut most = least;
         let mut candidates = !(self.free | self.kept | self.locked);

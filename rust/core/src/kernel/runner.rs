@@ -10,19 +10,22 @@ use super::{
     interpret::Interpreter,
     writer::{self, Shape},
 };
-use crate::{isa::Level, real::Real, tape::split::Body};
+use crate::{
+    isa::Level,
+    tape::{real::Real, split::Body},
+};
 
-/// Each operation of the body is interpreted so often, counted over one lane, before machine code is written: writing an operation
-/// takes about as long.
+/// Each operation of the body is interpreted so often, counted over one lane, before machine code is written: writing an
+/// operation takes about as long.
 const INTERPRETATIONS_PER_WRITE: u64 = 4000;
-/// After so many steps of a single member it is tried whether equal operations can be lanes of one vector: that takes about as long as
-/// these steps.
+/// After so many steps of a single member it is tried whether equal operations can be lanes of one vector: that takes about as
+/// long as these steps.
 const STEPS_PER_PACKING: u64 = 30_000;
 /// The cost of dispatching an operation over a row of lanes in the interpreter, in lanes.
 const LANES_PER_DISPATCH: usize = 10;
 
-/// Lanes that the interpreter takes at once where no shape sets their number: of so few members all, of many the fewest and the most.
-/// The more there are, the less it counts how long an operation takes to be dispatched.
+/// Lanes that the interpreter takes at once where no shape sets their number: of so few members all, of many the fewest and the
+/// most. The more there are, the less it counts how long an operation takes to be dispatched.
 const FEW_INTERPRETED: usize = 8;
 const INTERPRETED_LANES: [usize; 2] = [64, 256];
 /// The most bytes of the values of an interpreted step between these numbers of lanes, so that they stay in the L1 cache.
@@ -39,9 +42,9 @@ fn interpreted_lanes(body: &Body, members: usize) -> usize {
     members.div_ceil(turns).next_multiple_of(FEW_INTERPRETED)
 }
 
-/// What makes steps. What each wants of the numbers that are the same for all ([`Kernel::pool`]) is its own.
+/// Which kernel runs. Each has its own layout of the uniform numbers: see [`Kernel::pool`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum By {
+pub(crate) enum KernelKind {
     /// The interpreter.
     Interpreter,
     /// Machine code, a member in each lane.
@@ -51,7 +54,7 @@ pub enum By {
 }
 
 /// A body, over tiles of one length.
-pub struct Runner<T: Real = f64> {
+pub(crate) struct Runner<T: Real = f64> {
     body: Body,
     lanes: usize,
     interpreter: Interpreter,
@@ -67,19 +70,19 @@ pub struct Runner<T: Real = f64> {
 
 impl<T: Real> Runner<T> {
     /// For a run of so many members.
-    pub fn new(body: &Body, level: Level, members: usize) -> Runner<T> {
+    pub(crate) fn new(body: &Body, level: Level, members: usize) -> Runner<T> {
         let shape = writer::choose(body, level, members);
         let lanes = shape.as_ref().map_or_else(|| interpreted_lanes(body, members), Shape::lanes);
         Runner::shaped(body, level, lanes, shape)
     }
 
     /// For rows of so many lanes, each a number of a long block.
-    pub fn long(body: &Body, level: Level, lanes: usize) -> Runner<T> {
+    pub(crate) fn long(body: &Body, level: Level, lanes: usize) -> Runner<T> {
         Runner::shaped(body, level, lanes, writer::choose_long(body, level, lanes))
     }
 
     /// With a shape that was chosen before; interpreted if there is none.
-    pub fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner<T> {
+    pub(crate) fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner<T> {
         let interpreter = Interpreter::new(body, lanes, level.of_loops());
         let packed = OnceLock::new();
         if !shape.is_some_and(|shape: Shape| shape.packs()) {
@@ -98,27 +101,27 @@ impl<T: Real> Runner<T> {
     }
 
     /// How long rows are.
-    pub fn lanes(&self) -> usize {
+    pub(crate) fn lanes(&self) -> usize {
         self.lanes
     }
 
     /// How machine code would go through a tile; none where there is none at this level.
-    pub fn layout(&self) -> Option<Layout> {
+    pub(crate) fn layout(&self) -> Option<Layout> {
         self.shape.as_ref().map(Shape::layout)
     }
 
     /// Whether its machine code may have the numbers of one member in the lanes of vectors.
-    pub fn packs(&self) -> bool {
+    pub(crate) fn packs(&self) -> bool {
         self.shape.is_some_and(|shape| shape.packs())
     }
 
     /// What it makes steps of.
-    pub fn body(&self) -> &Body {
+    pub(crate) fn body(&self) -> &Body {
         &self.body
     }
 
     /// What makes so many more steps.
-    pub fn kernel(&self, steps: usize) -> (&dyn Kernel<T>, By) {
+    pub(crate) fn kernel(&self, steps: usize) -> (&dyn Kernel<T>, KernelKind) {
         // Asked first: the count of what was done belongs to all threads, and to touch it takes longer than a short kernel.
         if let Some(Some(written)) = self.written.get() {
             let packed = match self.packed.get() {
@@ -126,18 +129,18 @@ impl<T: Real> Runner<T> {
                 None if self.steps.fetch_add(steps as u64, Relaxed) < STEPS_PER_PACKING => None,
                 None => self.pack(),
             };
-            return packed.map_or((written.as_ref(), By::Lanes), |packed| (packed, By::Packed));
+            return packed.map_or((written.as_ref(), KernelKind::Lanes), |packed| (packed, KernelKind::Packed));
         }
         let coming = (steps * (self.lanes + LANES_PER_DISPATCH)) as u64;
         let pays = self.shape.is_some() && self.done.fetch_add(coming, Relaxed) + coming >= INTERPRETATIONS_PER_WRITE;
         match pays.then(|| self.write_lanes()).flatten() {
-            Some(written) => (written, By::Lanes),
-            None => (&self.interpreter, By::Interpreter),
+            Some(written) => (written, KernelKind::Lanes),
+            None => (&self.interpreter, KernelKind::Interpreter),
         }
     }
 
     /// The fastest machine code, written now if it was not before; none where none can be.
-    pub fn write(&self) -> Option<&dyn Kernel<T>> {
+    pub(crate) fn write(&self) -> Option<&dyn Kernel<T>> {
         let written = self.write_lanes()?;
         Some(self.pack().unwrap_or(written))
     }

@@ -1,15 +1,15 @@
 //! In which order the operations of a step are written.
 //!
-//! A CPU executes out of order, but only among the next few hundred operations. Several interleaved vectors give it enough to do. A long
-//! step leaves no registers for a second vector, and a single member has none: written function after function, such a step is a row of
-//! chains, each longer than what the CPU sees. So an operation that would wait for its operands is put off, and the first one after it that
-//! need not wait goes before it.
+//! A CPU executes out of order, but only among the next few hundred operations. Several interleaved vectors give it enough to do.
+//! A long step leaves no registers for a second vector, and a single member has none: written function after function, such a
+//! step is a row of chains, each longer than what the CPU sees. So an operation that would wait for its operands is put off, and
+//! the first one after it that need not wait goes before it.
 
 use std::collections::BTreeSet;
 
 use super::{
     choose::{is_slow, keeps_its_unit, timing},
-    plan::Plan,
+    plan::KernelPlan,
     shape::Shape,
 };
 use crate::tape::Op;
@@ -19,15 +19,17 @@ pub type Order = Vec<(usize, usize)>;
 
 /// The CPU overlaps shorter steps of a vector with those of the next vector by itself.
 const MIN_STEP_OPERATIONS: usize = 128;
-/// If interleaved vectors share more numbers than this, these are read from memory: once for all vectors, if one follows the other.
+/// If interleaved vectors share more numbers than this, these are read from memory: once for all vectors, if one follows the
+/// other.
 const MAX_SHARED: usize = 12;
-/// How many results of a single vector may wait to be used, for each register, if they do not fit into registers in any case: fewer waits
-/// then gain more than spills cost.
+/// How many results of a single vector may wait to be used, for each register, if they do not fit into registers in any case:
+/// fewer waits then gain more than spills cost.
 const MAX_WAITING_PER_REGISTER: usize = 2;
 /// The same for vectors one after the other of which some wait for roots and quotients, also where there are fewer registers.
 const MAX_WAITING_AROUND_SLOW: usize = 32;
-/// So many operations an interleaved vector is behind the one before it: sums of some are then made while products of others are, by
-/// other units. Fitted to the fastest numbers on the scenes of the benchmarks; less where steps are so short that it would leave gaps.
+/// So many operations an interleaved vector is behind the one before it: sums of some are then made while products of others are,
+/// by other units. Fitted to the fastest numbers on the scenes of the benchmarks; less where steps are so short that it would
+/// leave gaps.
 const MAX_BEHIND: usize = 3;
 const MIN_OPERATIONS_PER_BEHIND: usize = 6;
 /// Of the operations whose operands are made or under way, so many are compared, from the first one on.
@@ -35,7 +37,8 @@ const MAX_COMPARED: usize = 64;
 /// A CPU begins two operations on long vectors in a cycle.
 const CYCLES_PER_OPERATION: f64 = 0.5;
 
-/// Operation after operation, each for all vectors that are interleaved; each vector is so many operations behind the one before it.
+/// Operation after operation, each for all vectors that are interleaved; each vector is so many operations behind the one before
+/// it.
 pub fn in_turn(operations: usize, shape: Shape, behind: usize) -> Order {
     let mut order = Vec::with_capacity(operations * shape.block_vectors);
     for first in (0..shape.block_vectors).step_by(shape.interleaved) {
@@ -49,15 +52,15 @@ pub fn in_turn(operations: usize, shape: Shape, behind: usize) -> Order {
 }
 
 /// The order in which a plan is written; `ops` are the operations of its body.
-pub(super) fn order<D: Copy>(plan: &Plan<D>, ops: &[Op], shape: Shape) -> Order {
+pub(super) fn order<I: Copy>(plan: &KernelPlan<I>, ops: &[Op], shape: Shape) -> Order {
     let interleaves = shape.interleaved.min(shape.block_vectors) > 1;
     let is_single = shape.width == 1 && shape.block_vectors == 1;
     let shared = plan.sources.iter().filter(|source| source.is_shared()).count();
     let waits = Waits::of(plan, ops, shape);
     let has_slow = (0..plan.steps.len()).any(|i| waits.is_slow(i));
     if has_slow && !interleaves && !shape.resident && shape.block_vectors > 1 {
-        // Roots and quotients have one unit for all vectors. Side by side, all would come to it at once and wait for it, and then leave it
-        // idle at once. So each vector goes as far as it can, and the next one fills its waits.
+        // Roots and quotients have one unit for all vectors. Side by side, all would come to it at once and wait for it, and then
+        // leave it idle at once. So each vector goes as far as it can, and the next one fills its waits.
         return waits.shortened(&in_turn(plan.steps.len(), shape, 0), MAX_WAITING_AROUND_SLOW);
     }
     // A state that is in registers leaves none to interleaved vectors for more results that wait.
@@ -101,7 +104,7 @@ impl Waits {
         Waits { operands, users, time }
     }
 
-    fn of<D: Copy>(plan: &Plan<D>, ops: &[Op], shape: Shape) -> Waits {
+    fn of<I: Copy>(plan: &KernelPlan<I>, ops: &[Op], shape: Shape) -> Waits {
         // Half a vector is done in half the time where a unit makes a few numbers after the other.
         let share = if shape.width * shape.bytes < 64 { 0.5 } else { 1.0 };
         let time = |op: Op| {
@@ -135,7 +138,8 @@ impl Waits {
         most
     }
 
-    /// The order in which that goes first which has the longest way to the end of the step: no other vector fills the waits there.
+    /// The order in which that goes first which has the longest way to the end of the step: no other vector fills the waits
+    /// there.
     pub fn longest_first(&self, mut order: Order) -> Order {
         let mut rest = vec![0.0f64; self.time.len()];
         for i in (0..rest.len()).rev() {

@@ -19,7 +19,8 @@ pub struct Shape {
     pub interleaved: usize,
     /// Blocks, which are stepped one after the other.
     pub blocks: usize,
-    /// Whether a block makes all steps before the next one does, with the state in registers. Otherwise each step is made by all blocks.
+    /// Whether a block makes all steps before the next one does, with the state in registers. Otherwise each step is made by all
+    /// blocks.
     pub resident: bool,
 }
 
@@ -30,13 +31,13 @@ impl Shape {
     }
 
     /// The same in words that every CPU has.
-    pub fn layout(&self) -> Layout {
+    pub(crate) fn layout(&self) -> Layout {
         let Shape { width, block_vectors, blocks, resident, .. } = *self;
         Layout { width, block_vectors, blocks, resident, registers: self.registers() }
     }
 
-    /// Whether the numbers of one member may be lanes of vectors: there is one member, numbers have 64 bits, and the CPU has a writer for
-    /// it.
+    /// Whether the numbers of one member may be lanes of vectors: there is one member, numbers have 64 bits, and the CPU has a
+    /// writer for it.
     pub fn packs(&self) -> bool {
         self.lanes() == 1 && self.bytes == 8 && self.resident && matches!(self.level, Level::Avx2 | Level::Avx512)
     }

@@ -1,20 +1,20 @@
 //! One step of the vectors of a block, instruction after instruction.
 //!
-//! A value is in a register, in memory, or both. Leaves are in memory from the start; a result is spilled to the scratch only when
-//! registers run out. Each number of the state has a home: a register of its own, or its row. The next value goes there as soon as
-//! the old one is not needed any more: at once if the instruction that computes it is the last to read the old one.
+//! A value is in a register, in memory, or both. Leaves are in memory from the start; a result is spilled to the scratch only
+//! when registers run out. Each number of the state has a home: a register of its own, or its row. The next value goes there as
+//! soon as the old one is not needed any more: at once if the instruction that computes it is the last to read the old one.
 
 use super::{
     machine::{Base, Machine, Place},
     pack::MOST_LANES,
-    plan::{Plan, Source, Step},
+    plan::{KernelPlan, Source, Step},
     registers::{NONE, Registers, Uses},
     shape::Shape,
 };
 
 /// Where a value is in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Where {
+pub(crate) enum Where {
     Nowhere,
     /// As its source says.
     Leaf,
@@ -25,17 +25,23 @@ pub enum Where {
 }
 
 /// A value of one of the vectors of a block.
-pub type Value = u32;
+pub(crate) type Value = u32;
+
+/// A CPU that the writer can write for.
+pub(crate) trait MakeOperation: Machine {
+    /// Writes an operation for one vector, and returns where its result is. None if there are too few registers.
+    fn make(writer: &mut Writer<Self>, step: &Step<Self::Instruction>, vector: usize, of: &[Value]) -> Option<u8>;
+}
 
 /// What is written, and what is where meanwhile.
 #[derive(Debug)]
-pub struct Writer<'a, M: Machine> {
-    pub plan: &'a Plan<M::Doing>,
+pub(crate) struct Writer<'a, M: MakeOperation> {
+    pub plan: &'a KernelPlan<M::Instruction>,
     pub shape: Shape,
     /// Numbers in the vectors of the operation that is written.
     pub width: usize,
     /// The operations, each for a vector, in the order in which they are made.
-    pub order: Vec<(&'a Step<M::Doing>, usize)>,
+    pub order: Vec<(&'a Step<M::Instruction>, usize)>,
     pub code: M,
     pub registers: Registers,
     pub uses: Uses,
@@ -52,15 +58,15 @@ pub struct Writer<'a, M: Machine> {
     pub slots: u32,
 }
 
-impl<M: Machine> Writer<'_, M> {
+impl<M: MakeOperation> Writer<'_, M> {
     /// The value of the plan in a vector.
-    pub fn value(&self, id: u32, vector: usize) -> Value {
+    pub(crate) fn value(&self, id: u32, vector: usize) -> Value {
         let vector = if self.plan.sources[id as usize].is_shared() { 0 } else { vector };
         id * self.shape.block_vectors as u32 + vector as u32
     }
 
     /// Where a value comes from.
-    pub fn source(&self, value: Value) -> Source {
+    pub(crate) fn source(&self, value: Value) -> Source {
         self.plan.sources[value as usize / self.shape.block_vectors]
     }
 
@@ -86,7 +92,7 @@ impl<M: Machine> Writer<'_, M> {
     }
 
     /// Where a value is in memory.
-    pub fn place(&self, value: Value) -> Place {
+    pub(crate) fn place(&self, value: Value) -> Place {
         if let Some(packing) = &self.plan.packing {
             let home = |home: usize| Place::new(Base::Scratch, (8 * MOST_LANES * home) as i32);
             match (self.memory[value as usize], self.source(value)) {
@@ -110,14 +116,14 @@ impl<M: Machine> Writer<'_, M> {
     }
 
     /// Loads a value.
-    pub fn load(&mut self, value: Value, register: u8) {
+    pub(crate) fn load(&mut self, value: Value, register: u8) {
         let place = self.place(value);
         self.as_wide_as(value, |code| code.load(register, place));
         self.registers.put(value, register);
     }
 
     /// Stores to the row of a number of the state.
-    pub fn store(&mut self, s: u32, value: Value, register: u8) {
+    pub(crate) fn store(&mut self, s: u32, value: Value, register: u8) {
         let row = match self.plan.packing {
             None => self.in_row(Base::State, s, value),
             Some(_) => Place::new(Base::Scratch, 8 * (MOST_LANES as u32 * s) as i32),
@@ -126,13 +132,13 @@ impl<M: Machine> Writer<'_, M> {
     }
 
     /// The cost of keeping a value in its register: how many operations until it is needed, twice as many if memory holds it too.
-    pub fn price(uses: &mut Uses, memory: &[Where], now: u32, value: Value) -> u32 {
+    pub(crate) fn price(uses: &mut Uses, memory: &[Where], now: u32, value: Value) -> u32 {
         let wait = uses.next(value, now).saturating_sub(now);
         if memory[value as usize] == Where::Nowhere { wait } else { wait.saturating_mul(2) }
     }
 
     /// A register to write to. The value that it held is spilled if it is still needed.
-    pub fn take(&mut self) -> Option<u8> {
+    pub(crate) fn take(&mut self) -> Option<u8> {
         if let Some(register) = self.registers.any_free() {
             return Some(register);
         }
@@ -153,7 +159,7 @@ impl<M: Machine> Writer<'_, M> {
     }
 
     /// The register of a value, which is loaded if it is in none.
-    pub fn fetch(&mut self, value: Value) -> Option<u8> {
+    pub(crate) fn fetch(&mut self, value: Value) -> Option<u8> {
         let register = match self.registers.of(value) {
             Some(register) => register,
             None => {
@@ -167,7 +173,7 @@ impl<M: Machine> Writer<'_, M> {
     }
 
     /// Whether a value is needed later.
-    pub fn is_needed(&mut self, value: Value) -> bool {
+    pub(crate) fn is_needed(&mut self, value: Value) -> bool {
         self.uses.next(value, self.now) != NONE
     }
 
@@ -188,7 +194,7 @@ impl<M: Machine> Writer<'_, M> {
     }
 
     /// The register for what is made of these: the home of the number of the state that it replaces, one of theirs, or another.
-    pub fn result(&mut self, id: u32, vector: usize, of: &[Value]) -> Option<u8> {
+    pub(crate) fn result(&mut self, id: u32, vector: usize, of: &[Value]) -> Option<u8> {
         self.let_go(of);
         match self.free_home(id, vector) {
             Some(home) => Some(home),
@@ -196,8 +202,9 @@ impl<M: Machine> Writer<'_, M> {
         }
     }
 
-    /// The same for an instruction that overwrites an operand: one of `over` if it is not needed any more. None of the registers `apart`.
-    pub fn result_over(&mut self, id: u32, vector: usize, of: &[Value], over: &[Value], apart: &[u8]) -> Option<u8> {
+    /// The same for an instruction that overwrites an operand: one of `over` if it is not needed any more. None of the registers
+    /// `apart`.
+    pub(crate) fn result_over(&mut self, id: u32, vector: usize, of: &[Value], over: &[Value], apart: &[u8]) -> Option<u8> {
         let home = self.free_home(id, vector).filter(|home| !apart.contains(home));
         let own = over.iter().find_map(|value| {
             let register = self.registers.of(*value)?;
@@ -221,7 +228,7 @@ impl<M: Machine> Writer<'_, M> {
     }
 
     /// Writes one operation for one vector. None if there are too few registers even so.
-    pub fn make(&mut self, step: &Step<M::Doing>, vector: usize) -> Option<()> {
+    pub(crate) fn make(&mut self, step: &Step<M::Instruction>, vector: usize) -> Option<()> {
         let mut of = [0; 4];
         for (value, id) in of.iter_mut().zip(step.of()) {
             *value = self.value(*id, vector);

@@ -4,15 +4,18 @@ use super::{
     Kernel, Tile, aarch64,
     frame::Frame,
     loops,
-    machine::Machine,
     pack::{self, MOST_LANES, Packed, Verdict},
     pages::Pages,
-    plan::{Plan, is_sound},
+    plan::{KernelPlan, is_sound},
     schedule,
     shape::Shape,
+    write::MakeOperation,
     x86,
 };
-use crate::{isa::Level, real::Real, tape::split::Body};
+use crate::{
+    isa::Level,
+    tape::{real::Real, split::Body},
+};
 
 /// Machine code for a CPU that this machine may not have.
 #[derive(Clone, Debug)]
@@ -49,18 +52,18 @@ pub fn assemble(body: &Body, shape: Shape) -> Option<Assembled> {
     }
 }
 
-fn assemble_for<M: Machine>(body: &Body, shape: Shape) -> Option<Assembled> {
+fn assemble_for<M: MakeOperation>(body: &Body, shape: Shape) -> Option<Assembled> {
     assemble_plan::<M>(body, None, shape)
 }
 
-fn assemble_plan<M: Machine>(body: &Body, packed: Option<&Packed>, shape: Shape) -> Option<Assembled> {
+fn assemble_plan<M: MakeOperation>(body: &Body, packed: Option<&Packed>, shape: Shape) -> Option<Assembled> {
     if !shape.is_possible(body, M::MOST_OPERATIONS) {
         return None;
     }
     let machine = M::new(shape, body.ops.len() * shape.block_vectors);
     let plan = match packed {
-        None => Plan::new(body, &machine)?,
-        Some(packed) => Plan::packed(body, packed, &machine)?,
+        None => KernelPlan::new(body, &machine)?,
+        Some(packed) => KernelPlan::packed(body, packed, &machine)?,
     };
     let order = match packed {
         None => schedule::order(&plan, &body.ops, shape),
@@ -93,7 +96,8 @@ pub fn write(body: &Body, shape: Shape) -> Option<Written> {
     execute(assemble(body, shape)?)
 }
 
-/// Writes a kernel for a single member, whose equal operations are lanes of one vector, if that gains. None as above, or if it does not.
+/// Writes a kernel for a single member, whose equal operations are lanes of one vector, if that gains. None as above, or if it
+/// does not.
 pub fn write_if_it_gains(body: &Body, shape: Shape) -> Option<Written> {
     if !shape.packs() || !is_sound(body) {
         return None;

@@ -3,22 +3,22 @@
 use std::sync::Arc;
 
 use super::{
-    Rates,
-    course::{V, Y},
+    blocks::{Blocks, Schedules},
     executor::Executor,
-    group::{Blocks, Courses},
+    rates::Rates,
+    schedule::{V, Y},
 };
 use crate::{
-    controls,
     error::Error,
+    group::AdaptiveBatch,
     isa::Level,
-    pace::{Acceptance, Made, Pace, Scales, judge},
-    run::{
-        adaptive::{AdaptiveBatch, NO_CLOCK},
-        workers::Stop,
+    model::{around::controls, spec::Spec, steppers::method},
+    stage::{Clock, Stop},
+    step::{
+        key::StepKind,
+        pace::{Acceptance, Made, Pace, Scales, judge},
+        tapes::Traced,
     },
-    spec::Spec,
-    trace::{How, Traced, method},
 };
 
 /// One member, whose rates are scaled to a step of 1.
@@ -39,17 +39,17 @@ pub struct LargeAdaptive {
 impl LargeAdaptive {
     /// Of rates by a method that estimates its error. `budget` is the most attempts of the member.
     pub fn new(
-        courses: Arc<Courses>,
+        schedules: Arc<Schedules>,
         rates: Box<dyn Rates>,
         traced: &Traced,
         level: Level,
         budget: f64,
     ) -> Result<LargeAdaptive, Error> {
-        let How::Attempts { name, acceptance, backward, .. } = &traced.scene().how else { return Err(Error::NoEstimate) };
+        let StepKind::Attempts { name, acceptance, backward, .. } = &traced.key().how else { return Err(Error::NoEstimate) };
         let order = method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?.order;
-        let blocks = Blocks::new(courses, rates, traced.shape);
-        let executor = blocks.executor(&blocks.courses.step, level, &NO_CLOCK);
-        let pushes = controls::pushes(&traced.scene().given);
+        let blocks = Blocks::new(schedules, rates, traced.shape);
+        let executor = blocks.executor(&blocks.schedules.step, level, &Clock::NONE);
+        let pushes = controls::pushes(&traced.key().signature);
         let (acceptance, backward) = (acceptance.clone(), *backward);
         let pace = Pace::of([0.0; Pace::<f64>::NUMBERS]);
         Ok(LargeAdaptive { blocks, executor, order, acceptance, backward, budget, pushes, pace, scales: Scales::default() })
@@ -99,7 +99,7 @@ impl AdaptiveBatch for LargeAdaptive {
     }
 
     fn attempt(&mut self, attempts: usize) {
-        let Blocks { courses, rates, arena, sizes, stride } = &mut self.blocks;
+        let Blocks { schedules, rates, arena, sizes, stride } = &mut self.blocks;
         for _ in 0..attempts {
             let outlook = self.pace.outlook(self.budget);
             if !outlook.runs && !outlook.is_extra {
@@ -109,17 +109,17 @@ impl AdaptiveBatch for LargeAdaptive {
             rates.tally_mut().fill(0.0);
             // Rates that run backward are those of a step of −1.
             let (t, step) = if self.backward { (-self.pace.t, -outlook.step) } else { (self.pace.t, outlook.step) };
-            self.executor.run(&courses.step, rates.as_mut(), *sizes, t, step, arena);
+            self.executor.run(&schedules.step, rates.as_mut(), *sizes, t, step, arena);
             // Results come in pairs: of velocities, of coordinates.
             let block = |i: usize, row: usize| &arena[row * *stride..][..sizes[i % 2]];
-            let blocks: Vec<&[f64]> = courses.step.results.iter().enumerate().map(|(i, row)| block(i, *row)).collect();
+            let blocks: Vec<&[f64]> = schedules.step.results.iter().enumerate().map(|(i, row)| block(i, *row)).collect();
             let made = Made::of(&self.acceptance, [block(0, V), block(1, Y)], &blocks);
             let counts = self.acceptance.counts(sizes[0], sizes[1]);
             let (next, longest, took) = judge(&self.pace, &self.scales, self.order, counts, &made, outlook);
             self.pace = next;
             self.scales.longest = longest;
             if took {
-                for ((home, made), numbers) in [V, Y].into_iter().zip(&courses.step.results).zip(*sizes) {
+                for ((home, made), numbers) in [V, Y].into_iter().zip(&schedules.step.results).zip(*sizes) {
                     arena.copy_within(made * *stride..made * *stride + numbers, home * *stride);
                 }
                 let (v, y) = arena.split_at_mut(*stride);

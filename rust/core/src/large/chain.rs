@@ -1,9 +1,9 @@
-//! The rates of a long chain ([`crate::systems::chain`]).
+//! The rates of a long chain ([`crate::model::systems::chain`]).
 
-use super::{Asked, Facts, Rates};
+use super::rates::{RateTraits, Rates, RatesRequest};
 use crate::{
     isa::{Level, Task, with_isa},
-    spec::Spec,
+    model::spec::Spec,
 };
 
 struct Chain {
@@ -14,7 +14,7 @@ struct Chain {
 }
 
 /// The rates of a chain.
-pub fn make(asked: &Asked) -> Box<dyn Rates> {
+pub(crate) fn make(asked: &RatesRequest) -> Box<dyn Rates> {
     let n = asked.shape.y;
     let (stiffness, by_mass) = (vec![0.0; n + 1], vec![0.0; n]);
     Box::new(Chain { level: asked.machine.level, h: asked.h, stiffness, by_mass })
@@ -48,12 +48,12 @@ impl Task for Pull<'_> {
 }
 
 impl Rates for Chain {
-    fn facts(&self) -> Facts {
-        Facts { second_order: true, reads_v: false, stretched: false }
+    fn traits(&self) -> RateTraits {
+        RateTraits { second_order: true, reads_v: false, stretched: false }
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
-        let row = |name: &str, i: usize| spec.given.place(name).map_or(f64::NAN, |place| spec.rows[place + i].at(first));
+        let row = |name: &str, i: usize| spec.signature.place(name).map_or(f64::NAN, |place| spec.rows[place + i].at(first));
         self.stiffness.iter_mut().enumerate().for_each(|(i, k)| *k = row("stiffness", i));
         self.by_mass.iter_mut().enumerate().for_each(|(i, by_mass)| *by_mass = self.h / row("mass", i));
     }

@@ -1,23 +1,26 @@
-//! Contact of the points of a large system: the same as [`crate::contact`], over rows, member by member and point by point.
+//! Contact of the points of a large system: the same as [`crate::model::around::contact`], over rows, member by member and point
+//! by point.
 
 use std::sync::Arc;
 
-use super::{Asked, Facts, Rates, executor::Executor, group::Blocks};
-use crate::{
-    contact::{Contacts, Springs, dimensions},
-    run::workers::Stop,
+use super::{
+    blocks::Blocks,
+    executor::Executor,
+    rates::{RateTraits, Rates, RatesRequest},
+};
+use crate::model::{
+    around::contact::{Contacts, Springs, dimensions},
     spec::{Parameters, Spec},
-    window::Window,
 };
 
 /// The parameters of one member.
 fn parameters<'a>(spec: &'a Spec, h: f64, member: usize) -> Parameters<'a, f64> {
     let numbers = spec.rows.iter().map(|row| row.at(member)).collect();
-    Parameters { given: &spec.given, h, numbers, sample: |_, _| f64::NAN }
+    Parameters { signature: &spec.signature, h, numbers, sample: |_, _| f64::NAN }
 }
 
 /// The surfaces of the members of a group, and the state before a step.
-pub struct RowContacts {
+pub(crate) struct RowContacts {
     /// One for each lane.
     lanes: Vec<Contacts<f64>>,
     dim: usize,
@@ -42,16 +45,16 @@ fn point<const N: usize>(rows: [&[f64]; N], dim: usize, lanes: usize, at: (usize
 
 impl RowContacts {
     /// For the members from `first`; lanes past the `count`-th repeat the last one. None if no surface acts after a step.
-    pub fn new(spec: &Spec, h: f64, lanes: usize, first: usize, count: usize) -> Option<RowContacts> {
+    pub(crate) fn new(spec: &Spec, h: f64, lanes: usize, first: usize, count: usize) -> Option<RowContacts> {
         let member = |lane: usize| first + lane.min(count.saturating_sub(1));
         let lanes = (0..lanes).map(|lane| Contacts::new(&parameters(spec, h, member(lane)))).collect::<Option<_>>()?;
         let none = || [Vec::new(), Vec::new()];
-        let dim = dimensions(&spec.given);
+        let dim = dimensions(&spec.signature);
         Some(RowContacts { lanes, dim, before: none(), after: none(), velocities: none(), touched: Vec::new() })
     }
 
     /// Copies the state before a step.
-    pub fn keep(&mut self, (v, y): (&[f64], &[f64])) {
+    pub(crate) fn keep(&mut self, (v, y): (&[f64], &[f64])) {
         copy(&mut self.before, [v, y]);
     }
 
@@ -122,8 +125,8 @@ impl RowContacts {
             self.before[0] = v0;
             return;
         };
-        let (end, courses) = (t + h, Arc::clone(&blocks.courses));
-        let (Some(to_carry), Some(to_v)) = (&courses.start, &courses.finish) else { return };
+        let (end, schedules) = (t + h, Arc::clone(&blocks.schedules));
+        let (Some(to_carry), Some(to_v)) = (&schedules.start, &schedules.finish) else { return };
         let (v, y) = blocks.slots();
         copy(&mut self.after, [v, y]);
         for (i, (state, t)) in [(&self.before, t), (&self.after, end)].into_iter().enumerate() {
@@ -159,14 +162,23 @@ struct SprungRates {
 }
 
 /// Rates with the springs that are given, or the rates themselves.
-pub fn wrap(rates: Box<dyn Rates>, asked: &Asked) -> Box<dyn Rates> {
-    let has_spring = (0..asked.given.whole("contacts")).any(|i| asked.given.word(&format!("contact_{i}_way")) == "spring");
+pub(crate) fn wrap(rates: Box<dyn Rates>, asked: &RatesRequest) -> Box<dyn Rates> {
+    let has_spring =
+        (0..asked.signature.whole("contacts")).any(|i| asked.signature.word(&format!("contact_{i}_way")) == "spring");
     if has_spring { Box::new(SprungRates { rates, h: asked.h, springs: None }) } else { rates }
 }
 
 impl Rates for SprungRates {
-    fn facts(&self) -> Facts {
-        self.rates.facts()
+    fn inner(&self) -> Option<&dyn Rates> {
+        Some(self.rates.as_ref())
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Rates> {
+        Some(self.rates.as_mut())
+    }
+
+    fn traits(&self) -> RateTraits {
+        self.rates.traits()
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
@@ -174,54 +186,10 @@ impl Rates for SprungRates {
         self.rates.prepare(spec, first, count);
     }
 
-    fn set_window(&mut self, window: Option<Window<f64>>) {
-        self.rates.set_window(window);
-    }
-
-    fn set_stop_flag(&mut self, stop: &Stop) {
-        self.rates.set_stop_flag(stop);
-    }
-
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
         self.rates.dv(t, v, y, out);
         if let Some(springs) = &self.springs {
             springs.push(y, &mut out[..y.len()]);
         }
-    }
-
-    fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        self.rates.dy(t, v, y, out);
-    }
-
-    fn velocity(&mut self, d: &[f64], out: &mut [f64]) {
-        self.rates.velocity(d, out);
-    }
-
-    fn project(&mut self, v: &mut [f64], y: &mut [f64]) {
-        self.rates.project(v, y);
-    }
-
-    fn cache_forces(&mut self, y: &[f64]) {
-        self.rates.cache_forces(y);
-    }
-
-    fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
-        self.rates.record(v, y, rows);
-    }
-
-    fn energies(&mut self, v: &[f64], y: &[f64], dv: &mut [f64]) -> Option<[f64; 2]> {
-        self.rates.energies(v, y, dv)
-    }
-
-    fn gradient(&mut self, v: &[f64], dv: &[f64], along: (&mut [f64], &mut [f64])) -> Option<f64> {
-        self.rates.gradient(v, dv, along)
-    }
-
-    fn tally(&self) -> &[f64] {
-        self.rates.tally()
-    }
-
-    fn tally_mut(&mut self) -> &mut [f64] {
-        self.rates.tally_mut()
     }
 }

@@ -1,24 +1,22 @@
-//! A control or a projection that wraps the rates of one member: the same as [`crate::controls`], over rows.
+//! A control or a projection that wraps the rates of one member: the same as [`crate::model::around::controls`], over rows.
 
-use super::{Asked, Facts, Rates};
-use crate::{
-    controls::{self, energy, projection},
-    run::workers::Stop,
+use super::rates::{RateTraits, Rates, RatesRequest};
+use crate::model::{
+    around::controls::{self, energy, projection},
     spec::Spec,
-    window::Window,
 };
 
 /// Rates under the control that is given, or the rates themselves.
-pub fn wrap(rates: Box<dyn Rates>, asked: &Asked) -> Box<dyn Rates> {
-    if !controls::is_given(asked.given) {
+pub(crate) fn wrap(rates: Box<dyn Rates>, asked: &RatesRequest) -> Box<dyn Rates> {
+    if !controls::is_given(asked.signature) {
         return rates;
     }
-    let control = match asked.given.word("control") {
+    let control = match asked.signature.word("control") {
         "energy" => Control::Push {
-            limited: asked.given.word("control.form") == "limited",
-            between: controls::is_after_the_step(asked.given),
+            limited: asked.signature.word("control.form") == "limited",
+            between: controls::is_after_the_step(asked.signature),
         },
-        _ => Control::Projection { nacozy: asked.given.word("control.way") == "nacozy" },
+        _ => Control::Projection { nacozy: asked.signature.word("control.way") == "nacozy" },
     };
     let (v, y) = (vec![0.0; asked.shape.v], vec![0.0; asked.shape.y]);
     let step = asked.attempts.then_some(asked.h);
@@ -49,10 +47,18 @@ struct ControlledRates {
 }
 
 impl Rates for ControlledRates {
-    fn facts(&self) -> Facts {
+    fn inner(&self) -> Option<&dyn Rates> {
+        Some(self.rates.as_ref())
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Rates> {
+        Some(self.rates.as_mut())
+    }
+
+    fn traits(&self) -> RateTraits {
         let pushes = matches!(self.control, Control::Push { between: false, .. });
-        let facts = self.rates.facts();
-        Facts { reads_v: pushes || facts.reads_v, stretched: pushes && self.step.is_some(), ..facts }
+        let traits = self.rates.traits();
+        RateTraits { reads_v: pushes || traits.reads_v, stretched: pushes && self.step.is_some(), ..traits }
     }
 
     fn set_step(&mut self, step: f64) {
@@ -60,17 +66,9 @@ impl Rates for ControlledRates {
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        let number = |name: &str| spec.given.place(name).map_or(f64::NAN, |place| spec.rows[place].at(first));
+        let number = |name: &str| spec.signature.place(name).map_or(f64::NAN, |place| spec.rows[place].at(first));
         (self.gain, self.target) = (number("control.gain"), self.h * number("control.target"));
         self.rates.prepare(spec, first, count);
-    }
-
-    fn set_window(&mut self, window: Option<Window<f64>>) {
-        self.rates.set_window(window);
-    }
-
-    fn set_stop_flag(&mut self, stop: &Stop) {
-        self.rates.set_stop_flag(stop);
     }
 
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
@@ -86,14 +84,6 @@ impl Rates for ControlledRates {
         for (out, v) in out.iter_mut().zip(v) {
             *out -= g * v;
         }
-    }
-
-    fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        self.rates.dy(t, v, y, out);
-    }
-
-    fn velocity(&mut self, d: &[f64], out: &mut [f64]) {
-        self.rates.velocity(d, out);
     }
 
     fn project(&mut self, v: &mut [f64], y: &mut [f64]) {
@@ -122,22 +112,6 @@ impl Rates for ControlledRates {
         for (block, along) in [(v, &self.along.0), (y, &self.along.1)] {
             block.iter_mut().zip(along).for_each(|(number, along)| *number -= step * along);
         }
-    }
-
-    fn cache_forces(&mut self, y: &[f64]) {
-        self.rates.cache_forces(y);
-    }
-
-    fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
-        self.rates.record(v, y, rows);
-    }
-
-    fn energies(&mut self, v: &[f64], y: &[f64], dv: &mut [f64]) -> Option<[f64; 2]> {
-        self.rates.energies(v, y, dv)
-    }
-
-    fn gradient(&mut self, v: &[f64], dv: &[f64], along: (&mut [f64], &mut [f64])) -> Option<f64> {
-        self.rates.gradient(v, dv, along)
     }
 
     fn tally(&self) -> &[f64] {

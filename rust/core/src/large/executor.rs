@@ -1,41 +1,39 @@
-//! Executes a course: rates and passes over an arena.
+//! Executes a schedule: rates and passes over an arena.
 
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::{
-    Rates,
-    course::{Act, Course, Rate},
+    rates::Rates,
+    schedule::{Action, BlockSchedule, Rate},
 };
 use crate::{
     isa::Level,
-    run::{
-        stage::{Clock, PreparedStage},
-        workers::Stop,
-    },
-    spec::Spec,
+    model::spec::Spec,
+    stage::{Clock, PreparedStage, Stop},
 };
 
-/// The passes of a course, ready for an arena.
-pub struct Executor {
-    /// Of each act its kernel, if it is a pass.
+/// The passes of a schedule, ready for an arena.
+pub(crate) struct Executor {
+    /// Of each action its kernel, if it is a pass.
     passes: Vec<Option<PreparedStage>>,
     stride: usize,
-    /// When set, the remaining acts are skipped.
+    /// When set, the remaining actions are skipped.
     pub stop: Stop,
 }
 
 const VECTOR: usize = 8;
 
 /// The length of rows of so many numbers, padded to whole vectors.
-pub fn stride(numbers: usize) -> usize {
-    // Four vectors can be interleaved if their number is a multiple of four. Short rows are padded less: they would be half empty.
+pub(crate) fn stride(numbers: usize) -> usize {
+    // Four vectors can be interleaved if their number is a multiple of four. Short rows are padded less: they would be half
+    // empty.
     const INTERLEAVED: usize = 4 * VECTOR;
     if numbers <= 8 * INTERLEAVED {
         return numbers.next_multiple_of(if numbers <= INTERLEAVED { VECTOR } else { 2 * VECTOR }).max(VECTOR);
     }
     let mut stride = numbers.next_multiple_of(INTERLEAVED);
-    // A load waits for an earlier store whose address differs by a multiple of 4096 bytes: rows must not begin at the same place of a
-    // page.
+    // A load waits for an earlier store whose address differs by a multiple of 4096 bytes: rows must not begin at the same place
+    // of a page.
     const PAGE_NUMBERS: usize = 512;
     while numbers >= PAGE_NUMBERS
         && ((stride / INTERLEAVED).is_multiple_of(2)
@@ -49,27 +47,35 @@ pub fn stride(numbers: usize) -> usize {
 
 impl Executor {
     /// For rows of so many numbers.
-    pub fn new(course: &Course, level: Level, stride: usize, clock: &Clock) -> Executor {
+    pub(crate) fn new(schedule: &BlockSchedule, level: Level, stride: usize, clock: &Clock) -> Executor {
         let no_parameters = Spec::default();
-        let pass = |act: &Act| match act {
-            Act::Pass(stage) => {
-                Some(PreparedStage::with(stage, stage.kit_of(level, stride), &no_parameters, clock, f64::INFINITY))
+        let pass = |action: &Action| match action {
+            Action::Pass(stage) => {
+                Some(PreparedStage::with(stage, stage.compiled_for_lanes(level, stride), &no_parameters, clock, f64::INFINITY))
             }
-            Act::Ask { .. } | Act::Both { .. } => None,
+            Action::Ask { .. } | Action::Both { .. } => None,
         };
-        Executor { passes: course.acts.iter().map(pass).collect(), stride, stop: Stop::default() }
+        Executor { passes: schedule.actions.iter().map(pass).collect(), stride, stop: Stop::default() }
     }
 
     /// Executes it at time t, with the step h, which is also the step of an attempt.
-    pub fn run(&mut self, course: &Course, rates: &mut dyn Rates, sizes: [usize; 2], t: f64, h: f64, arena: &mut [f64]) {
+    pub(crate) fn run(
+        &mut self,
+        schedule: &BlockSchedule,
+        rates: &mut dyn Rates,
+        sizes: [usize; 2],
+        t: f64,
+        h: f64,
+        arena: &mut [f64],
+    ) {
         let stride = self.stride;
-        for (act, pass) in course.acts.iter().zip(&mut self.passes) {
+        for (action, pass) in schedule.actions.iter().zip(&mut self.passes) {
             if self.stop.load(Relaxed) {
                 return;
             }
-            match (act, pass) {
-                (Act::Pass(stage), Some(pass)) => pass.advance_at(stage, h, arena),
-                (Act::Ask { rate, at, v, y, out }, _) => {
+            match (action, pass) {
+                (Action::Pass(stage), Some(pass)) => pass.advance_at(stage, h, arena),
+                (Action::Ask { rate, at, v, y, out }, _) => {
                     let (before, rest) = arena.split_at_mut(out * stride);
                     let (out_row, after) = rest.split_at_mut(stride);
                     let row = |row: usize, numbers: usize| {
@@ -87,7 +93,7 @@ impl Executor {
                         Rate::Velocity => rates.velocity(row(*y, sizes[1]), &mut out_row[..sizes[0]]),
                     }
                 }
-                (Act::Both { at, state: [v, y], out: [dv, dy] }, _) => {
+                (Action::Both { at, state: [v, y], out: [dv, dy] }, _) => {
                     let row = |row: &usize, numbers: usize| row * stride..row * stride + numbers;
                     let [of_v, of_y] = sizes.map(|numbers| numbers.next_multiple_of(VECTOR));
                     let rows = [row(v, sizes[0]), row(y, sizes[1]), row(dv, of_v), row(dy, of_y)];
@@ -96,7 +102,7 @@ impl Executor {
                         rates.both(at.at(t, h), v, y, [dv, dy]);
                     }
                 }
-                (Act::Pass(_), None) => {} // there is a kernel for each pass
+                (Action::Pass(_), None) => {} // there is a kernel for each pass
             }
         }
     }

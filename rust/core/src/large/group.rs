@@ -3,105 +3,20 @@
 use std::sync::{Arc, atomic::Ordering::Relaxed};
 
 use super::{
-    Facts, Rates,
+    blocks::{Blocks, Schedules},
     contact::RowContacts,
-    course::{Course, Goal},
-    executor::{Executor, stride},
+    executor::Executor,
+    rates::Rates,
+    schedule::BlockSchedule,
 };
 use crate::{
-    error::Error,
+    group::Group,
     isa::Level,
-    program::{Block, Program},
-    run::{
-        aligned::Aligned,
-        group::Group,
-        stage::{Clock, Force},
-        workers::Stop,
-    },
-    spec::Spec,
-    system::Shape,
-    trace::{How, method},
-    window,
+    model::{spec::Spec, system::Shape, window},
+    stage::{Clock, Force, Stop},
 };
 
-/// The courses of a method, for one kind of rates.
-pub struct Courses {
-    /// A step, or an attempt at one.
-    pub step: Course,
-    /// Turns velocities into what the method carries.
-    pub start: Option<Course>,
-    /// Turns what the method carries into velocities.
-    pub finish: Option<Course>,
-}
-
-impl Courses {
-    /// Of a method that steps so, for rates of which these facts are known.
-    pub fn new(how: &How, facts: Facts, shape: Shape) -> Result<Courses, Error> {
-        let (name, choice) = match how {
-            How::Method { name, choice } => (name.as_str(), Some(*choice)),
-            How::Attempts { name, .. } => (name.as_str(), None),
-            How::Step(_) | How::Matrix { .. } => ("", None), // it has no method, which the next line says
-        };
-        let method = method(name)?;
-        let course = |program: Program| {
-            // A program of one result changes the block v alone.
-            let results: Vec<Block> = match program.results[..] {
-                [v] => vec![v, Block::Y],
-                _ => program.results.clone(),
-            };
-            Course::new(&program, &results, if choice.is_some() { Goal::State } else { Goal::Attempt }, facts, shape)
-        };
-        let step = if choice.is_some() { Some(method.program()) } else { method.attempt() };
-        Ok(Courses {
-            step: course(step.ok_or(Error::NoEstimate)?),
-            start: choice.and_then(|choice| method.start(choice)).map(course),
-            finish: choice.and_then(|choice| method.finish(choice)).map(course),
-        })
-    }
-
-    fn all(&self) -> impl Iterator<Item = &Course> {
-        [Some(&self.step), self.start.as_ref(), self.finish.as_ref()].into_iter().flatten()
-    }
-
-    /// How many rows an arena for all of them has.
-    fn rows(&self) -> usize {
-        self.all().map(|course| course.rows).max().unwrap_or(2)
-    }
-}
-
-/// Rates, and the arena in which a method uses them.
-pub(super) struct Blocks {
-    pub courses: Arc<Courses>,
-    pub rates: Box<dyn Rates>,
-    pub arena: Aligned,
-    /// Numbers of both blocks, of all lanes.
-    pub sizes: [usize; 2],
-    pub stride: usize,
-}
-
-impl Blocks {
-    pub fn new(courses: Arc<Courses>, rates: Box<dyn Rates>, shape: Shape) -> Blocks {
-        let sizes = [shape.v * rates.lanes(), shape.y * rates.lanes()];
-        let stride = stride(sizes[0].max(sizes[1]));
-        Blocks { arena: Aligned::new(courses.rows() * stride), courses, rates, sizes, stride }
-    }
-
-    pub fn executor(&self, course: &Course, level: Level, clock: &Clock) -> Executor {
-        Executor::new(course, level, self.stride, clock)
-    }
-
-    pub fn slots(&self) -> (&[f64], &[f64]) {
-        let (v, y) = self.arena.split_at(self.stride);
-        (&v[..self.sizes[0]], &y[..self.sizes[1]])
-    }
-
-    pub fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
-        let (v, y) = self.arena.split_at_mut(self.stride);
-        (&mut v[..self.sizes[0]], &mut y[..self.sizes[1]])
-    }
-}
-
-/// Members of a large system, stepped by a course that calls their rates.
+/// Members of a large system, stepped by a schedule that calls their rates.
 pub struct LargeGroup {
     blocks: Blocks,
     clock: Clock,
@@ -119,20 +34,20 @@ pub struct LargeGroup {
 impl LargeGroup {
     /// As many members as the rates have lanes, with so many recorded numbers each.
     pub fn new(
-        courses: Arc<Courses>,
+        schedules: Arc<Schedules>,
         rates: Box<dyn Rates>,
         shape: Shape,
         recorded: usize,
         level: Level,
         clock: &Clock,
     ) -> LargeGroup {
-        let blocks = Blocks::new(courses, rates, shape);
-        let executor = |course: &Course| blocks.executor(course, level, clock);
+        let blocks = Blocks::new(schedules, rates, shape);
+        let executor = |schedule: &BlockSchedule| blocks.executor(schedule, level, clock);
         LargeGroup {
             clock: *clock,
-            step: executor(&blocks.courses.step),
-            start: blocks.courses.start.as_ref().map(executor),
-            finish: blocks.courses.finish.as_ref().map(executor),
+            step: executor(&blocks.schedules.step),
+            start: blocks.schedules.start.as_ref().map(executor),
+            finish: blocks.schedules.finish.as_ref().map(executor),
             contacts: None,
             recorded,
             prepared: false,
@@ -178,10 +93,10 @@ impl Group for LargeGroup {
 
     fn start(&mut self, k: i64) {
         let (t, h) = (self.clock.at(k), self.clock.h);
-        let Blocks { courses, rates, arena, sizes, .. } = &mut self.blocks;
-        if let (Some(executor), Some(course)) = (&mut self.start, &courses.start) {
+        let Blocks { schedules, rates, arena, sizes, .. } = &mut self.blocks;
+        if let (Some(executor), Some(schedule)) = (&mut self.start, &schedules.start) {
             rates.set_window(Some(window::of_slot(t, h)));
-            executor.run(course, rates.as_mut(), *sizes, t, h, arena);
+            executor.run(schedule, rates.as_mut(), *sizes, t, h, arena);
         }
     }
 
@@ -194,9 +109,9 @@ impl Group for LargeGroup {
             if let Some(contacts) = &mut self.contacts {
                 contacts.keep(self.blocks.slots());
             }
-            let Blocks { courses, rates, arena, sizes, stride } = &mut self.blocks;
+            let Blocks { schedules, rates, arena, sizes, stride } = &mut self.blocks;
             rates.set_window(Some(window::of_step(t, h, self.start.is_some())));
-            self.step.run(&courses.step, rates.as_mut(), *sizes, t, h, arena);
+            self.step.run(&schedules.step, rates.as_mut(), *sizes, t, h, arena);
             let (v, y) = arena.split_at_mut(*stride);
             rates.project(&mut v[..sizes[0]], &mut y[..sizes[1]]);
             if let Some(contacts) = &mut self.contacts {
@@ -208,13 +123,13 @@ impl Group for LargeGroup {
 
     fn finish(&mut self, k: i64) {
         let (t, h) = (self.clock.at(k), self.clock.h);
-        let Blocks { courses, rates, arena, sizes, stride } = &mut self.blocks;
-        if let (Some(executor), Some(course)) = (&mut self.finish, &courses.finish) {
+        let Blocks { schedules, rates, arena, sizes, stride } = &mut self.blocks;
+        if let (Some(executor), Some(schedule)) = (&mut self.finish, &schedules.finish) {
             if self.recorded > 0 {
                 rates.cache_forces(&arena[*stride..][..sizes[1]]);
             }
             rates.set_window(Some(window::of_slot(t, h)));
-            executor.run(course, rates.as_mut(), *sizes, t, h, arena);
+            executor.run(schedule, rates.as_mut(), *sizes, t, h, arena);
         }
     }
 

@@ -1,10 +1,12 @@
 //! Inputs of one member, by number.
 
 use crate::{
-    signal::{Signal, curve},
-    spec::{Parameters, Spec},
+    model::{
+        signal::{Signal, curve},
+        spec::{Parameters, Spec},
+        window::{Window, is_held, mean},
+    },
     tape::split::HOLD_SLACK,
-    window::{Window, is_held, mean},
 };
 
 /// A sampled input of one member.
@@ -15,7 +17,8 @@ struct Samples {
 }
 
 impl Samples {
-    /// The sample that holds at a time: the last one not after it, or the first or last one outside; the first if the time is a NaN.
+    /// The sample that holds at a time: the last one not after it, or the first or last one outside; the first if the time is a
+    /// NaN.
     fn at(&self, t: f64) -> f64 {
         let at = ((t - self.start) / self.interval * HOLD_SLACK).floor();
         let last = self.values.len() - 1;
@@ -25,7 +28,7 @@ impl Samples {
 
 /// The inputs of one member.
 #[derive(Default)]
-pub struct Inputs {
+pub(crate) struct Inputs {
     signals: Vec<Signal<f64>>,
     samples: Vec<Samples>,
     /// Of which samples a step sees the mean.
@@ -34,23 +37,23 @@ pub struct Inputs {
 
 impl Inputs {
     /// Those of a member: `inputs[0]` and so on.
-    pub fn new(spec: &Spec, member: usize) -> Inputs {
-        let given = &spec.given;
+    pub(crate) fn new(spec: &Spec, member: usize) -> Inputs {
+        let signature = &spec.signature;
         let numbers = spec.rows.iter().map(|row| row.at(member)).collect();
         // `fill` looks samples up in the tables, which `Parameters` does not have here.
-        let p = Parameters { given, h: 1.0, numbers, sample: |_, _| f64::NAN };
+        let p = Parameters { signature, h: 1.0, numbers, sample: |_, _| f64::NAN };
         let signal = |i: usize| p.signal(&format!("inputs[{i}]")).unwrap_or(Signal::Constant(f64::NAN));
         let samples = spec.tables.iter().map(|table| Samples {
             values: table.samples.iter().map(|row| row.at(member)).collect(),
             start: table.start,
             interval: table.interval,
         });
-        let held = (0..given.tables.len()).map(|table| is_held(given, table)).collect();
-        Inputs { signals: (0..given.whole("inputs")).map(signal).collect(), samples: samples.collect(), held }
+        let held = (0..signature.tables.len()).map(|table| is_held(signature, table)).collect();
+        Inputs { signals: (0..signature.whole("inputs")).map(signal).collect(), samples: samples.collect(), held }
     }
 
     /// Their values at a time, or those that steps over a window see.
-    pub fn fill(&self, t: f64, window: Option<Window<f64>>, values: &mut [f64]) {
+    pub(crate) fn fill(&self, t: f64, window: Option<Window<f64>>, values: &mut [f64]) {
         let at = |table: u32, t: f64| self.samples[table as usize].at(t);
         for (value, signal) in values.iter_mut().zip(&self.signals) {
             *value = match (*signal, window) {

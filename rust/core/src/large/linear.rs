@@ -1,14 +1,16 @@
-//! The rates of a large linear system ([`crate::systems::linear`]).
+//! The rates of a large linear system ([`crate::model::systems::linear`]).
 
 use std::sync::atomic::AtomicBool;
 
-use super::{Asked, Facts, Rates, inputs::Inputs, panels::Panels};
+use super::{
+    inputs::Inputs,
+    panels::Panels,
+    rates::{RateTraits, Rates, RatesRequest},
+};
 use crate::{
     isa::{Level, Task, with_isa},
-    run::workers::Stop,
-    spec::Spec,
-    system::Shape,
-    window::Window,
+    model::{spec::Spec, system::Shape, window::Window},
+    stage::Stop,
 };
 
 struct Linear {
@@ -29,7 +31,7 @@ struct Linear {
 }
 
 /// The rates of a linear system.
-pub fn make(asked: &Asked) -> Box<dyn Rates> {
+pub(crate) fn make(asked: &RatesRequest) -> Box<dyn Rates> {
     let nothing = || Panels::new(0, 0, |_, _| 0.0);
     Box::new(Linear {
         shape: asked.shape,
@@ -38,7 +40,7 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
         of_v: nothing(),
         of_y: nothing(),
         inputs: Inputs::default(),
-        x: vec![0.0; asked.given.whole("inputs")],
+        x: vec![0.0; asked.signature.whole("inputs")],
         time: f64::NAN,
         window: None,
         speed: 0.0,
@@ -72,12 +74,12 @@ impl Linear {
 }
 
 impl Rates for Linear {
-    fn facts(&self) -> Facts {
-        Facts { second_order: false, reads_v: true, stretched: false }
+    fn traits(&self) -> RateTraits {
+        RateTraits { second_order: false, reads_v: true, stretched: false }
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
-        let (h, place) = (self.h, spec.given.place("rows").unwrap_or(0));
+        let (h, place) = (self.h, spec.signature.place("rows").unwrap_or(0));
         let columns = self.shape.v + self.shape.y + self.x.len();
         let entry = |i: usize, j: usize| h * spec.rows[place + i * columns + j].at(first);
         self.of_v = Panels::new(self.shape.v, columns, entry);

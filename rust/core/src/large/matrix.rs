@@ -7,12 +7,12 @@ use super::{
     panels::{Panels, filled},
 };
 use crate::{
+    aligned::Aligned,
+    group::Group,
     isa::{Level, Task, with_isa},
-    run::{aligned::Aligned, group::Group, stage::Clock, workers::Stop},
-    spec::Spec,
-    system::Shape,
-    trace::How,
-    window,
+    model::{spec::Spec, system::Shape, window},
+    stage::{Clock, Stop},
+    step::key::StepKind,
 };
 
 /// A member of a linear map.
@@ -39,12 +39,12 @@ pub struct Matrix {
 
 impl Matrix {
     /// With inputs at the times of the form.
-    pub fn new(spec: &Spec, shape: Shape, how: &How, level: Level, clock: &Clock) -> Matrix {
+    pub fn new(spec: &Spec, shape: Shape, how: &StepKind, level: Level, clock: &Clock) -> Matrix {
         let nodes: Vec<f64> = match how {
-            How::Matrix { nodes } => nodes.iter().map(|bits| f64::from_bits(*bits)).collect(),
-            How::Method { .. } | How::Attempts { .. } | How::Step(_) => Vec::new(), // not the matrix form: never called
+            StepKind::Matrix { nodes } => nodes.iter().map(|bits| f64::from_bits(*bits)).collect(),
+            StepKind::Method { .. } | StepKind::Attempts { .. } | StepKind::Step(_) => Vec::new(), // not the matrix form: never called
         };
-        let (n, count) = (shape.v + shape.y, spec.given.whole("inputs"));
+        let (n, count) = (shape.v + shape.y, spec.signature.whole("inputs"));
         Matrix {
             shape,
             level,
@@ -52,7 +52,7 @@ impl Matrix {
             pq: Panels::new(0, 0, |_, _| 0.0),
             inputs: Inputs::default(),
             count,
-            carries: spec.given.whole("carries") > 0,
+            carries: spec.signature.whole("carries") > 0,
             u: vec![0.0; nodes.len() * count],
             nodes,
             state: Aligned::new(filled(n)),
@@ -98,7 +98,7 @@ impl Group for Matrix {
             return;
         }
         let n = self.shape.v + self.shape.y;
-        let (p, q) = (spec.given.place("p").unwrap_or(0), spec.given.place("q").unwrap_or(0));
+        let (p, q) = (spec.signature.place("p").unwrap_or(0), spec.signature.place("q").unwrap_or(0));
         // P by rows; Q by columns, nodes and inputs, each with a number for every row.
         let place = |i: usize, j: usize| if j < n { p + i * n + j } else { q + (j - n) * n + i };
         self.pq = Panels::new(n, n + self.u.len(), |i, j| spec.rows[place(i, j)].at(first));

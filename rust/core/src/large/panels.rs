@@ -1,25 +1,25 @@
 //! Products of a matrix with columns of numbers, summed in the order of the columns.
 //!
-//! A sum in a fixed order is a chain of additions that wait for each other. So several rows are summed at once: their chains run side by
-//! side, and a number of the state is read once for all of them. The entries are stored in panels of so many rows, in the order in
-//! which they are used; rows of zeros fill the last panel. They change no sum.
+//! A sum in a fixed order is a chain of additions that wait for each other. So several rows are summed at once: their chains run
+//! side by side, and a number of the state is read once for all of them. The entries are stored in panels of so many rows, in the
+//! order in which they are used; rows of zeros fill the last panel. They change no sum.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use crate::run::aligned::Aligned;
+use crate::aligned::Aligned;
 
 /// A matrix, by panels.
-pub struct Panels {
+pub(crate) struct Panels {
     entries: Aligned,
     filled: usize,
 }
 
-/// Rows of a panel: as many panels of the first height as possible, then of the next. An addition takes four cycles: four vectors of
-/// eight rows hide that.
+/// Rows of a panel: as many panels of the first height as possible, then of the next. An addition takes four cycles: four vectors
+/// of eight rows hide that.
 const HEIGHTS: [usize; 3] = [32, 16, 8];
 
 /// How many numbers a product has, with the padding of the last panel.
-pub fn filled(rows: usize) -> usize {
+pub(crate) fn filled(rows: usize) -> usize {
     rows.next_multiple_of(HEIGHTS[2])
 }
 
@@ -64,7 +64,7 @@ fn sums<const R: usize>(mut entries: &[[f64; R]], parts: [&[f64]; 3]) -> [f64; R
 
 impl Panels {
     /// The matrix with these entries by row and column.
-    pub fn new(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
+    pub(crate) fn new(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
         let filled = filled(rows);
         let mut entries = Aligned::new(filled * columns);
         let mut places = entries.iter_mut();
@@ -81,10 +81,10 @@ impl Panels {
         Panels { entries, filled }
     }
 
-    /// `out` = the matrix times the numbers of all parts, one part after the other; it has room for [`filled`] numbers. When `stop` is
-    /// set, it returns early with an unfinished result.
+    /// `out` = the matrix times the numbers of all parts, one part after the other; it has room for [`filled`] numbers. When
+    /// `stop` is set, it returns early with an unfinished result.
     #[inline(always)]
-    pub fn times(&self, parts: [&[f64]; 3], out: &mut [f64], stop: &AtomicBool) {
+    pub(crate) fn times(&self, parts: [&[f64]; 3], out: &mut [f64], stop: &AtomicBool) {
         let rest = panels::<{ HEIGHTS[0] }>(&self.entries, &mut out[..self.filled], parts, stop);
         let rest = panels::<{ HEIGHTS[1] }>(rest.0, rest.1, parts, stop);
         panels::<{ HEIGHTS[2] }>(rest.0, rest.1, parts, stop);

@@ -1,28 +1,41 @@
 //! Rates as tapes of their own, for several members side by side, or for one member of a system without a hand-written kernel.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
-use super::{Facts, Rates};
+use super::rates::{RateTraits, Rates};
 use crate::{
-    contact, controls,
+    aligned::Aligned,
     error::Error,
     isa::Level,
-    number::{Symbol, record},
-    run::{
-        aligned::Aligned,
-        stage::{Clock, Force, PreparedStage, Stage},
+    model::{
+        around::{self, controls},
+        spec::{Signature, Spec},
+        system::{Block, Kind, Shape, System},
+        systems::kind,
+        window::{self, Window},
     },
-    spec::{Given, Spec},
-    system::{Block, Kind, Shape, System},
-    tape::{Id, Op, Tape},
-    trace::{block, cut, ids, kind, parameters},
-    window::{self, Window},
+    stage::{Clock, Force, PreparedStage, Stage},
+    step::{block, cache::Cache, ids, key::TapeKey, parameters},
+    tape::{
+        Id, Op, Tape,
+        number::{Symbol, record},
+        reserved::WINDOW_ENDS,
+    },
 };
 
+static CACHE: LazyLock<Cache<CacheKey, RateTapes>> = LazyLock::new(Cache::default);
+
+/// The system, and its recorded quantities.
+type CacheKey = (Arc<Signature>, Vec<String>);
+
+fn cache_key(key: &TapeKey) -> CacheKey {
+    (key.signature.clone(), key.record.clone())
+}
+
 /// The rates of a system, traced. Their state is v, y, a block for the result, and a number for the tally.
-pub struct Rated {
+pub struct RateTapes {
     shape: Shape,
-    facts: Facts,
+    traits: RateTraits,
     /// Whether the system has a tally, a sum over the steps.
     tally: bool,
     dv: Option<Stage>,
@@ -46,17 +59,17 @@ fn behind(shape: Shape) -> usize {
 /// Traces a function of the system, v and y. Its results are a block or none, v and y.
 fn rate(
     kind: &Kind,
-    given: &Given,
+    signature: &Signature,
     shape: Shape,
     make: impl FnOnce(&dyn System<Symbol>, Block<Symbol>, Block<Symbol>) -> (Option<Block<Symbol>>, Block<Symbol>, Block<Symbol>),
 ) -> (Tape, Vec<Id>) {
     record(Tape::default(), || {
         let state = |i: usize| Symbol::new(Op::State(i as u32));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-        let p = parameters(given, Symbol::new(Op::Step));
-        let s = controls::wrap(&p, contact::wrap(&p, (kind.make)(&p)), state(behind(shape)));
-        let seen = || window::ENDS.map(|end| Symbol::new(Op::Param(end)));
-        let (made, v, y) = window::over(given, seen, || make(s.as_ref(), v, y));
+        let p = parameters(signature, Symbol::new(Op::Step));
+        let s = around::wrap(&p, (kind.make)(&p), state(behind(shape)));
+        let seen = || WINDOW_ENDS.map(|end| Symbol::new(Op::Param(end)));
+        let (made, v, y) = window::over(signature, seen, || make(s.as_ref(), v, y));
         let mut next = ids([&v, &y]);
         next.extend(made.iter().flat_map(|made| made.iter().map(|symbol| symbol.0)));
         next.extend((next.len()..behind(shape)).map(|i| state(i).0));
@@ -77,31 +90,31 @@ fn is_v_times_step(tape: &Tape, made: &[Id]) -> bool {
     })
 }
 
-impl Rated {
+impl RateTapes {
     /// Traces the rates of a system, and the quantities to record.
-    pub fn new(given: &Given, names: &[String]) -> Result<Rated, Error> {
-        let kind = kind(given)?;
-        let shape = (kind.shape)(given)?;
+    pub(crate) fn new(signature: &Signature, names: &[String]) -> Result<RateTapes, Error> {
+        let kind = kind(signature)?;
+        let shape = (kind.shape)(signature)?;
         let time = || Symbol::new(Op::Time);
-        let stage = |traced: &(Tape, Vec<Id>)| Some(cut(given, traced));
-        let dv = rate(kind, given, shape, |s, v, y| (Some(s.dv(time(), &v, &y)), v, y));
-        let dy = rate(kind, given, shape, |s, v, y| (Some(s.dy(time(), &v, &y)), v, y));
+        let stage = |traced: &(Tape, Vec<Id>)| Some(Stage::cut(signature, traced));
+        let dv = rate(kind, signature, shape, |s, v, y| (Some(s.dv(time(), &v, &y)), v, y));
+        let dy = rate(kind, signature, shape, |s, v, y| (Some(s.dy(time(), &v, &y)), v, y));
         let second_order = shape.v == shape.y && is_v_times_step(&dy.0, &dy.1[before(shape)..][..shape.y]);
         let needed = dv.0.needed(dv.1[before(shape)..].iter().copied());
         let reads = |what: &dyn Fn(Op) -> bool| needed.iter().zip(dv.0.ops()).any(|(needed, op)| *needed && what(*op));
         let reads_v = reads(&|op| matches!(op, Op::State(i) if (i as usize) < shape.v));
         let is_of_y = !reads_v && !reads(&|op| matches!(op, Op::Time | Op::Sample(..)));
         let velocity =
-            (!second_order && shape.v == shape.y).then(|| rate(kind, given, shape, |s, v, y| (Some(s.velocity(&y)), v, y)));
+            (!second_order && shape.v == shape.y).then(|| rate(kind, signature, shape, |s, v, y| (Some(s.velocity(&y)), v, y)));
         // Where a tape that also computes h·v̇ costs hardly more than without, it does so, and the next step uses it.
         let work = |(tape, next): &(Tape, Vec<Id>)| tape.needed(next.iter().copied()).iter().filter(|needed| **needed).count();
         let with_rate = |trace: &dyn Fn(bool) -> (Tape, Vec<Id>)| {
             let (alone, both) = (trace(false), trace(is_of_y));
             let is_cheap = is_of_y && 4 * work(&both) <= 4 * work(&alone) + work(&dv);
-            (cut(given, if is_cheap { &both } else { &alone }), is_cheap)
+            (Stage::cut(signature, if is_cheap { &both } else { &alone }), is_cheap)
         };
         let project = |with_dv: bool| {
-            rate(kind, given, shape, |s, v, y| {
+            rate(kind, signature, shape, |s, v, y| {
                 let (v, y) = s.project(v, y);
                 (with_dv.then(|| s.dv(time(), &v, &y)), v, y)
             })
@@ -111,8 +124,8 @@ impl Rated {
         let quantities = |with_dv: bool| {
             record(Tape::default(), || {
                 let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-                let p = parameters(given, Symbol::new(Op::Step));
-                let s = controls::force::wrap(&p, contact::wrap(&p, (kind.make)(&p)));
+                let p = parameters(signature, Symbol::new(Op::Step));
+                let s = around::wrap_for_carry(&p, (kind.make)(&p));
                 let mut next = ids([&v, &y]);
                 let made = names.iter().filter_map(|name| s.record(name, &v, &y)).flatten();
                 next.extend(made.map(|symbol| symbol.0));
@@ -120,10 +133,10 @@ impl Rated {
                 next
             })
         };
-        Ok(Rated {
+        Ok(RateTapes {
             shape,
-            facts: Facts { second_order, reads_v, stretched: false },
-            tally: controls::is_given(given),
+            traits: RateTraits { second_order, reads_v, stretched: false },
+            tally: controls::is_given(signature),
             dv: if shape.v > 0 { stage(&dv) } else { None },
             dy: if second_order { None } else { stage(&dy) },
             velocity: velocity.as_ref().and_then(stage),
@@ -132,8 +145,22 @@ impl Rated {
         })
     }
 
+    /// Those of a key, found before or made now; all methods share them.
+    pub fn of(key: &TapeKey) -> Result<Arc<RateTapes>, Error> {
+        CACHE.find(&cache_key(key), || {
+            let tapes = RateTapes::new(&key.signature, &key.record)?;
+            let size = tapes.size();
+            Ok((tapes, size))
+        })
+    }
+
+    /// Whether these tapes are there already.
+    pub(crate) fn are_known(key: &TapeKey) -> bool {
+        CACHE.has(&cache_key(key))
+    }
+
     /// Operations of all its bodies.
-    pub fn size(&self) -> usize {
+    pub(crate) fn size(&self) -> usize {
         let rates = [&self.dv, &self.dy, &self.velocity].into_iter().flatten();
         let others = [&self.project, &self.record].into_iter().flatten().map(|(stage, _)| stage);
         rates.chain(others).map(Stage::size).sum::<usize>()
@@ -141,13 +168,13 @@ impl Rated {
 }
 
 /// How many members go side by side: a vector of them.
-pub fn lanes(level: Level) -> usize {
+pub(crate) fn lanes(level: Level) -> usize {
     if level == Level::Avx2 { 4 } else { 8 }
 }
 
 /// Rates by tapes.
 pub struct TapeRates {
-    rated: Arc<Rated>,
+    rated: Arc<RateTapes>,
     lanes: usize,
     dv: Option<PreparedStage>,
     dy: Option<PreparedStage>,
@@ -171,11 +198,11 @@ fn keep(to: &mut Vec<f64>, numbers: &[f64]) {
 
 impl TapeRates {
     /// For so many members side by side.
-    pub fn new(rated: Arc<Rated>, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> TapeRates {
+    pub fn new(rated: Arc<RateTapes>, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> TapeRates {
         let load = |stage: &Stage| {
-            let kit = stage.kit_of(level, lanes);
-            kit.runner.write(); // rates that are traced are going to be evaluated often
-            PreparedStage::with(stage, kit, spec, clock, f64::INFINITY)
+            let compiled = stage.compiled_for_lanes(level, lanes);
+            compiled.runner.write(); // rates that are traced are going to be evaluated often
+            PreparedStage::with(stage, compiled, spec, clock, f64::INFINITY)
         };
         let record_state = rated.record.as_ref().map_or(0, |(stage, _)| stage.split.body.next.len());
         TapeRates {
@@ -200,7 +227,7 @@ impl TapeRates {
     }
 
     /// Does something with all stages that changes the rates.
-    fn stages(&mut self, act: impl Fn(&mut PreparedStage, &Stage)) {
+    fn stages(&mut self, action: impl Fn(&mut PreparedStage, &Stage)) {
         let TapeRates { rated, dv, dy, velocity, project, record, .. } = self;
         let all = [
             (dv, rated.dv.as_ref()),
@@ -211,7 +238,7 @@ impl TapeRates {
         ];
         for (prepared, stage) in all {
             if let (Some(prepared), Some(stage)) = (prepared, stage) {
-                act(prepared, stage);
+                action(prepared, stage);
             }
         }
         self.is_known = false;
@@ -238,8 +265,8 @@ impl Rates for TapeRates {
         self.lanes
     }
 
-    fn facts(&self) -> Facts {
-        self.rated.facts
+    fn traits(&self) -> RateTraits {
+        self.rated.traits
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
@@ -260,7 +287,7 @@ impl Rates for TapeRates {
             return;
         }
         self.is_known = false;
-        self.set_state(if self.rated.facts.reads_v { v } else { &[] }, y);
+        self.set_state(if self.rated.traits.reads_v { v } else { &[] }, y);
         let window = self.window.unwrap_or([t, t, 1.0]);
         if let (Some(prepared), Some(stage)) = (&mut self.dv, &self.rated.dv) {
             prepared.advance_over(stage, t, window, &mut self.state);

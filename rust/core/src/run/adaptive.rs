@@ -1,234 +1,481 @@
-//! Members with adaptive steps, each with a time and a step of its own.
+//! The driver of adaptive steps: every member has its own time and step, and when one is done its lane takes the next.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use super::{
-    aligned::Aligned,
-    stage::{Clock, PreparedStage, Stage},
-    workers::Stop,
+    Model,
+    columns::{Columns, cut},
+    fixed::expect,
+    workers::{self, GoOn, Workers},
 };
 use crate::{
     error::Error,
-    isa::Level,
-    pace::Pace,
-    spec::Spec,
-    trace::{How, Tapes, Traced},
+    group::AdaptiveBatch,
+    model::spec::Row,
+    stage::{Machine, Stop},
+    step::{key::StepKind, pace::Pace, tapes::Traced},
 };
 
-/// A batch of members with adaptive steps; their rates are scaled to a step of 1.
-pub trait AdaptiveBatch: Send {
-    /// How many members there are.
-    fn lanes(&self) -> usize;
-
-    /// Takes the parameters of a member into one lane.
-    fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize);
-
-    /// Puts a state, v and y, into a lane.
-    fn set_state(&mut self, lane: usize, state: &[f64]);
-
-    /// The state of a lane.
-    fn state(&self, lane: usize) -> Vec<f64>;
-
-    /// The step-size control of a lane.
-    fn pace(&self, lane: usize) -> Pace<f64>;
-
-    /// One number of all lanes: of v, of y or, behind these, of the step-size control. None where lanes do not stand side by side.
-    fn row(&self, _number: usize) -> Option<&[f64]> {
-        None
-    }
-
-    /// Sets the step-size control of a lane.
-    fn set_pace(&mut self, lane: usize, pace: Pace<f64>);
-
-    /// What stands behind the step-size control of a lane: the largest sizes of its groups, and tolerances of their own.
-    fn scales(&self, lane: usize) -> Vec<f64>;
-
-    /// Sets it.
-    fn set_scales(&mut self, lane: usize, numbers: &[f64]);
-
-    /// Whether it knows where a member stands at the start, so that [`AdaptiveBatch::begin`] can be asked.
-    fn begins(&self) -> bool {
-        false
-    }
-
-    /// Brings the step-size control of a lane to what it is at the start of that member.
-    fn begin(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
-
-    /// So many attempts of every lane that runs.
-    fn attempt(&mut self, attempts: usize);
-
-    /// Whether the coefficients of a series are known after an attempt, so that [`AdaptiveBatch::attempt_by_terms`] needs no others.
-    fn has_terms(&self) -> bool {
-        false
-    }
-
-    /// Writes whether each lane has a step of the run to try.
-    fn find_running(&self, budget: f64, runs: &mut [bool]) {
-        runs.iter_mut().enumerate().for_each(|(lane, runs)| *runs = self.pace(lane).runs(budget));
-    }
-
-    /// How many steps of the present length lanes have left to their next saved times, in the mean of those that are not there.
-    fn steps_left(&self) -> f64 {
-        1.0
-    }
-
-    /// One attempt of one lane, at the start of a step whose coefficients are known.
-    fn attempt_by_terms(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
-
-    /// Sets the flag at which an attempt that may take long stops early.
-    fn set_stop_flag(&mut self, _stop: &Stop) {}
+/// A run to be made.
+#[derive(Clone, Debug)]
+pub struct AdaptiveRun<'a> {
+    /// What to step, and how.
+    pub model: Model<'a>,
+    /// What hot loops may use.
+    pub machine: Machine,
+    /// Times to keep the state at, ascending, by rows.
+    pub at: Vec<Row<'a>>,
+    /// The times that no step crosses, by rows: those just before each, ascending, and behind them those just after.
+    pub jumps: Vec<Row<'a>>,
+    /// The members' paces at the start, by rows, in the order of [`Pace::numbers`], and what stands behind them.
+    pub paces: Vec<Row<'a>>,
+    /// Whether the steps to try first and the lengths of the blocks are still to be found: see `Pace::begun`.
+    pub begins: bool,
+    /// The most attempts of a member.
+    pub budget: i64,
+    /// Velocities at the start, by rows.
+    pub v: Vec<Row<'a>>,
+    /// Coordinates at the start, by rows.
+    pub y: Vec<Row<'a>>,
+    /// How many members.
+    pub members: usize,
 }
 
-/// Members of a system whose whole attempt is one tape.
-pub struct AdaptiveLanes {
-    tapes: Arc<Tapes>,
-    /// Numbers of v and y, and those that stand behind the pace.
-    numbers: usize,
-    scales: usize,
-    step: PreparedStage,
-    /// Rows of v, of y, of the paces, of the sizes and, of a series, of its coefficients.
-    state: Aligned,
-    /// What goes by one lane at a time, from its first use on: attempts by known coefficients, and where a member stands at the start.
-    by_terms: Option<OneLane>,
-    begin: Option<OneLane>,
-    level: Level,
-    budget: f64,
+/// How a member ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Status {
+    /// At the last time.
+    Ok = 0,
+    /// Out of attempts.
+    Budget = 2,
+    /// A step no longer moves the time.
+    Underflow = 3,
+    /// As `Underflow`, because no step, however short, gave a finite state.
+    NotFinite = 4,
 }
 
-/// A stage that is run for one lane alone.
-struct OneLane {
-    step: PreparedStage,
-    /// The member whose parameters it has.
-    member: Option<usize>,
-    /// The numbers of the lane.
-    numbers: Aligned,
+/// What a run fills: arrays of rows of one number per member.
+#[derive(Debug)]
+pub struct Arrays<'a> {
+    /// The states at the output times; NaN from where a member stopped.
+    pub saved_v: &'a mut [f64],
+    /// Likewise the coordinates.
+    pub saved_y: &'a mut [f64],
+    /// Rows of the members' states at the end, v and y: those before the step that contains the last output time.
+    pub state: &'a mut [f64],
+    /// Their paces at the end, by rows.
+    pub paces: &'a mut [f64],
+    /// One row: the status.
+    pub status: &'a mut [i64],
+    /// Empty; or for each time of [`AdaptiveRun::at`], which are then all the same, the times of the members, and behind them the
+    /// steps to try next. Then attempts are made one by one until that time is passed, and what is kept is where members stand
+    /// before the first and after each. No step is held.
+    pub attempt_log: &'a mut [f64],
 }
 
-impl OneLane {
-    fn new(stage: &Stage, spec: &Spec, level: Level, budget: f64) -> OneLane {
-        let numbers = Aligned::new(stage.split.body.next.len());
-        OneLane { step: PreparedStage::new(stage, spec, level, 1, &NO_CLOCK, budget), member: None, numbers }
-    }
+/// Attempts between two checks of the lanes.
+const ATTEMPTS_BETWEEN_CHECKS: usize = 16;
+/// The same while some lanes make extra steps.
+const ATTEMPTS_WITH_EXTRA_STEPS: usize = 4;
+/// Numbers of a lane above which it is checked after every attempt, which may take long.
+const LARGE_MEMBER_NUMBERS: usize = 1000;
+/// Members of a small system below which a second thread costs more time than it saves.
+const MIN_MEMBERS_FOR_THREADS: usize = 256;
 
-    /// Runs it with a member's parameters, and the numbers of a lane from rows of so many lanes.
-    fn run(&mut self, stage: &Stage, spec: &Spec, member: usize, rows: &[f64], (lane, lanes): (usize, usize)) -> &[f64] {
-        if self.member != Some(member) {
-            self.step.prepare_lane(stage, spec, 0, member);
-            self.member = Some(member);
-        }
-        for (number, row) in self.numbers.iter_mut().zip(rows.chunks_exact(lanes)) {
-            *number = row[lane];
-        }
-        self.step.advance(stage, &NO_CLOCK, 0, 1, &mut self.numbers);
-        &self.numbers
-    }
+struct Part<'a> {
+    first: usize,
+    count: usize,
+    saved_v: Columns<'a, f64>,
+    saved_y: Columns<'a, f64>,
+    state: Columns<'a, f64>,
+    paces: Columns<'a, f64>,
+    status: Columns<'a, i64>,
+    attempt_log: Columns<'a, f64>,
 }
 
-/// Every lane has its own time, so no step has one.
-pub(crate) const NO_CLOCK: Clock = Clock { t0: 0.0, h: 1.0 };
-
-impl AdaptiveLanes {
-    /// For a run of so many members.
-    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, budget: f64) -> Result<AdaptiveLanes, Error> {
-        let tapes = traced.tapes()?;
-        let step = PreparedStage::new(&tapes.step, spec, level, members, &NO_CLOCK, budget);
-        let How::Attempts { acceptance, .. } = &traced.scene().how else { return Err(Error::NoEstimate) };
-        let (numbers, scales) = (traced.shape.v + traced.shape.y, acceptance.numbers(traced.shape.v, traced.shape.y));
-        let all = tapes.step.split.body.next.len();
-        let state = Aligned::new(all * step.lanes());
-        Ok(AdaptiveLanes { state, step, numbers, scales, by_terms: None, begin: None, level, budget, tapes })
+/// Makes the run, and returns whether it did: where members stand at the start is not found for a system whose attempt is not one
+/// tape. The monitor is as that of [`crate::run::fixed::run`].
+pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<bool, Error> {
+    let b = plan.members;
+    let traced = plan.model.traced()?;
+    let (p, q) = (traced.shape.v, traced.shape.y);
+    expect("v", p, plan.v.len())?;
+    expect("y", q, plan.y.len())?;
+    expect("saved_v", plan.at.len() * p * b, arrays.saved_v.len())?;
+    expect("saved_y", plan.at.len() * q * b, arrays.saved_y.len())?;
+    expect("state", (p + q) * b, arrays.state.len())?;
+    let StepKind::Attempts { acceptance, .. } = &plan.model.key.how else { return Err(Error::NoEstimate) };
+    let numbers = Pace::<f64>::NUMBERS + acceptance.numbers(p, q);
+    expect("paces", numbers, plan.paces.len())?;
+    expect("paces", numbers * b, arrays.paces.len())?;
+    expect("status", b, arrays.status.len())?;
+    if !arrays.attempt_log.is_empty() {
+        expect("attempt_log", 2 * plan.at.len() * b, arrays.attempt_log.len())?;
     }
-}
-
-impl AdaptiveBatch for AdaptiveLanes {
-    fn lanes(&self) -> usize {
-        self.step.lanes()
-    }
-
-    fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize) {
-        self.step.prepare_lane(&self.tapes.step, spec, lane, member);
-    }
-
-    fn set_state(&mut self, lane: usize, state: &[f64]) {
-        let lanes = self.step.lanes();
-        for (row, number) in self.state.chunks_exact_mut(lanes).zip(state) {
-            row[lane] = *number;
+    for row in plan.model.spec.rows.iter().chain(&plan.v).chain(&plan.y).chain(&plan.paces).chain(&plan.at).chain(&plan.jumps) {
+        if row.0.len() != 1 {
+            expect("a row", b, row.0.len())?;
         }
     }
 
-    fn state(&self, lane: usize) -> Vec<f64> {
-        let lanes = self.step.lanes();
-        self.state.chunks_exact(lanes).take(self.numbers).map(|row| row[lane]).collect()
+    plan.model.room(traced.shape, 1)?;
+    let stop = Stop::default();
+    let worker = || Worker::new(plan, &traced, &stop);
+    let mine = worker()?;
+    if plan.begins && !mine.group.begins() {
+        return Ok(false);
     }
-
-    fn pace(&self, lane: usize) -> Pace<f64> {
-        let (lanes, before) = (self.step.lanes(), self.numbers);
-        Pace::of(std::array::from_fn(|i| self.state[(before + i) * lanes + lane]))
-    }
-
-    fn row(&self, number: usize) -> Option<&[f64]> {
-        self.state.chunks_exact(self.step.lanes()).nth(number)
-    }
-
-    fn set_pace(&mut self, lane: usize, pace: Pace<f64>) {
-        let (lanes, before) = (self.step.lanes(), self.numbers);
-        for (i, number) in pace.numbers().into_iter().enumerate() {
-            self.state[(before + i) * lanes + lane] = number;
-        }
-    }
-
-    fn scales(&self, lane: usize) -> Vec<f64> {
-        let (lanes, before) = (self.step.lanes(), self.numbers + Pace::<f64>::NUMBERS);
-        (0..self.scales).map(|i| self.state[(before + i) * lanes + lane]).collect()
-    }
-
-    fn set_scales(&mut self, lane: usize, numbers: &[f64]) {
-        let (lanes, before) = (self.step.lanes(), self.numbers + Pace::<f64>::NUMBERS);
-        for (i, number) in numbers.iter().enumerate() {
-            self.state[(before + i) * lanes + lane] = *number;
-        }
-    }
-
-    fn begins(&self) -> bool {
-        self.tapes.begin.is_some()
-    }
-
-    fn begin(&mut self, spec: &Spec, lane: usize, member: usize) {
-        let Some(stage) = &self.tapes.begin else { return };
-        let lanes = self.step.lanes();
-        let one = self.begin.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
-        let begun = one.run(stage, spec, member, &self.state, (lane, lanes));
-        for (row, number) in self.state.chunks_exact_mut(lanes).zip(begun) {
-            row[lane] = *number;
-        }
-    }
-
-    fn attempt(&mut self, attempts: usize) {
-        self.step.advance(&self.tapes.step, &NO_CLOCK, 0, attempts, &mut self.state);
-    }
-
-    fn has_terms(&self) -> bool {
-        self.tapes.by_terms.is_some()
-    }
-
-    fn find_running(&self, budget: f64, runs: &mut [bool]) {
-        let lanes = self.step.lanes();
-        Pace::find_running(|i| &self.state[(self.numbers + i) * lanes..][..lanes], budget, runs);
-    }
-
-    fn steps_left(&self) -> f64 {
-        let lanes = self.step.lanes();
-        Pace::steps_left(|i| &self.state[(self.numbers + i) * lanes..][..lanes])
-    }
-
-    fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {
-        let Some(stage) = &self.tapes.by_terms else { return };
-        let lanes = self.step.lanes();
-        let one = self.by_terms.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
-        let made = one.run(stage, spec, member, &self.state, (lane, lanes));
-        for (row, number) in self.state.chunks_exact_mut(lanes).zip(made).take(self.numbers + Pace::<f64>::NUMBERS + self.scales)
+    let lanes = mine.group.lanes();
+    let threads = plan.machine.threads_for(b.div_ceil(lanes), lanes == 1 || b >= MIN_MEMBERS_FOR_THREADS);
+    plan.model.room(traced.shape, threads)?;
+    // Few shares, since lanes run empty at the end of each; but several, so that the others do not wait long for a slow one.
+    let shares = if threads == 1 { 1 } else { b.div_ceil(lanes).min(threads * 8) };
+    let shares: Vec<usize> = (0..shares).map(|i| b * (i + 1) / shares - b * i / shares).collect();
+    let mut status = cut(arrays.status, b, &shares).into_iter();
+    let mut rows =
+        [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces, arrays.attempt_log].map(|a| cut(a, b, &shares).into_iter());
+    let mut parts = Vec::with_capacity(shares.len());
+    let mut first = 0;
+    for count in shares {
+        if let ([Some(saved_v), Some(saved_y), Some(state), Some(paces), Some(attempt_log)], Some(status)) =
+            (rows.each_mut().map(Iterator::next), status.next())
         {
-            row[lane] = *number;
+            parts.push(Part { first, count, saved_v, saved_y, state, paces, status, attempt_log });
+        }
+        first += count;
+    }
+    let workers = Workers { threads, background: traced.is_long(lanes), total: b as f64, stop: Stop::clone(&stop) };
+    workers::share(parts, &workers, monitor, mine, worker, Worker::part)?;
+    Ok(true)
+}
+
+/// How long a step is that ends at the wall if it would cross it.
+fn length(t: f64, h: f64, wall: f64) -> f64 {
+    if wall < t + h { wall - t } else { h }
+}
+
+/// Which member of the part a lane steps, and which of the saved times is next.
+struct Assignment {
+    member: usize,
+    next: usize,
+    /// While an extra step is made: the state that it starts from, which has to be put back, and how many attempts were rejected
+    /// before.
+    origin: Option<(Vec<f64>, f64)>,
+    /// A run that goes on is held, and the coefficients of its series have to be found first.
+    held_before: bool,
+}
+
+struct Worker<'a> {
+    plan: &'a AdaptiveRun<'a>,
+    group: Box<dyn AdaptiveBatch>,
+}
+
+impl<'a> Worker<'a> {
+    fn new(plan: &'a AdaptiveRun<'a>, traced: &Arc<Traced>, stop: &Stop) -> Result<Self, Error> {
+        let threads = if plan.members == 1 { plan.machine.threads } else { 1 };
+        let machine = Machine { threads, ..plan.machine };
+        let mut group = plan.model.adaptive(traced, machine, plan.members, plan.budget as f64)?;
+        group.set_stop_flag(stop);
+        Ok(Worker { plan, group })
+    }
+
+    fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
+        if part.attempt_log.rows() > 0 {
+            return self.attempt_log(part, go_on);
+        }
+        let mut waiting = 0..part.count;
+        let mut assignments: Vec<Option<Assignment>> = (0..self.group.lanes()).map(|_| None).collect();
+        for (lane, assigned) in assignments.iter_mut().enumerate() {
+            *assigned = waiting.next().map(|member| self.begin_member(&part, lane, member));
+            if assigned.is_none() {
+                // A lane without a member still needs parameters that are numbers; its pace never runs.
+                self.assign_member(&part, lane, part.count - 1);
+                let pace = self.group.pace(lane);
+                self.group.set_pace(lane, pace.idle());
+            }
+        }
+        // Of a series: which lanes have a step to try, and how many attempts were made since the monitor was last asked.
+        let (mut runs, mut unseen) = (vec![false; assignments.len()], 0);
+        while assignments.iter().any(Option::is_some) {
+            for (lane, assigned) in assignments.iter_mut().enumerate() {
+                if runs[lane] {
+                    continue;
+                }
+                if let Some(taken) = assigned.take() {
+                    *assigned = self.update_lane(&mut part, lane, taken, &mut waiting, go_on)?;
+                }
+            }
+            let numbers = self.plan.v.len() + self.plan.y.len();
+            if self.group.has_terms() {
+                let attempts = self.attempts_by_series();
+                self.group.attempt(attempts);
+                self.group.find_running(self.plan.budget as f64, &mut runs);
+                unseen += attempts;
+                if unseen >= ATTEMPTS_BETWEEN_CHECKS {
+                    unseen = 0;
+                    if !go_on(0) {
+                        return Err(Error::Interrupted);
+                    }
+                }
+                continue;
+            }
+            // A member that makes an extra step makes only that before the next check.
+            let (taken, extra) =
+                assignments.iter().flatten().fold((0, 0), |(n, m), assigned| (n + 1, m + usize::from(assigned.origin.is_some())));
+            let attempts = if numbers > LARGE_MEMBER_NUMBERS || 2 * extra > taken {
+                1
+            } else if extra > 0 {
+                ATTEMPTS_WITH_EXTRA_STEPS
+            } else {
+                ATTEMPTS_BETWEEN_CHECKS
+            };
+            self.group.attempt(attempts);
+            if !go_on(0) {
+                return Err(Error::Interrupted);
+            }
+        }
+        Ok(())
+    }
+
+    /// Attempts of all members one by one, keeping where they stand before the first and after each.
+    fn attempt_log(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
+        let (lanes, rows) = (self.group.lanes(), self.plan.at.len());
+        let of_time = self.plan.v.len() + self.plan.y.len() + Pace::<f64>::PLACES[0];
+        for first in (0..part.count).step_by(lanes) {
+            let last = part.count - 1;
+            for lane in 0..lanes {
+                self.begin_member(&part, lane, (first + lane).min(last)); // lanes without a member repeat the last
+                let pace = self.group.pace(lane);
+                self.group.set_pace(lane, Pace { target: f64::INFINITY, held: 0.0, ..pace });
+            }
+            for (row, ends) in self.plan.at.iter().enumerate() {
+                self.note(&mut part, first, row);
+                for lane in 0..lanes {
+                    let end = ends.at(part.first + (first + lane).min(last));
+                    if self.group.row(of_time).is_some_and(|times| times[lane] < end) {
+                        continue;
+                    }
+                    let pace = self.group.pace(lane);
+                    if pace.t >= end && pace.target > pace.t {
+                        self.group.set_pace(lane, pace.idle());
+                    }
+                }
+                let budget = self.plan.budget as f64;
+                if row + 1 < rows && (0..lanes).any(|lane| self.group.pace(lane).runs(budget)) {
+                    self.group.attempt(1);
+                    for lane in (0..lanes).filter(|_| !self.plan.jumps.is_empty()) {
+                        self.cross(lane, part.first + (first + lane).min(last));
+                    }
+                }
+                if !go_on(0) {
+                    return Err(Error::Interrupted);
+                }
+            }
+            for (lane, member) in (first..part.count).enumerate().take(lanes) {
+                let pace = self.group.pace(lane);
+                self.end(&mut part, lane, &Assignment { member, next: rows, origin: None, held_before: false }, &pace);
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps where all lanes stand, the first of which has this member.
+    fn note(&self, part: &mut Part, first: usize, row: usize) {
+        let (p, q, rows) = (self.plan.v.len(), self.plan.y.len(), self.plan.at.len());
+        let members = first..part.count.min(first + self.group.lanes());
+        if self.group.row(0).is_none() {
+            for (lane, member) in members.enumerate() {
+                let pace = self.group.pace(lane);
+                part.attempt_log.row(row)[member] = pace.t;
+                part.attempt_log.row(rows + row)[member] = length(pace.t, pace.h, pace.wall);
+                self.save(part, lane, &Assignment { member, next: row, origin: None, held_before: false });
+            }
+            return;
+        }
+        let copy = |number: usize, to: &mut [f64]| {
+            let from = self.group.row(number).unwrap_or_default();
+            to[members.clone()].copy_from_slice(&from[..members.len()]);
+        };
+        (0..p).for_each(|i| copy(i, part.saved_v.row(row * p + i)));
+        (0..q).for_each(|i| copy(p + i, part.saved_y.row(row * q + i)));
+        for (i, place) in Pace::<f64>::PLACES.into_iter().enumerate() {
+            copy(p + q + place, part.attempt_log.row(i * rows + row));
+        }
+        if !self.plan.jumps.is_empty() {
+            for (lane, member) in members.clone().enumerate() {
+                let pace = self.group.pace(lane);
+                part.attempt_log.row(rows + row)[member] = length(pace.t, pace.h, pace.wall);
+            }
+        }
+    }
+
+    /// Brings a lane whose member has come to a wall behind it; returns whether it did.
+    fn cross(&mut self, lane: usize, member: usize) -> bool {
+        let pace = self.group.pace(lane);
+        if pace.t < pace.wall {
+            return false;
+        }
+        let (before, after) = self.plan.jumps.split_at(self.plan.jumps.len() / 2);
+        let passed = before.partition_point(|row| row.at(member) <= pace.t);
+        let Some(after) = passed.checked_sub(1).and_then(|last| after.get(last)) else { return false };
+        let wall =
+            |t: f64| before.get(before.partition_point(|row| row.at(member) <= t)).map_or(f64::INFINITY, |row| row.at(member));
+        let after = after.at(member);
+        self.group.set_pace(lane, pace.crossed(after, wall(after), self.group.has_terms()));
+        true
+    }
+
+    /// How many attempts are made before the next check, by the number of steps that are left to the next saved times. A single
+    /// lane makes half of them. Of many lanes, each waits for half of the attempts when it is there, and a check costs about a
+    /// fourth of an attempt: the sum is least for the root of half of the steps that a lane has left in the mean.
+    fn attempts_by_series(&self) -> usize {
+        let left = self.group.steps_left() / 2.0;
+        let attempts = if self.group.lanes() > 1 { left.sqrt() } else { left };
+        (attempts as usize).clamp(1, ATTEMPTS_BETWEEN_CHECKS)
+    }
+
+    /// Puts a member into a lane, which steps it from now on.
+    fn begin_member(&mut self, part: &Part, lane: usize, member: usize) -> Assignment {
+        let assigned = self.assign_member(part, lane, member);
+        if self.plan.begins {
+            self.group.begin(&self.plan.model.spec, lane, part.first + member);
+        }
+        assigned
+    }
+
+    /// Puts a member into a lane, at its start.
+    fn assign_member(&mut self, part: &Part, lane: usize, member: usize) -> Assignment {
+        let (plan, at) = (self.plan, part.first + member);
+        self.group.prepare_lane(&plan.model.spec, lane, at);
+        let state: Vec<f64> = plan.v.iter().chain(&plan.y).map(|row| row.at(at)).collect();
+        self.group.set_state(lane, &state);
+        let pace = Pace::of(std::array::from_fn(|i| plan.paces[i].at(at)));
+        let scales: Vec<f64> = plan.paces[Pace::<f64>::NUMBERS..].iter().map(|row| row.at(at)).collect();
+        self.group.set_scales(lane, &scales);
+        let before = &plan.jumps[..plan.jumps.len() / 2];
+        let next = before.get(before.partition_point(|row| row.at(at) <= pace.t));
+        self.group.set_pace(lane, Pace { target: pace.t, wall: next.map_or(f64::INFINITY, |row| row.at(at)), ..pace });
+        Assignment { member, next: 0, origin: None, held_before: pace.held > 0.0 }
+    }
+
+    /// Brings a lane to its next attempt: saves the states that it has reached and sets its next time, or ends its member and
+    /// assigns the next. None if no member is left.
+    fn update_lane(
+        &mut self,
+        part: &mut Part,
+        lane: usize,
+        mut assigned: Assignment,
+        waiting: &mut Range<usize>,
+        go_on: GoOn,
+    ) -> Result<Option<Assignment>, Error> {
+        let (plan, budget) = (self.plan, self.plan.budget as f64);
+        loop {
+            if let Some((origin, rejected)) = assigned.origin.take() {
+                // An extra step whose error was not tolerated did not change the state; the run has gone on with shorter steps.
+                if self.group.pace(lane).rejected <= rejected {
+                    self.save(part, lane, &assigned);
+                    assigned.next += 1;
+                    self.group.set_state(lane, &origin);
+                }
+            }
+            if !plan.jumps.is_empty() {
+                self.cross(lane, part.first + assigned.member);
+            }
+            let mut pace = self.group.pace(lane);
+            while let Some(target) = plan.at.get(assigned.next) {
+                pace.target = target.at(part.first + assigned.member);
+                let target = pace.target;
+                if pace.t < target {
+                    break;
+                }
+                self.save(part, lane, &assigned);
+                assigned.next += 1;
+            }
+            if assigned.next < plan.at.len() && self.group.has_terms() && pace.held > 0.0 {
+                if std::mem::take(&mut assigned.held_before) {
+                    self.group.set_pace(lane, pace);
+                    return Ok(Some(assigned));
+                }
+                self.go_by_terms(part, lane, &mut assigned, pace);
+                continue;
+            }
+            if assigned.next < plan.at.len() {
+                if pace.holds() {
+                    pace.extra = pace.target - pace.t;
+                    assigned.origin = Some((self.group.state(lane), pace.rejected));
+                } else {
+                    pace.held = 0.0;
+                }
+                if pace.extra > 0.0 || pace.runs(budget) {
+                    self.group.set_pace(lane, pace);
+                    return Ok(Some(assigned));
+                }
+            }
+            self.end(part, lane, &assigned, &pace);
+            if !go_on(1) {
+                return Err(Error::Interrupted);
+            }
+            let Some(member) = waiting.next() else {
+                self.group.set_pace(lane, pace.idle()); // nothing runs in an empty lane
+                return Ok(None);
+            };
+            assigned = self.begin_member(part, lane, member);
+        }
+    }
+
+    /// Of a step that is held and whose coefficients are known: saves the state at the next time within it, or takes it.
+    fn go_by_terms(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, mut pace: Pace<f64>) {
+        let (spec, member) = (&self.plan.model.spec, part.first + assigned.member);
+        if !pace.holds() {
+            self.group.set_pace(lane, Pace { held: 0.0, ..pace });
+            self.group.attempt_by_terms(spec, lane, member);
+            return;
+        }
+        pace.extra = pace.target - pace.t;
+        let origin = self.group.state(lane);
+        self.group.set_pace(lane, pace);
+        self.group.attempt_by_terms(spec, lane, member);
+        self.save(part, lane, assigned);
+        assigned.next += 1;
+        self.group.set_state(lane, &origin);
+    }
+
+    /// Notes how a member ended.
+    fn end(&self, part: &mut Part, lane: usize, assigned: &Assignment, pace: &Pace<f64>) {
+        let times = self.plan.at.len();
+        let status = if assigned.next == times {
+            Status::Ok
+        } else if pace.accepted + pace.rejected >= self.plan.budget as f64 {
+            Status::Budget
+        } else if pace.error < f64::INFINITY {
+            Status::Underflow
+        } else {
+            Status::NotFinite
+        };
+        for rows in [&mut part.saved_v, &mut part.saved_y] {
+            let block = rows.rows() / times.max(1);
+            for row in assigned.next * block..rows.rows() {
+                rows.row(row)[assigned.member] = f64::NAN;
+            }
+        }
+        for (row, number) in self.group.state(lane).into_iter().enumerate() {
+            part.state.row(row)[assigned.member] = number;
+        }
+        for (row, number) in pace.numbers().into_iter().chain(self.group.scales(lane)).enumerate() {
+            part.paces.row(row)[assigned.member] = number;
+        }
+        for row in 0..part.status.rows() {
+            part.status.row(row)[assigned.member] = status as i64;
+        }
+    }
+
+    fn save(&self, part: &mut Part, lane: usize, assigned: &Assignment) {
+        let state = self.group.state(lane);
+        let (v, y) = state.split_at(self.plan.v.len());
+        for (rows, block) in [(&mut part.saved_v, v), (&mut part.saved_y, y)] {
+            for (i, number) in block.iter().enumerate() {
+                rows.row(assigned.next * block.len() + i)[assigned.member] = *number;
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Machine, Model, Way};
+use super::{Model, StepStrategy};
 use crate::{
     error::Error,
     kernel::{
@@ -10,12 +10,13 @@ use crate::{
         pack::{self, Verdict},
         writer,
     },
-    real::{Precision, Real},
+    stage::Machine,
+    step::tapes::Tapes,
     tape::{
         Counts,
+        real::{Precision, Real},
         split::{Body, Split},
     },
-    trace::Tapes,
 };
 
 /// A step that is one tape, and its kernel.
@@ -37,8 +38,8 @@ pub struct Compiled {
     pub bytes: usize,
     /// The most values that are spilled at once because there are not enough registers.
     pub spills: usize,
-    /// Of a single member's machine code: whether equal operations are lanes of one vector, and what the model says of that; none where it
-    /// was not considered.
+    /// Of a single member's machine code: whether equal operations are lanes of one vector, and what the model says of that; none
+    /// where it was not considered.
     pub packing: Option<(bool, Verdict)>,
     /// How long tracing took, with cutting, and everything that is run once in a while.
     pub trace: Duration,
@@ -78,10 +79,10 @@ impl Model<'_> {
     /// Traces and compiles the step anew, for so many members; none if it is too long for one tape.
     pub fn compiled(&self, machine: Machine, members: usize) -> Result<Option<Compiled>, Error> {
         let traced = self.traced()?;
-        if !matches!(self.way(&traced, machine, members, f64::INFINITY), Way::Tape) {
+        if !matches!(self.way(&traced, machine, members, f64::INFINITY), StepStrategy::Tape) {
             return Ok(None);
         }
-        match self.scene.precision {
+        match self.key.precision {
             Precision::Double => self.compiled_for::<f64>(machine, members),
             Precision::Single => self.compiled_for::<f32>(machine, members),
         }
@@ -89,12 +90,12 @@ impl Model<'_> {
 
     fn compiled_for<T: Real>(&self, machine: Machine, members: usize) -> Result<Option<Compiled>, Error> {
         let began = Instant::now();
-        let tapes: Tapes<T> = self.scene.trace()?;
+        let tapes: Tapes<T> = self.key.trace()?;
         let trace = began.elapsed();
         let split = &tapes.step.split;
         let began = Instant::now();
-        let kit = tapes.step.kit(machine.level, members);
-        let runner = &kit.runner;
+        let compiled = tapes.step.compiled(machine.level, members);
+        let runner = &compiled.runner;
         let written = runner.write();
         let (bytes, spills) = written.map_or((0, 0), |kernel| (kernel.bytes(), kernel.spills()));
         let layout = match (runner.layout(), written) {
@@ -122,25 +123,27 @@ impl Model<'_> {
         }))
     }
 
-    /// How a step that is too long for one tape is computed, its approximate number of operations, and how many members are stepped
-    /// together: by tapes of the rates ("rates"), by a hand-written kernel for one member ("hand"), or by one for products of matrices
-    /// ("matrix"). None if it is one tape. `paced`: for adaptive steps.
+    /// How a step that is too long for one tape is computed, its approximate number of operations, and how many members are
+    /// stepped together: by tapes of the rates ("rates"), by a hand-written kernel for one member ("hand"), or by one for
+    /// products of matrices ("matrix"). None if it is one tape. `paced`: for adaptive steps.
     pub fn in_parts(&self, machine: Machine, members: usize, paced: bool) -> Result<Option<(&'static str, usize, usize)>, Error> {
         let traced = self.traced()?;
         let steps = if paced { 0.0 } else { f64::INFINITY };
         let mut way = self.way(&traced, machine, members, steps);
-        if paced && !matches!(way, Way::Tape | Way::Matrix) {
+        if paced && !matches!(way, StepStrategy::Tape | StepStrategy::Matrix) {
             way = match (way, self.way(&traced, machine, 1, steps)) {
-                (Way::Long(long), _) | (_, Way::Long(long)) => Way::Long(long),
-                _ => Way::Rates(1),
+                (StepStrategy::HandWrittenRates(long), _) | (_, StepStrategy::HandWrittenRates(long)) => {
+                    StepStrategy::HandWrittenRates(long)
+                }
+                _ => StepStrategy::Rates(1),
             };
         }
         Ok(match way {
-            Way::Tape => None,
-            Way::Matrix if paced => None,
-            Way::Rates(lanes) => Some(("rates", traced.operations.1, lanes)),
-            Way::Long(_) => Some(("hand", traced.operations.1, 1)),
-            Way::Matrix => Some(("matrix", traced.operations.1, 1)),
+            StepStrategy::Tape => None,
+            StepStrategy::Matrix if paced => None,
+            StepStrategy::Rates(lanes) => Some(("rates", traced.operations.1, lanes)),
+            StepStrategy::HandWrittenRates(_) => Some(("hand", traced.operations.1, 1)),
+            StepStrategy::Matrix => Some(("matrix", traced.operations.1, 1)),
         })
     }
 }

@@ -2,9 +2,9 @@
 
 use std::{
     sync::{
-        Arc, Mutex,
+        Mutex,
         atomic::{
-            AtomicBool, AtomicU64, AtomicUsize,
+            AtomicU64, AtomicUsize,
             Ordering::{Acquire, Relaxed, Release},
         },
     },
@@ -12,27 +12,24 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::error::Error;
+use crate::{error::Error, stage::Stop};
 
 /// The longest time between two calls of the caller's monitor.
-pub const POLL: Duration = Duration::from_millis(20);
+pub(crate) const POLL: Duration = Duration::from_millis(20);
 
 /// So much memory must be left for a thread to be started: for its stack, 2 MiB, and for what it and the others allocate.
 const ROOM_FOR_A_THREAD: usize = 16 << 20;
 
 /// Is called with the amount of work done since the last call; returns whether to continue.
-pub type GoOn<'a> = &'a mut dyn FnMut(u64) -> bool;
-
-/// Set when all threads are to stop. They leave their parts unfinished; the results of an interrupted run are discarded.
-pub type Stop = Arc<AtomicBool>;
+pub(crate) type GoOn<'a> = &'a mut dyn FnMut(u64) -> bool;
 
 /// The threads of a run, and its stop flag.
 #[derive(Debug)]
-pub struct Workers {
+pub(crate) struct Workers {
     /// Number of threads that work on parts.
     pub threads: usize,
-    /// Work in other threads only: a single step may take long, and the caller waits for signals, so that it can be stopped within
-    /// one.
+    /// Work in other threads only: a single step may take long, and the caller waits for signals, so that it can be stopped
+    /// within one.
     pub background: bool,
     /// The whole work, in the unit of [`GoOn`].
     pub total: f64,
@@ -42,9 +39,9 @@ pub struct Workers {
 
 /// Does all parts. `mine` is the state of the first worker, `worker` makes those of the others.
 ///
-/// The monitor is called on this thread some dozens of times a second with the fraction of the total that is done. When it returns
-/// false, all threads are told to stop.
-pub fn share<P: Send, W: Send>(
+/// The monitor is called on this thread some dozens of times a second with the fraction of the total that is done. When it
+/// returns false, all threads are told to stop.
+pub(crate) fn share<P: Send, W: Send>(
     parts: Vec<P>,
     workers: &Workers,
     monitor: &mut dyn FnMut(f64) -> bool,
@@ -69,8 +66,8 @@ pub fn share<P: Send, W: Send>(
         let mut mine = Some(mine);
         let mut helpers = Vec::new();
         for _ in usize::from(!background)..*threads {
-            // One that is started with the last of the memory may find none for itself a moment later, and the C library then ends
-            // the process.
+            // One that is started with the last of the memory may find none for itself a moment later, and the C library then
+            // ends the process.
             if memmap2::MmapMut::map_anon(ROOM_FOR_A_THREAD).is_err() {
                 break;
             }

@@ -3,13 +3,17 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::{
-    Machine, Model,
-    batch::Steppable,
-    group::Group,
-    stage::{Clock, Force},
-    workers::{self, GoOn, Stop, Workers},
+    Model,
+    fixed::Steppable,
+    workers::{self, GoOn, Workers},
 };
-use crate::{controls::force::NAME, error::Error, real::Real};
+use crate::{
+    error::Error,
+    group::Group,
+    model::around::force::NAME,
+    stage::{Clock, Force, Machine, Stop},
+    tape::real::Real,
+};
 
 struct Share<T> {
     group: Box<dyn Group<T>>,
@@ -107,7 +111,7 @@ impl<T: Steppable> World<T> {
         let sizes = (traced.shape.v * members, traced.shape.y * members);
         let carries = traced.carries;
         let written = if carries { (vec![T::default(); sizes.0], vec![T::default(); sizes.1]) } else { Default::default() };
-        let force = model.spec.given.place(NAME);
+        let force = model.spec.signature.place(NAME);
         Ok(World { clock, shares, members, sizes, carries, written, is_written: false, step, steps_between_checks, stop, force })
     }
 
@@ -126,7 +130,8 @@ impl<T: Steppable> World<T> {
         self.clock.at(self.step)
     }
 
-    /// How many steps are made in some milliseconds; none if a single one may take long, and is for [`World::step_in_background`].
+    /// How many steps are made in some milliseconds; none if a single one may take long, and is for
+    /// [`World::step_in_background`].
     pub fn steps_between_checks(&self) -> Option<i64> {
         self.steps_between_checks
     }
@@ -189,8 +194,8 @@ impl<T: Steppable> World<T> {
         self.step = until;
     }
 
-    /// As `step`, by another thread. The monitor is called on this one. When it returns false, the world stays at the last complete
-    /// step or, where its velocities would take long to compute, at the one before.
+    /// As `step`, by another thread. The monitor is called on this one. When it returns false, the world stays at the last
+    /// complete step or, where its velocities would take long to compute, at the one before.
     pub fn step_in_background(
         &mut self,
         n: i64,
@@ -235,9 +240,9 @@ impl<T: Steppable> World<T> {
             self.step = from + n;
             return Ok(());
         }
-        // The arrays are still those of the start. For a method with a carry, v at the state of the slots takes a rate there, which
-        // cannot be stopped. Systems with slow rates keep the last rate that they computed, which is that of the start of the last
-        // step. So the state before that step is the one that can be returned at once.
+        // The arrays are still those of the start. For a method with a carry, v at the state of the slots takes a rate there,
+        // which cannot be stopped. Systems with slow rates keep the last rate that they computed, which is that of the start of
+        // the last step. So the state before that step is the one that can be returned at once.
         let back = usize::from(self.carries && 0 < made && made < n);
         for Share { group, before, .. } in &mut self.shares {
             let (v, y) = &before[back];

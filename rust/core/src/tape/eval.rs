@@ -1,6 +1,6 @@
 //! What each operation means, in one place.
 
-use super::Op;
+use super::op::Op;
 
 macro_rules! meaning {
     ($(#[$doc:meta])* $apply:ident, $bits:ident, $float:ident) => {

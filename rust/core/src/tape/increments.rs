@@ -1,16 +1,18 @@
 //! The first half of [`super::fuse::fuse`]: increments are not rounded before they are added.
 //!
-//! Methods compute with increments, a factor that depends on the step h times something of the state: h·v̇. Here an increment is kept
-//! as c·factor·x, a number, what is known before the step, and a value:
+//! Methods compute with increments, a factor that depends on the step h times something of the state: h·v̇. Here an increment is
+//! kept as c·factor·x, a number, what is known before the step, and a value:
 //!
-//! - a change of sign, a product with a number, and a product with something else that is known before the step change c and the factor;
-//! - of two increments of one factor, the sum is one too: c₁·f·x + c₂·f·y = c₁·f·(x + (c₂/c₁)·y), where x is the one of the lower rank;
+//! - a change of sign, a product with a number, and a product with something else that is known before the step change c and
+//!   the factor;
+//! - of two increments of one factor, the sum is one too: c₁·f·x + c₂·f·y = c₁·f·(x + (c₂/c₁)·y), where x is the one of the
+//!   lower rank;
 //! - everything else takes the product, (c·f)·x, whose first half is computed before the steps.
 //!
 //! So v + ½(h·a₁ + h·a₂) becomes v + (½h)·(a₁ + a₂), and no product stands between a rate and the sum it belongs to.
 //! `reference/increments.py` says the same in Python.
 
-use super::{Id, Op, Tape, fuse::Facts};
+use super::{Id, Op, Tape, uses::UseCounts};
 
 /// c · factor · of
 #[derive(Clone, Copy)]
@@ -29,7 +31,7 @@ enum Value {
 
 struct Rewriting<'a> {
     tape: &'a Tape,
-    facts: Facts,
+    uses: UseCounts,
     made: Tape,
     /// Of each value of the old tape what it is on the new one.
     values: Vec<Value>,
@@ -39,17 +41,17 @@ struct Rewriting<'a> {
 pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let (tape, roots) = &negated_sums(tape, roots);
     let made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
-    let mut work = Rewriting { tape, facts: Facts::new(tape, roots), made, values: Vec::with_capacity(tape.ops().len()) };
+    let mut work = Rewriting { tape, uses: UseCounts::new(tape, roots), made, values: Vec::with_capacity(tape.ops().len()) };
     for (id, op) in tape.ops().iter().enumerate() {
-        let value = if work.facts.needed[id] { work.value(*op) } else { Value::Plain(0) };
+        let value = if work.uses.needed[id] { work.value(*op) } else { Value::Plain(0) };
         work.values.push(value);
     }
     let roots = roots.iter().map(|root| work.plain(*root)).collect();
     (work.made, roots)
 }
 
-/// The same tape with −(x + y) in place of (−x) − y. Of −x and −y a tape writes (−x) − y or (−y) − x, whichever it comes upon first, and what
-/// is made of it must not depend on that.
+/// The same tape with −(x + y) in place of (−x) − y. Of −x and −y a tape writes (−x) − y or (−y) − x, whichever it comes upon
+/// first, and what is made of it must not depend on that.
 fn negated_sums(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let mut made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
     let mut place = Vec::<Id>::with_capacity(tape.ops().len());
@@ -75,7 +77,7 @@ impl Rewriting<'_> {
                 let Some((p, x)) = self.weighted(a, b) else { return self.same(op) };
                 match self.values[x as usize] {
                     Value::Increment(of) => Value::Increment(self.times(of, p)),
-                    Value::Plain(_) if self.facts.of_step[p as usize] => Value::Increment(self.increment(p, x)),
+                    Value::Plain(_) if self.uses.of_step[p as usize] => Value::Increment(self.increment(p, x)),
                     Value::Plain(_) => self.same(op),
                 }
             }
@@ -102,7 +104,7 @@ impl Rewriting<'_> {
     fn increment(&mut self, p: Id, mut x: Id) -> Increment {
         let mut made = Increment { c: 1.0, factor: self.plain(p), of: 0 };
         while let Op::Mul(a, b) = self.tape.op(x)
-            && self.facts.reads[x as usize] == 1
+            && self.uses.reads[x as usize] == 1
             && let Some((q, rest)) = self.weighted(a, b)
         {
             made = self.times(made, q);
@@ -127,7 +129,7 @@ impl Rewriting<'_> {
             && x.factor == y.factor
             && a != b
         {
-            let turned = self.facts.ranks[b as usize] < self.facts.ranks[a as usize];
+            let turned = self.uses.ranks[b as usize] < self.uses.ranks[a as usize];
             let (low, high) = if turned { (y, x) } else { (x, y) };
             let ratio = if is_difference { -(high.c / low.c) } else { high.c / low.c };
             if ratio.is_finite() && ratio != 0.0 {

@@ -1,221 +1,37 @@
 //! The tape: the operations of a step, as a straight-line program.
 //!
-//! A step is run once with symbols instead of numbers ([`crate::number::Symbol`]), which record its operations on the tape. An
-//! operation that is already on the tape is not written again, constants are folded where that is exact, and an operation
-//! that changes no bit is left out. So the bits of every value are those of the operations as the step performs them.
+//! A step is run once with symbols instead of numbers ([`crate::tape::number::Symbol`]), which record its operations on the tape.
+//! An operation that is already on the tape is not written again, constants are folded where that is exact, and an operation that
+//! changes no bit is left out. So the bits of every value are those of the operations as the step performs them.
 //!
 //! Only the sign and payload of a NaN may differ: they are not promised.
 
+pub mod equations;
 pub mod eval;
+mod fast_hash;
 pub mod fuse;
 mod increments;
+pub mod number;
+mod op;
 pub mod print;
-pub mod quick;
+pub mod real;
+pub mod reserved;
+pub(crate) mod series;
 pub mod split;
+mod symbol;
+mod uses;
 
 use std::collections::BTreeSet;
 
-use self::quick::QuickMap;
-use crate::real::Precision;
-
-/// A value on a tape, by the index of its operation.
-pub type Id = u32;
-
-/// An operation. Comparisons set all bits of a number where they are true, and none where they are false.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Op {
-    /// A number of the state, as it is at the start of the step.
-    State(u32),
-    /// A parameter of the member.
-    Param(u32),
-    /// The step h.
-    Step,
-    /// The time at the start of the step.
-    Time,
-    /// A number, by its bits; of 32 bits the lower half.
-    Const(u64),
-    /// A sampled input at a time.
-    Sample(u32, Id),
-    /// a + b
-    Add(Id, Id),
-    /// a − b
-    Sub(Id, Id),
-    /// a · b
-    Mul(Id, Id),
-    /// a / b
-    Div(Id, Id),
-    /// a · b + c, rounded once
-    MulAdd(Id, Id, Id),
-    /// a · b − c, rounded once
-    MulSub(Id, Id, Id),
-    /// c − a · b, rounded once
-    SubMul(Id, Id, Id),
-    /// √a
-    Sqrt(Id),
-    /// −a
-    Neg(Id),
-    /// The largest whole number not above a.
-    Floor(Id),
-    /// a < b; false of a NaN, as all comparisons are.
-    Less(Id, Id),
-    /// a ≤ b
-    LessEqual(Id, Id),
-    /// a = b
-    Equal(Id, Id),
-    /// Of bits: where the first is set the second, else the third. A mask comes from a comparison.
-    Select(Id, Id, Id),
-    /// Bits of both.
-    And(Id, Id),
-    /// Bits of either.
-    Or(Id, Id),
-    /// Bits of one and not of both.
-    Xor(Id, Id),
-    /// The sum of both as whole numbers of as many bits, without a carry out.
-    AddBits(Id, Id),
-    /// Bits moved up by so many places, zeros after them.
-    ShiftUp(Id, u32),
-    /// Bits moved down by so many places, zeros before them.
-    ShiftDown(Id, u32),
-    /// The same value again: where the next state is a number of the present one, or a constant.
-    Copy(Id),
-    /// Of a body ([`split::Body`]): a number of the member that is the same in every step.
-    Row(u32),
-    /// Of a body: a number that is the same for all members and steps. Of a tape that is being cut: a fact of an input, see `split`.
-    Uniform(u32),
-    /// Of a body: a number of the step, the same for all members.
-    PerStep(u32),
-    /// Of a body: a number of the member that its sampled inputs have at the step.
-    Held(u32),
-    /// Of a body: a sample, by its place, where members are at times of their own.
-    Gather(Id),
-}
-
-impl Op {
-    /// Its operands: the first so many of the three.
-    #[inline]
-    pub fn operands(self) -> ([Id; 3], usize) {
-        use Op::*;
-        match self {
-            State(_) | Param(_) | Step | Time | Const(_) | Row(_) | Uniform(_) | PerStep(_) | Held(_) => ([0; 3], 0),
-            Sample(_, a) | Sqrt(a) | Neg(a) | Floor(a) | ShiftUp(a, _) | ShiftDown(a, _) | Copy(a) | Gather(a) => ([a, 0, 0], 1),
-            Add(a, b)
-            | Sub(a, b)
-            | Mul(a, b)
-            | Div(a, b)
-            | Less(a, b)
-            | LessEqual(a, b)
-            | Equal(a, b)
-            | And(a, b)
-            | Or(a, b)
-            | Xor(a, b)
-            | AddBits(a, b) => ([a, b, 0], 2),
-            MulAdd(a, b, c) | MulSub(a, b, c) | SubMul(a, b, c) | Select(a, b, c) => ([a, b, c], 3),
-        }
-    }
-
-    /// The same operation with other operands.
-    #[must_use]
-    pub fn with(self, mut f: impl FnMut(Id) -> Id) -> Op {
-        let (mut operands, n) = self.operands();
-        for id in &mut operands[..n] {
-            *id = f(*id);
-        }
-        self.over(operands)
-    }
-
-    /// The same operation over the first so many of three operands.
-    fn over(self, [a, b, c]: [Id; 3]) -> Op {
-        use Op::*;
-        match self {
-            State(_) | Param(_) | Step | Time | Const(_) | Row(_) | Uniform(_) | PerStep(_) | Held(_) => self,
-            Sample(i, _) => Sample(i, a),
-            Sqrt(_) => Sqrt(a),
-            Neg(_) => Neg(a),
-            Floor(_) => Floor(a),
-            ShiftUp(_, n) => ShiftUp(a, n),
-            ShiftDown(_, n) => ShiftDown(a, n),
-            Copy(_) => Copy(a),
-            Gather(_) => Gather(a),
-            Add(..) => Add(a, b),
-            Sub(..) => Sub(a, b),
-            Mul(..) => Mul(a, b),
-            Div(..) => Div(a, b),
-            Less(..) => Less(a, b),
-            LessEqual(..) => LessEqual(a, b),
-            Equal(..) => Equal(a, b),
-            MulAdd(..) => MulAdd(a, b, c),
-            MulSub(..) => MulSub(a, b, c),
-            SubMul(..) => SubMul(a, b, c),
-            Select(..) => Select(a, b, c),
-            And(..) => And(a, b),
-            Or(..) => Or(a, b),
-            Xor(..) => Xor(a, b),
-            AddBits(..) => AddBits(a, b),
-        }
-    }
-
-    /// Whether its two operands may be exchanged.
-    pub fn commutes(self) -> bool {
-        use Op::*;
-        matches!(self, Add(..) | Mul(..) | Equal(..) | And(..) | Or(..) | Xor(..) | AddBits(..))
-    }
-
-    /// Whether it is an input of the tape, without operands.
-    pub fn is_leaf(self) -> bool {
-        self.operands().1 == 0
-    }
-}
-
-/// How often each kind of operation occurs. Changes of sign, copies and bit masks are not arithmetic.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Additions and subtractions.
-    pub additions: u32,
-    /// Products.
-    pub multiplications: u32,
-    /// Fused multiply-adds: a product and a sum, rounded once.
-    pub fused: u32,
-    /// Quotients.
-    pub divisions: u32,
-    /// Square roots.
-    pub square_roots: u32,
-    /// Comparisons and choices.
-    pub choices: u32,
-    /// Operations on bits, roundings to whole numbers.
-    pub bits: u32,
-}
-
-impl Counts {
-    /// Counts one more.
-    pub fn note(&mut self, op: Op) {
-        use Op::*;
-        match op {
-            Add(..) | Sub(..) => self.additions += 1,
-            Mul(..) => self.multiplications += 1,
-            MulAdd(..) | MulSub(..) | SubMul(..) => self.fused += 1,
-            Div(..) => self.divisions += 1,
-            Sqrt(_) => self.square_roots += 1,
-            Less(..) | LessEqual(..) | Equal(..) | Select(..) => self.choices += 1,
-            And(..) | Or(..) | Xor(..) | AddBits(..) | ShiftUp(..) | ShiftDown(..) | Floor(_) => self.bits += 1,
-            State(_) | Param(_) | Step | Time | Const(_) | Sample(..) | Neg(_) | Copy(_) | Row(_) | Uniform(_) | PerStep(_)
-            | Held(_) | Gather(_) => {}
-        }
-    }
-
-    /// All of them.
-    pub fn total(&self) -> usize {
-        let kinds =
-            [self.additions, self.multiplications, self.fused, self.divisions, self.square_roots, self.choices, self.bits];
-        kinds.iter().fold(0, |all, count| all + *count as usize)
-    }
-}
+pub use self::op::{Counts, Id, Op};
+use self::{fast_hash::FastHashMap, real::Precision};
 
 /// Operations in the order in which they were first requested, each once.
 #[derive(Clone, Debug, Default)]
 pub struct Tape {
     ops: Vec<Op>,
     precision: Precision,
-    seen: QuickMap<Op, Id>,
+    seen: FastHashMap<Op, Id>,
     /// Of each value: whether it is surely not −0.
     not_minus_zero: Vec<bool>,
     /// Of each value: whether it depends on the state.
@@ -247,9 +63,9 @@ impl Tape {
         self.ops[id as usize]
     }
 
-    /// Counts of the operations of a step as it is written down, if these values are its next state: the operations on values that depend
-    /// on the state, before equal ones were merged and unused ones left out, and those of inputs that change with time. Operations on
-    /// parameters alone are not counted, since they are computed before the steps.
+    /// Counts of the operations of a step as it is written down, if these values are its next state: the operations on values
+    /// that depend on the state, before equal ones were merged and unused ones left out, and those of inputs that change with
+    /// time. Operations on parameters alone are not counted, since they are computed before the steps.
     pub fn written(&self, roots: impl IntoIterator<Item = Id>) -> Counts {
         let mut counts = self.written;
         let mut changes: Vec<bool> = Vec::with_capacity(self.ops.len());
@@ -265,7 +81,7 @@ impl Tape {
     }
 
     /// How many operations on what changes between steps these values are made of, equal ones once and some of them left out.
-    pub fn changing(&self, roots: impl IntoIterator<Item = Id>, without: &BTreeSet<Id>) -> usize {
+    pub(crate) fn changing(&self, roots: impl IntoIterator<Item = Id>, without: &BTreeSet<Id>) -> usize {
         let mask = self.needed(roots);
         let mut counts = Counts::default();
         let mut changes: Vec<bool> = Vec::with_capacity(self.ops.len());
@@ -282,18 +98,18 @@ impl Tape {
     }
 
     /// Notes how many operations one evaluation of the rates takes, and how many all coefficients of their series.
-    pub fn note_series(&mut self, rates: usize, coefficients: usize) {
+    pub(crate) fn note_series(&mut self, rates: usize, coefficients: usize) {
         self.series = [rates, coefficients];
     }
 
     /// To how many evaluations of the rates the coefficients of a series are equal, by their operations; 0 without a series.
-    pub fn series_evaluations(&self) -> usize {
+    pub(crate) fn series_evaluations(&self) -> usize {
         let [rates, coefficients] = self.series;
         coefficients.div_ceil(rates.max(1))
     }
 
     /// Whether a value depends on the state.
-    pub fn is_of_state(&self, id: Id) -> bool {
+    pub(crate) fn is_of_state(&self, id: Id) -> bool {
         self.of_state[id as usize]
     }
 
@@ -302,7 +118,7 @@ impl Tape {
         self.keep(Op::Const(self.precision.bits_of(x)))
     }
 
-    /// A constant of bits: see [`Precision::pattern`].
+    /// A constant of bits: see `Precision::pattern`.
     pub fn bits_of(&mut self, bits: u64) -> Id {
         self.keep(Op::Const(self.precision.pattern(bits)))
     }

@@ -1,7 +1,6 @@
 //! A tape as text.
 
-use super::{Id, Op};
-use crate::real::Precision;
+use super::{Id, Op, real::Precision};
 
 /// One operation, as a line of a listing.
 pub fn line(id: Id, op: Op, precision: Precision) -> String {
@@ -46,7 +45,8 @@ pub fn line(id: Id, op: Op, precision: Precision) -> String {
     format!("%{id} = {is}")
 }
 
-/// The name of an operation, and its argument besides the operands: the index of a leaf, the bits of a constant, a number of bits.
+/// The name of an operation, and its argument besides the operands: the index of a leaf, the bits of a constant, a number of
+/// bits.
 pub fn named(op: Op) -> (&'static str, u64) {
     use Op::*;
     match op {
@@ -83,9 +83,4 @@ pub fn named(op: Op) -> (&'static str, u64) {
         Held(i) => ("held", i.into()),
         Gather(_) => ("gather", 0),
     }
-}
-
-/// A listing of operations.
-pub fn listing(ops: &[Op], precision: Precision) -> String {
-    ops.iter().enumerate().map(|(id, op)| line(id as Id, *op, precision) + "\n").collect()
 }

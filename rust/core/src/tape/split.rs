@@ -1,4 +1,5 @@
-//! Splits a tape by how often its values change: once for a run, once for a member, once for a step, or for every member at every step.
+//! Splits a tape by how often its values change: once for a run, once for a member, once for a step, or for every member at every
+//! step.
 //!
 //! Many values do not change from step to step (Φ = ω₀·h), or not from member to member (the sine of a drive that all
 //! share). So the tape is cut into four [`Body`]s, each a list of operations over rows of lanes. Only the
@@ -6,8 +7,7 @@
 
 use std::hash::Hash;
 
-use super::{Id, Op, Tape, quick::QuickMap};
-use crate::{real::Precision, window::ENDS};
+use super::{Id, Op, Tape, fast_hash::FastHashMap, real::Precision, reserved::WINDOW_ENDS};
 
 /// Operations over lanes: the input of the interpreter and of a kernel writer.
 ///
@@ -17,8 +17,8 @@ use crate::{real::Precision, window::ENDS};
 pub struct Body {
     /// The operations.
     pub ops: Vec<Op>,
-    /// The next value of each number of the state. It is `State(s)` itself if s stays as it is; otherwise it is not a leaf, and not the
-    /// next value of another number of the state as well (where it would be, there is a `Copy`).
+    /// The next value of each number of the state. It is `State(s)` itself if s stays as it is; otherwise it is not a leaf, and
+    /// not the next value of another number of the state as well (where it would be, there is a `Copy`).
     pub next: Vec<Id>,
     /// How many rows of the member it may read.
     pub rows: usize,
@@ -32,7 +32,7 @@ pub struct Body {
 
 impl Body {
     /// Whether a number of the state stays as it is.
-    pub fn keeps(&self, s: usize) -> bool {
+    pub(crate) fn keeps(&self, s: usize) -> bool {
         self.ops[self.next[s] as usize] == Op::State(s as u32)
     }
 
@@ -60,7 +60,7 @@ impl Body {
             }
         }
         let mut place = vec![0; tape.ops().len()];
-        let mut known: QuickMap<Op, Id> = QuickMap::default();
+        let mut known: FastHashMap<Op, Id> = FastHashMap::default();
         let mut body = Body { precision: tape.precision(), ..Body::default() };
         for id in (0..tape.ops().len()).filter(|id| needed[*id]) {
             let op = leaves[id].unwrap_or_else(|| tape.ops()[id].with(|operand| place[operand as usize]));
@@ -73,7 +73,8 @@ impl Body {
         body
     }
 
-    /// Numbers the leaves of a kind in the order in which they are read, for sequential access to memory. `list` has their meaning.
+    /// Numbers the leaves of a kind in the order in which they are read, for sequential access to memory. `list` has their
+    /// meaning.
     fn sort_leaves(&mut self, list: &mut Vec<Id>, is: impl Fn(Op) -> bool, leaf: impl Fn(u32) -> Op) {
         let mut order: Vec<Id> = Vec::with_capacity(list.len());
         let mut seen = vec![false; self.ops.len()];
@@ -126,20 +127,21 @@ impl Body {
         }
     }
 
-    /// The body of several steps, one after the other, which also returns the states between: after the numbers of the last state come the
-    /// velocities before each step, and then the coordinates before each step; `sizes` has the lengths of both. A state has `state`
-    /// numbers. If the body of a step has further results, these are the velocities before the step, and the v slot holds the carry.
+    /// The body of several steps, one after the other, which also returns the states between: after the numbers of the last state
+    /// come the velocities before each step, and then the coordinates before each step; `sizes` has the lengths of both. A state
+    /// has `state` numbers. If the body of a step has further results, these are the velocities before the step, and the v slot
+    /// holds the carry.
     #[must_use]
-    pub fn trail(&self, steps: usize, state: usize, sizes: [usize; 2]) -> Body {
-        let mut trail = Body { precision: self.precision, ..Body::default() };
-        let mut leaves: QuickMap<Op, Id> = QuickMap::default();
-        let mut leaf = |trail: &mut Body, op: Op| {
+    pub fn unrolled(&self, steps: usize, state: usize, sizes: [usize; 2]) -> Body {
+        let mut unrolled = Body { precision: self.precision, ..Body::default() };
+        let mut leaves: FastHashMap<Op, Id> = FastHashMap::default();
+        let mut leaf = |unrolled: &mut Body, op: Op| {
             *leaves.entry(op).or_insert_with(|| {
-                trail.ops.push(op);
-                trail.ops.len() as Id - 1
+                unrolled.ops.push(op);
+                unrolled.ops.len() as Id - 1
             })
         };
-        let mut now: Vec<Id> = (0..state as u32).map(|s| leaf(&mut trail, Op::State(s))).collect();
+        let mut now: Vec<Id> = (0..state as u32).map(|s| leaf(&mut unrolled, Op::State(s))).collect();
         let mut shown = sizes.map(|size| Vec::with_capacity(steps * size));
         let mut place = vec![0; self.ops.len()];
         for step in 0..steps {
@@ -153,10 +155,10 @@ impl Body {
                 place[id] = match op {
                     Op::State(s) => now[s as usize],
                     Op::Copy(of) => place[of as usize],
-                    op if op.is_leaf() => leaf(&mut trail, op),
+                    op if op.is_leaf() => leaf(&mut unrolled, op),
                     op => {
-                        trail.ops.push(op.with(|operand| place[operand as usize]));
-                        trail.ops.len() as Id - 1
+                        unrolled.ops.push(op.with(|operand| place[operand as usize]));
+                        unrolled.ops.len() as Id - 1
                     }
                 };
             }
@@ -166,8 +168,8 @@ impl Body {
             shown[1].extend_from_slice(&now[sizes[0]..][..sizes[1]]);
             now.copy_from_slice(next);
         }
-        trail.next = now.into_iter().chain(shown.into_iter().flatten()).collect();
-        trail.finished()
+        unrolled.next = now.into_iter().chain(shown.into_iter().flatten()).collect();
+        unrolled.finished()
     }
 
     fn finished(mut self) -> Body {
@@ -179,7 +181,7 @@ impl Body {
 
 /// How often a value changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Rank {
+pub(crate) enum Rank {
     /// It is known beforehand.
     Constant,
     /// Once a run, the same for all members.
@@ -194,7 +196,7 @@ pub enum Rank {
 
 /// The meaning of a number that is the same for all members.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Given {
+pub enum UniformSource {
     /// The step h.
     Step,
     /// A parameter.
@@ -226,7 +228,7 @@ pub enum Entry {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Split {
     /// The meaning of the uniforms of the first three bodies.
-    pub given: Vec<Given>,
+    pub sources: Vec<UniformSource>,
     /// Which parameters are the rows of `member`.
     pub params: Vec<u32>,
     /// Its state are the uniforms of `body`; computed once, in one lane.
@@ -252,8 +254,9 @@ pub fn split(tape: &Tape, next: &[Id], uniform: IsShared, common: IsShared) -> S
     split_with_times(tape, next, uniform, common, &|_| false)
 }
 
-/// The same, where `of_times` says which inputs are the times at which samples begin: these follow from the numbers of the samples.
-pub fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, common: IsShared, of_times: IsShared) -> Split {
+/// The same, where `of_times` says which inputs are the times at which samples begin: these follow from the numbers of the
+/// samples.
+pub(crate) fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, common: IsShared, of_times: IsShared) -> Split {
     let mut tape = tape.clone();
     let next = look_up_samples(&mut tape, next, uniform, of_times);
     let next = hoist_signs(&mut tape, &next, uniform);
@@ -306,20 +309,20 @@ pub fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, common: IsS
         entries.push(sample_number(&mut tape, input, t));
     }
 
-    let (mut given, mut params) = (Places::default(), Places::default());
+    let (mut sources, mut params) = (Places::default(), Places::default());
     let mut leaf = |id: Id| match tape.op(id) {
-        Op::Step => Some(Op::Uniform(given.of(Given::Step))),
-        Op::Param(i) if ENDS.contains(&i) => Some(Op::Row(ENDS[0] - i + 1)),
-        Op::Param(i) if uniform(i) => Some(Op::Uniform(given.of(Given::Param(i)))),
+        Op::Step => Some(Op::Uniform(sources.of(UniformSource::Step))),
+        Op::Param(i) if WINDOW_ENDS.contains(&i) => Some(Op::Row(WINDOW_ENDS[0] - i + 1)),
+        Op::Param(i) if uniform(i) => Some(Op::Uniform(sources.of(UniformSource::Param(i)))),
         Op::Param(i) => Some(Op::Row(params.of(i))),
-        Op::Uniform(fact) => Some(Op::Uniform(given.of(fact_of(fact)))),
+        Op::Uniform(fact) => Some(Op::Uniform(sources.of(fact_of(fact)))),
         Op::Time => Some(Op::Row(0)),
         _ => None,
     };
     split.run = Body::of(&tape, &uniforms, &mut leaf).finished();
     split.member = Body::of(&tape, &rows, &mut leaf).finished();
     split.step = Body::of(&tape, &entries, &mut leaf).finished();
-    split.given = given.list;
+    split.sources = sources.list;
     split.params = params.list;
     split
 }
@@ -327,12 +330,12 @@ pub fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, common: IsS
 /// Things in the order of their first request, each once.
 struct Places<T> {
     list: Vec<T>,
-    known: QuickMap<T, u32>,
+    known: FastHashMap<T, u32>,
 }
 
 impl<T> Default for Places<T> {
     fn default() -> Self {
-        Places { list: Vec::new(), known: QuickMap::default() }
+        Places { list: Vec::new(), known: FastHashMap::default() }
     }
 }
 
@@ -346,25 +349,33 @@ impl<T: Copy + Eq + Hash> Places<T> {
 }
 
 /// A property of an input that is known for a run but not when a step is traced, as a leaf of a tape that is being cut.
-fn fact(given: Given) -> Op {
-    Op::Uniform(match given {
-        Given::Start(input) => 5 * input,
-        Given::Interval(input) => 5 * input + 1,
-        Given::Last(input) => 5 * input + 2,
-        Given::First(input) => 5 * input + 3,
-        Given::Lanes | Given::Step | Given::Param(_) => 4,
+fn fact(source: UniformSource) -> Op {
+    Op::Uniform(match source {
+        UniformSource::Start(input) => 5 * input,
+        UniformSource::Interval(input) => 5 * input + 1,
+        UniformSource::Last(input) => 5 * input + 2,
+        UniformSource::First(input) => 5 * input + 3,
+        UniformSource::Lanes | UniformSource::Step | UniformSource::Param(_) => 4,
     })
 }
 
 /// The inverse of `fact`.
-fn fact_of(fact: u32) -> Given {
+fn fact_of(fact: u32) -> UniformSource {
     let input = fact / 5;
-    [Given::Start(input), Given::Interval(input), Given::Last(input), Given::First(input), Given::Lanes][fact as usize % 5]
+    [
+        UniformSource::Start(input),
+        UniformSource::Interval(input),
+        UniformSource::Last(input),
+        UniformSource::First(input),
+        UniformSource::Lanes,
+    ][fact as usize % 5]
 }
 
-/// The number of the sample that holds at a time: the last one not after it, or the first or last one outside; 0 if the time is a NaN.
+/// The number of the sample that holds at a time: the last one not after it, or the first or last one outside; 0 if the time is a
+/// NaN.
 fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
-    let [start, interval, last] = [Given::Start(input), Given::Interval(input), Given::Last(input)].map(|g| tape.keep(fact(g)));
+    let [start, interval, last] =
+        [UniformSource::Start(input), UniformSource::Interval(input), UniformSource::Last(input)].map(|g| tape.keep(fact(g)));
     let since = tape.keep(Op::Sub(t, start));
     let intervals = tape.keep(Op::Div(since, interval));
     let slack = tape.constant(HOLD_SLACK);
@@ -388,13 +399,14 @@ fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: IsShared, of_times: Is
             (_, Op::Sample(input, now)) if of_times(input) => {
                 let samples = input - 1; // the table before it, which has the same grid
                 let number = sample_number(tape, samples, now);
-                let [start, interval] = [Given::Start(samples), Given::Interval(samples)].map(|g| tape.keep(fact(g)));
+                let [start, interval] =
+                    [UniformSource::Start(samples), UniformSource::Interval(samples)].map(|g| tape.keep(fact(g)));
                 let since = tape.keep(Op::Mul(interval, number));
                 tape.keep(Op::Add(start, since))
             }
             (Op::Sample(_, t), Op::Sample(input, now)) if matches!(ranks[t as usize], Rank::Member | Rank::Lane) => {
                 let number = sample_number(tape, input, now);
-                let (lanes, first) = (tape.keep(fact(Given::Lanes)), tape.keep(fact(Given::First(input))));
+                let (lanes, first) = (tape.keep(fact(UniformSource::Lanes)), tape.keep(fact(UniformSource::First(input))));
                 let row = tape.keep(Op::Mul(number, lanes));
                 let at = tape.keep(Op::Add(row, first));
                 tape.keep(Op::Gather(at))
@@ -411,7 +423,7 @@ fn ranks(tape: &Tape, uniform: IsShared) -> Vec<Rank> {
         let rank = match *op {
             Op::Const(_) => Rank::Constant,
             Op::Step | Op::Uniform(_) => Rank::Run,
-            Op::Param(i) if ENDS.contains(&i) => Rank::Step,
+            Op::Param(i) if WINDOW_ENDS.contains(&i) => Rank::Step,
             Op::Param(i) if uniform(i) => Rank::Run,
             Op::Param(_) => Rank::Member,
             Op::Time => Rank::Step,
@@ -458,9 +470,9 @@ fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: IsShared) -> Vec<Id> {
 }
 
 impl Tape {
-    /// Adds the operations of another tape of the same precision, and returns the place of each of its values. Decisions that were made there, such as which
-    /// products are fused, remain.
-    pub fn take_over(&mut self, other: &Tape) -> Vec<Id> {
+    /// Adds the operations of another tape of the same precision, and returns the place of each of its values. Decisions that
+    /// were made there, such as which products are fused, remain.
+    pub(crate) fn take_over(&mut self, other: &Tape) -> Vec<Id> {
         let mut place: Vec<Id> = Vec::with_capacity(other.ops().len());
         for op in other.ops() {
             place.push(self.keep(op.with(|operand| place[operand as usize])));

@@ -17,9 +17,12 @@ use stepwell_core::{
         interpret::Interpreter,
         writer::{Assembled, Shape, assemble, choose},
     },
-    number::{Symbol, record},
-    real::{Precision, Real},
-    tape::{Op, Tape, split::Body},
+    tape::{
+        Op, Tape,
+        number::{Symbol, record},
+        real::{Precision, Real},
+        split::Body,
+    },
 };
 
 const COMPILER: &str = "aarch64-linux-gnu-gcc";
@@ -33,7 +36,7 @@ const STEPS: [usize; 3] = [1, 2, 7];
 const ROUNDING: [u64; 2] = [0, 1 << 22 | 1 << 24 | 1 << 25];
 
 /// A kernel with inputs.
-pub struct Case<T> {
+pub(crate) struct Case<T> {
     seed: u64,
     pub body: Body,
     pub assembled: Assembled,
@@ -41,7 +44,7 @@ pub struct Case<T> {
 }
 
 impl<T: Real> Case<T> {
-    pub fn all(seed: u64) -> Vec<Case<T>> {
+    pub(crate) fn all(seed: u64) -> Vec<Case<T>> {
         let random = &mut Random(seed.wrapping_mul(0xD134_2543_DE82_EF95) ^ 0xA64);
         let operations = match random.below(8) {
             0 => 3 + random.below(6),
@@ -96,7 +99,7 @@ fn next(bytes: &mut &[u8], count: usize) -> Option<u64> {
 }
 
 /// The compiled runner; None where there is no compiler or no emulator, and it has been said.
-pub fn runner(files: &str) -> Option<PathBuf> {
+pub(crate) fn runner(files: &str) -> Option<PathBuf> {
     for program in [COMPILER, EMULATOR] {
         if !crate::has(program) {
             crate::skipped(&format!("there is no {program}"));
@@ -111,9 +114,9 @@ pub fn runner(files: &str) -> Option<PathBuf> {
     Some(runner)
 }
 
-/// Runs all and compares with the interpreter; how many numbers are the same, or what is the first that is not. Tests that run at the same
-/// time use files of their own.
-pub fn compare<T: Real>(runner: &Path, cases: &[Case<T>], files: &str) -> Result<usize, String> {
+/// Runs all and compares with the interpreter; how many numbers are the same, or what is the first that is not. Tests that run at
+/// the same time use files of their own.
+pub(crate) fn compare<T: Real>(runner: &Path, cases: &[Case<T>], files: &str) -> Result<usize, String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let [from, to] = ["cases", "states"].map(|kind| folder.join(format!("aarch64-{files}-{kind}")));
     let mut bytes = Vec::new();

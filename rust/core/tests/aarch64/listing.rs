@@ -5,8 +5,10 @@ use std::{collections::BTreeSet, fs, path::Path, process::Command};
 use crate::emulated::Case;
 use stepwell_core::{
     kernel::writer::Shape,
-    real::{Precision, Real},
-    tape::Op,
+    tape::{
+        Op,
+        real::{Precision, Real},
+    },
 };
 
 const DISASSEMBLER: &str = "aarch64-linux-gnu-objdump";

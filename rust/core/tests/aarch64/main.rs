@@ -1,5 +1,5 @@
-//! Machine code for AArch64, on any machine: its words against an assembler's, and what it computes, under an emulator, against the
-//! interpreter, bit for bit.
+//! Machine code for AArch64, on any machine: its words against an assembler's, and what it computes, under an emulator, against
+//! the interpreter, bit for bit.
 //!
 //! On a machine with an AArch64, `tests/kernels` does the same as for all CPUs.
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]

@@ -1,7 +1,7 @@
 //! Kernels with wrong instructions: the comparison under the emulator notices each.
 
 use crate::emulated::{Case, compare, runner};
-use stepwell_core::real::Real;
+use stepwell_core::tape::real::Real;
 
 /// What is written, which bits of a word say so, and a wrong word for these bits.
 type Mistake = (&'static str, u32, u32, u32);

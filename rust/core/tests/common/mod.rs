@@ -1,24 +1,24 @@
 //! Models of the core, by names and numbers.
 
 use stepwell_core::{
-    real::Precision,
+    model::spec::{Row, Signature, Spec, Table},
     run::Model,
-    spec::{Given, Row, Spec, Table},
-    trace::{How, Scene},
+    step::key::{StepKind, TapeKey},
+    tape::real::Precision,
 };
 
 /// What is given to a system beside its inputs.
 #[derive(Default)]
-pub struct Of<'a, 'b> {
+pub(crate) struct Of<'a, 'b> {
     pub words: &'b [(&'b str, &'b str)],
     pub wholes: &'b [(&'b str, usize)],
     pub rows: &'b [(&'b str, Vec<Row<'a>>)],
     pub tables: Vec<(&'b str, Table<'a>)>,
 }
 
-pub fn spec<'a>(system: &str, of: Of<'a, '_>) -> Spec<'a> {
+pub(crate) fn spec<'a>(system: &str, of: Of<'a, '_>) -> Spec<'a> {
     let commons = |rows: &[Row]| rows.iter().map(Row::is_common).collect::<Vec<bool>>();
-    let given = Given {
+    let signature = Signature {
         system: system.to_owned(),
         words: of.words.iter().map(|(name, word)| (name.to_string(), word.to_string())).collect(),
         wholes: of.wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
@@ -29,20 +29,20 @@ pub fn spec<'a>(system: &str, of: Of<'a, '_>) -> Spec<'a> {
         watched: None,
     };
     let rows = of.rows.iter().flat_map(|(_, rows)| rows.clone()).collect();
-    Spec { given: given.into(), rows, tables: of.tables.into_iter().map(|(_, table)| table).collect() }
+    Spec { signature: signature.into(), rows, tables: of.tables.into_iter().map(|(_, table)| table).collect() }
 }
 
 /// A system stepped by a method.
-pub fn model<'a>(spec: Spec<'a>, method: &str) -> Model<'a> {
-    let how = How::Method { name: method.to_owned(), choice: 0 };
+pub(crate) fn model<'a>(spec: Spec<'a>, method: &str) -> Model<'a> {
+    let how = StepKind::Method { name: method.to_owned(), choice: 0 };
     Model {
-        scene: Scene { given: spec.given.clone(), how, record: Vec::new(), fused: false, precision: Precision::Double },
+        key: TapeKey { signature: spec.signature.clone(), how, record: Vec::new(), fused: false, precision: Precision::Double },
         spec,
     }
 }
 
 /// Free oscillators in canonical form.
-pub fn oscillators<'a>(omega: &'a [f64], method: &str) -> Model<'a> {
+pub(crate) fn oscillators<'a>(omega: &'a [f64], method: &str) -> Model<'a> {
     model(
         spec("oscillator", Of { words: &[("form", "canonical")], rows: &[("omega", vec![Row(omega)])], ..Of::default() }),
         method,

@@ -3,9 +3,9 @@
 use iced_x86::{Decoder, DecoderOptions, FlowControl, Instruction, Mnemonic, OpAccess, OpKind, Register};
 use stepwell_core::kernel::writer::Written;
 
-/// Panics if anything is in the code that should not be. Fused multiply-adds should be if the body has some. Returns how many instructions
-/// move numbers between lanes.
-pub fn read(kernel: &Written, is_fused: bool) -> usize {
+/// Panics if anything is in the code that should not be. Fused multiply-adds should be if the body has some. Returns how many
+/// instructions move numbers between lanes.
+pub(crate) fn read(kernel: &Written, is_fused: bool) -> usize {
     let mut moves = 0;
     let (code, frame, shape) = (kernel.code(), kernel.frame(), kernel.shape());
     let mut decoder = Decoder::with_ip(64, code, 0, DecoderOptions::NONE);

@@ -4,13 +4,12 @@ use crate::random::Random;
 use stepwell_core::{
     isa::Level,
     kernel::{Kernel, Tile, writer::Shape},
-    real::Real,
-    tape::{Op, split::Body},
+    tape::{Op, real::Real, split::Body},
 };
 
 /// Inputs of a kernel.
 #[derive(Clone)]
-pub struct Inputs<T = f64> {
+pub(crate) struct Inputs<T = f64> {
     pub state: Vec<T>,
     pub rows: Vec<T>,
     pub uniforms: Vec<T>,
@@ -21,7 +20,7 @@ pub struct Inputs<T = f64> {
 
 impl<T: Real> Inputs<T> {
     /// For a body, over rows of so many lanes.
-    pub fn new(random: &mut Random, body: &Body, lanes: usize, steps: usize) -> Inputs<T> {
+    pub(crate) fn new(random: &mut Random, body: &Body, lanes: usize, steps: usize) -> Inputs<T> {
         let mut numbers = |n: usize| (0..n).map(|_| random.number_of()).collect::<Vec<T>>();
         let (state, rows, uniforms) = (numbers(body.next.len() * lanes), numbers(body.rows * lanes), numbers(body.uniforms));
         let held = numbers(3 * lanes + 5);
@@ -39,7 +38,7 @@ impl<T: Real> Inputs<T> {
     }
 
     /// The state after a kernel has made the steps.
-    pub fn run(&self, kernel: &dyn Kernel<T>, scratch: &mut Vec<T>) -> Vec<T> {
+    pub(crate) fn run(&self, kernel: &dyn Kernel<T>, scratch: &mut Vec<T>) -> Vec<T> {
         let mut state = self.state.clone();
         let pool = kernel.pool(&self.uniforms);
         kernel.run(
@@ -58,7 +57,7 @@ impl<T: Real> Inputs<T> {
 }
 
 /// A shape of a level and a width.
-pub fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
+pub(crate) fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
     let block_vectors = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(12) };
     let blocks = if random.once_in(2) { 1 } else { 1 + random.below(5) };
     let interleaved = if random.once_in(3) { 1 + random.below(block_vectors) } else { block_vectors };
@@ -66,6 +65,6 @@ pub fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
 }
 
 /// The same bits, or both NaN.
-pub fn same<T: Real>(a: T, b: T) -> bool {
+pub(crate) fn same<T: Real>(a: T, b: T) -> bool {
     a.pattern() == b.pattern() || (a.wide().is_nan() && b.wide().is_nan())
 }

@@ -1,4 +1,5 @@
-//! Kernels that are written at run time: every bit as the interpreter has it, nothing touched that is not theirs, pages given back.
+//! Kernels that are written at run time: every bit as the interpreter has it, nothing touched that is not theirs, pages given
+//! back.
 #![cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_os = "linux")))]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
 
@@ -19,8 +20,11 @@ use stepwell_core::{
         interpret::Interpreter,
         writer::{Shape, Written, choose, write},
     },
-    real::{Precision, Real},
-    tape::{Op, split::Body},
+    tape::{
+        Op,
+        real::{Precision, Real},
+        split::Body,
+    },
 };
 
 fn widths() -> Vec<(Level, usize)> {
@@ -177,7 +181,8 @@ fn what_is_no_body_is_not_written() {
     }
 }
 
-/// Machine code has none of these; the interpreter has a loop for shifts that leave something of a number, and another for the rest.
+/// Machine code has none of these; the interpreter has a loop for shifts that leave something of a number, and another for the
+/// rest.
 fn shifts_are_as_defined<T: Real>() {
     let bits = 8 * size_of::<T>() as u32;
     for places in [0, 1, bits - 1, bits, bits + 1, 200] {
@@ -254,10 +259,10 @@ fn rounding_is_to_nearest_whatever_the_caller_does() {
     assert_eq!(after & OTHER_ROUNDING, OTHER_ROUNDING);
 }
 
-/// The body of several steps that returns the states between has the bits of these steps, interpreted and as machine code: for states as
-/// they are between steps, and for velocities that are computed from a carry.
+/// The body of several steps that returns the states between has the bits of these steps, interpreted and as machine code: for
+/// states as they are between steps, and for velocities that are computed from a carry.
 #[test]
-fn a_trail_has_the_states_of_its_steps() {
+fn unrolled_steps_return_the_states_between() {
     let wanted = std::env::var("STEPWELL_FUZZ").ok().and_then(|n| n.parse::<u64>().ok()).map_or(800, |n| n / 500);
     let (mut seen, mut seen_carried) = (0, 0);
     for seed in 0..wanted.max(800) {
@@ -274,7 +279,7 @@ fn a_trail_has_the_states_of_its_steps() {
             continue; // it would read a result of the step as a number of the state
         }
         let (lanes, steps) = (random.one_of(&[1, 4, 8]), 1 + random.below(9));
-        let trail = body.trail(steps, state, [v, y]);
+        let unrolled = body.unrolled(steps, state, [v, y]);
         let inputs = Inputs::<f64>::new(random, &body, lanes, steps);
         // One after the other.
         let oracle = Interpreter::new(&body, lanes, Level::Baseline);
@@ -292,14 +297,14 @@ fn a_trail_has_the_states_of_its_steps() {
         // At once.
         let mut all = Inputs { steps: 1, ..inputs };
         all.state.truncate(state * lanes);
-        all.state.resize(trail.next.len() * lanes, 0.0);
+        all.state.resize(unrolled.next.len() * lanes, 0.0);
         let (level, widest) = if Level::Neon.here() { (Level::Neon, 2) } else { (Level::Avx2, 4) };
         let width = if lanes == 1 { 1 } else { widest };
         let block_vectors = random.one_of(&[1, lanes / width]);
         let blocks = lanes / width / block_vectors;
         let shape = Shape { level, bytes: 8, width, block_vectors, interleaved: block_vectors, blocks, resident: false };
-        let written = level.here().then(|| write(&trail, shape).expect("a kernel"));
-        let interpreter = Interpreter::new(&trail, lanes, Level::Baseline);
+        let written = level.here().then(|| write(&unrolled, shape).expect("a kernel"));
+        let interpreter = Interpreter::new(&unrolled, lanes, Level::Baseline);
         for kernel in
             [Some(&interpreter as &dyn Kernel), written.as_ref().map(|kernel| kernel as &dyn Kernel)].into_iter().flatten()
         {

@@ -14,8 +14,7 @@ use stepwell_core::{
         pack::{self, Make, Move, Packed, Trial},
         writer::{choose, write_if_it_gains, write_packed},
     },
-    real::Precision,
-    tape::{Id, Op, split::Body},
+    tape::{Id, Op, real::Precision, split::Body},
 };
 
 /// A body of several equal parts, each with numbers of the state of its own; some operations read those of another part instead.
@@ -37,8 +36,8 @@ fn alike(random: &mut Random, operations: usize, states: usize, copies: usize) -
     whole
 }
 
-/// Compares a random body, some operations of which are lanes of one vector, with the interpreter; returns on how many inputs, and how many
-/// instructions that move numbers between lanes there are.
+/// Compares a random body, some operations of which are lanes of one vector, with the interpreter; returns on how many inputs,
+/// and how many instructions that move numbers between lanes there are.
 fn one_packed(seed: u64) -> [usize; 2] {
     let random = &mut Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
     let operations = random.one_of(&[12, 30, 60, 250]);
@@ -110,7 +109,8 @@ fn ring(n: u32) -> Body {
     Body { ops, next: (v..v + n).chain(y..y + n).collect(), rows: 1, ..Body::default() }
 }
 
-/// Packings of a body with a mistake each: a number from another lane, halves or operands exchanged, a number of the state replaced by another.
+/// Packings of a body with a mistake each: a number from another lane, halves or operands exchanged, a number of the state
+/// replaced by another.
 fn mistaken(packed: &Packed) -> Vec<Packed> {
     let mut all = Vec::new();
     let mut mistake = |at: usize, make: Make, of: [u32; 3]| {

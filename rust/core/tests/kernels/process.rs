@@ -38,7 +38,7 @@ fn set_rounding(bits: u64) {
 }
 
 /// Runs with rounding upwards and small numbers taken for zero, and tells how is rounded afterwards.
-pub fn with_other_rounding<T>(f: impl FnOnce() -> T) -> (T, u64) {
+pub(crate) fn with_other_rounding<T>(f: impl FnOnce() -> T) -> (T, u64) {
     let before = rounding();
     set_rounding(before | crate::OTHER_ROUNDING);
     let made = f();

@@ -1,36 +1,37 @@
 //! Random bodies and inputs, the same from the same seed.
 
-use stepwell_core::{
+use stepwell_core::tape::{
+    Id, Op,
     real::{Precision, Real},
-    tape::{Id, Op, split::Body},
+    split::Body,
 };
 
 /// SplitMix64.
-pub struct Random(pub u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
-    pub fn bits(&mut self) -> u64 {
+    pub(crate) fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let x = (self.0 ^ self.0 >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
         x ^ x >> 31
     }
 
-    pub fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
 
     /// Once in so many times.
-    pub fn once_in(&mut self, n: usize) -> bool {
+    pub(crate) fn once_in(&mut self, n: usize) -> bool {
         self.below(n) == 0
     }
 
-    pub fn one_of<T: Copy>(&mut self, list: &[T]) -> T {
+    pub(crate) fn one_of<T: Copy>(&mut self, list: &[T]) -> T {
         list[self.below(list.len())]
     }
 
     /// A number: often an ordinary one, or else any bits, or what is rare: NaN, infinities, subnormal, zeros, huge, small.
-    pub fn number(&mut self) -> f64 {
+    pub(crate) fn number(&mut self) -> f64 {
         let sign = self.bits() & 1 << 63;
         let unit = (self.bits() >> 11) as f64 / (1u64 << 53) as f64;
         let size = match self.below(16) {
@@ -50,7 +51,7 @@ impl Random {
 
 impl Random {
     /// The same for either size of numbers: of 32 bits often any bits, or a subnormal one.
-    pub fn number_of<T: Real>(&mut self) -> T {
+    pub(crate) fn number_of<T: Real>(&mut self) -> T {
         match (T::PRECISION, self.below(8)) {
             (Precision::Single, 0) => T::from_pattern(self.bits()),
             (Precision::Single, 1) => T::from_pattern(self.bits() & 0x807F_FFFF),
@@ -61,7 +62,7 @@ impl Random {
 
 /// The same body for numbers of 32 bits.
 #[allow(dead_code, reason = "not all tests have such bodies")]
-pub fn in_single(body: Body) -> Body {
+pub(crate) fn in_single(body: Body) -> Body {
     let ops = body.ops.iter().map(|op| match *op {
         Op::Const(u64::MAX) => Op::Const(Precision::Single.all_bits()),
         Op::Const(bits) => Op::Const(Precision::Single.bits_of(f64::from_bits(bits))),
@@ -166,7 +167,7 @@ impl Maker<'_> {
 }
 
 /// A body of about so many operations.
-pub fn body(random: &mut Random, operations: usize, states: usize) -> Body {
+pub(crate) fn body(random: &mut Random, operations: usize, states: usize) -> Body {
     let (rows, uniforms, per_step) = (random.below(6), random.below(4), random.below(5));
     // Numbers of the state whose bits are promised, since their next values are.
     let sure_states: Vec<bool> = (0..states).map(|_| random.once_in(3)).collect();

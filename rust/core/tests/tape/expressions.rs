@@ -2,16 +2,20 @@
 
 use stepwell_core::{
     isa::Level,
-    run::stage::{Clock, PreparedStage, Stage},
-    spec::{Row, Spec, Table},
-    tape::{Id, Op, Tape, eval, fuse::fuse, split::HOLD_SLACK, split::split},
+    model::spec::{Row, Spec, Table},
+    stage::{Clock, PreparedStage, Stage},
+    tape::{
+        Id, Op, Tape, eval,
+        fuse::fuse,
+        split::{HOLD_SLACK, split},
+    },
 };
 
 use crate::random::Random;
 
 /// What expressions are of: the numbers of one member at one step.
 #[derive(Clone, Copy, Default)]
-pub struct Given<'a> {
+pub(crate) struct Given<'a> {
     pub state: &'a [f64],
     pub params: &'a [f64],
     pub h: f64,
@@ -30,7 +34,7 @@ fn sample(samples: &[f64], t: f64) -> f64 {
 }
 
 /// Operation after operation.
-pub fn evaluate(ops: &[Op], given: &Given) -> Vec<u64> {
+pub(crate) fn evaluate(ops: &[Op], given: &Given) -> Vec<u64> {
     let mut values: Vec<u64> = Vec::with_capacity(ops.len());
     for op in ops {
         let ([a, b, c], n) = op.operands();
@@ -49,7 +53,7 @@ pub fn evaluate(ops: &[Op], given: &Given) -> Vec<u64> {
 }
 
 /// The same bits, or both NaN: its sign and payload are not promised.
-pub fn same(a: u64, b: u64) -> bool {
+pub(crate) fn same(a: u64, b: u64) -> bool {
     a == b || (f64::from_bits(a).is_nan() && f64::from_bits(b).is_nan())
 }
 

@@ -1,7 +1,7 @@
 //! The words of instructions: the few dozen forms that kernels are made of.
 //!
-//! Every instruction is a word of 32 bits with the numbers of its registers at fixed places. Arm Architecture Reference Manual for
-//! A-profile, section C7.2 (vectors) and C6.2 (the others).
+//! Every instruction is a word of 32 bits with the numbers of its registers at fixed places. Arm Architecture Reference Manual
+//! for A-profile, section C7.2 (vectors) and C6.2 (the others).
 
 /// The word of an instruction for either size of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

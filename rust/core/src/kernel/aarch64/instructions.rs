@@ -2,23 +2,24 @@
 //!
 //! Operands are in registers, and most instructions have a register of its own for the result.
 //!
-//! **To add an operation**, give it a line in `doing`; if it is of a new kind, an arm in `make` as well.
+//! **To add an operation**, give it a line in `instruction`; if it is of a new kind, an arm in `make` as well.
 
 use super::encode::{self as n, Code, Form, General, Words};
 use crate::{
     kernel::{
         frame::place,
+        instruction_set::InstructionSet,
         machine::{Base, Counter, Machine, Place},
         plan::Step,
         shape::Shape,
-        write::{Value, Writer},
+        write::{MakeOperation, Value, Writer},
     },
     tape::Op,
 };
 
 /// An instruction, or a few that belong together.
 #[derive(Clone, Copy, Debug)]
-pub enum Doing {
+pub(crate) enum Instruction {
     /// Of two values.
     Two(Form),
     /// Of two values, the second first.
@@ -58,99 +59,58 @@ fn pointer(base: Base) -> General {
     })
 }
 
-impl Machine for Code {
-    type Doing = Doing;
+impl InstructionSet for Code {
+    type Instruction = Instruction;
 
-    // A jump reaches 2²⁷ bytes. An operation takes at most 23 instructions, 92 bytes: four for each of its operands and its result, four
-    // for a value that it spills, and three of its own.
+    fn instruction(&self, op: Op) -> Instruction {
+        let bits = 8 * self.size as u32;
+        match op {
+            Op::Add(..) => Instruction::Two(n::ADD),
+            Op::Sub(..) => Instruction::Two(n::SUB),
+            Op::Mul(..) => Instruction::Two(n::MUL),
+            Op::Div(..) => Instruction::Two(n::DIV),
+            Op::MulAdd(..) => Instruction::MulAdd,
+            Op::MulSub(..) => Instruction::MulSub,
+            Op::SubMul(..) => Instruction::SubMul,
+            Op::And(..) => Instruction::Two(n::AND),
+            Op::Or(..) => Instruction::Two(n::OR),
+            Op::Xor(..) => Instruction::Two(n::XOR),
+            Op::AddBits(..) => Instruction::Two(n::ADD_BITS),
+            Op::Sqrt(_) => Instruction::One(n::SQRT),
+            Op::Floor(_) => Instruction::One(n::FLOOR),
+            Op::ShiftUp(_, places) => Instruction::One(n::shift_up(bits, places)),
+            Op::ShiftDown(_, 0) => Instruction::Copy,
+            Op::ShiftDown(_, places) => Instruction::One(n::shift_down(bits, places)),
+            Op::Less(..) => Instruction::Turned(n::GREATER),
+            Op::LessEqual(..) => Instruction::Turned(n::GREATER_EQUAL),
+            Op::Equal(..) => Instruction::Two(n::EQUAL),
+            // What is not asked for gets a default here.
+            Op::Copy(_) | Op::Neg(_) | Op::Select(..) => Instruction::Copy,
+            Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => Instruction::Copy,
+            Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => Instruction::Copy,
+        }
+    }
+
+    fn negate(&self) -> (Instruction, Option<u64>) {
+        (Instruction::One(n::NEG), None)
+    }
+
+    fn select(&self, _is_mask: bool) -> Instruction {
+        Instruction::Select
+    }
+
+    fn pick(&self, _comparison: Op) -> Option<Instruction> {
+        None
+    }
+}
+
+impl Machine for Code {
+    // A jump reaches 2²⁷ bytes. An operation takes at most 23 instructions, 92 bytes: four for each of its operands and its
+    // result, four for a value that it spills, and three of its own.
     const MOST_OPERATIONS: usize = 1 << 20;
 
     fn new(shape: Shape, instructions: usize) -> Code {
         Code { bytes: Vec::with_capacity(8 * instructions + 512), width: shape.width, size: shape.bytes }
-    }
-
-    fn doing(&self, op: Op) -> Doing {
-        let bits = 8 * self.size as u32;
-        match op {
-            Op::Add(..) => Doing::Two(n::ADD),
-            Op::Sub(..) => Doing::Two(n::SUB),
-            Op::Mul(..) => Doing::Two(n::MUL),
-            Op::Div(..) => Doing::Two(n::DIV),
-            Op::MulAdd(..) => Doing::MulAdd,
-            Op::MulSub(..) => Doing::MulSub,
-            Op::SubMul(..) => Doing::SubMul,
-            Op::And(..) => Doing::Two(n::AND),
-            Op::Or(..) => Doing::Two(n::OR),
-            Op::Xor(..) => Doing::Two(n::XOR),
-            Op::AddBits(..) => Doing::Two(n::ADD_BITS),
-            Op::Sqrt(_) => Doing::One(n::SQRT),
-            Op::Floor(_) => Doing::One(n::FLOOR),
-            Op::ShiftUp(_, places) => Doing::One(n::shift_up(bits, places)),
-            Op::ShiftDown(_, 0) => Doing::Copy,
-            Op::ShiftDown(_, places) => Doing::One(n::shift_down(bits, places)),
-            Op::Less(..) => Doing::Turned(n::GREATER),
-            Op::LessEqual(..) => Doing::Turned(n::GREATER_EQUAL),
-            Op::Equal(..) => Doing::Two(n::EQUAL),
-            // What is not asked for gets a default here.
-            Op::Copy(_) | Op::Neg(_) | Op::Select(..) => Doing::Copy,
-            Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => Doing::Copy,
-            Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => Doing::Copy,
-        }
-    }
-
-    fn negate(&self) -> (Doing, Option<u64>) {
-        (Doing::One(n::NEG), None)
-    }
-
-    fn select(&self, _is_mask: bool) -> Doing {
-        Doing::Select
-    }
-
-    fn pick(&self, _comparison: Op) -> Option<Doing> {
-        None
-    }
-
-    fn make(writer: &mut Writer<Code>, step: &Step<Doing>, vector: usize, of: &[Value]) -> Option<u8> {
-        let mut registers = [0; 3];
-        for (register, value) in registers.iter_mut().zip(of) {
-            *register = writer.fetch(*value)?;
-        }
-        let [a, b, c] = registers;
-        match step.doing {
-            Doing::MulAdd if writer.shape.width > 1 => writer.fused(n::ADD_PRODUCT, false, step.id, vector, of),
-            Doing::MulSub if writer.shape.width > 1 => writer.fused(n::ADD_PRODUCT, true, step.id, vector, of),
-            Doing::SubMul if writer.shape.width > 1 => writer.fused(n::SUB_PRODUCT, false, step.id, vector, of),
-            Doing::Select => {
-                let to = writer.result_over(step.id, vector, of, of, &[])?;
-                let code = &mut writer.code;
-                match to {
-                    _ if to == b && to != a => code.three(n::INSERT_WHERE_NOT, to, c, a),
-                    _ if to == c && to != a => code.three(n::INSERT_WHERE, to, b, a),
-                    _ => {
-                        if to != a {
-                            code.move_vector(to, a);
-                        }
-                        code.three(n::CHOOSE, to, b, c);
-                    }
-                }
-                Some(to)
-            }
-            doing => {
-                let to = writer.result(step.id, vector, of)?;
-                let code = &mut writer.code;
-                match doing {
-                    Doing::Two(form) => code.three(form, to, a, b),
-                    Doing::Turned(form) => code.three(form, to, b, a),
-                    Doing::One(form) => code.two(form, to, a),
-                    Doing::MulAdd => code.fused(n::MUL_ADD, to, a, b, c),
-                    Doing::MulSub => code.fused(n::MUL_SUB, to, a, b, c),
-                    Doing::SubMul => code.fused(n::SUB_MUL, to, a, b, c),
-                    Doing::Copy | Doing::Select if to == a => {}
-                    Doing::Copy | Doing::Select => code.move_vector(to, a),
-                }
-                Some(to)
-            }
-        }
     }
 
     fn load(&mut self, register: u8, from: Place) {
@@ -231,6 +191,51 @@ impl Machine for Code {
     }
 }
 
+impl MakeOperation for Code {
+    fn make(writer: &mut Writer<Code>, step: &Step<Instruction>, vector: usize, of: &[Value]) -> Option<u8> {
+        let mut registers = [0; 3];
+        for (register, value) in registers.iter_mut().zip(of) {
+            *register = writer.fetch(*value)?;
+        }
+        let [a, b, c] = registers;
+        match step.instruction {
+            Instruction::MulAdd if writer.shape.width > 1 => writer.fused(n::ADD_PRODUCT, false, step.id, vector, of),
+            Instruction::MulSub if writer.shape.width > 1 => writer.fused(n::ADD_PRODUCT, true, step.id, vector, of),
+            Instruction::SubMul if writer.shape.width > 1 => writer.fused(n::SUB_PRODUCT, false, step.id, vector, of),
+            Instruction::Select => {
+                let to = writer.result_over(step.id, vector, of, of, &[])?;
+                let code = &mut writer.code;
+                match to {
+                    _ if to == b && to != a => code.three(n::INSERT_WHERE_NOT, to, c, a),
+                    _ if to == c && to != a => code.three(n::INSERT_WHERE, to, b, a),
+                    _ => {
+                        if to != a {
+                            code.move_vector(to, a);
+                        }
+                        code.three(n::CHOOSE, to, b, c);
+                    }
+                }
+                Some(to)
+            }
+            instruction => {
+                let to = writer.result(step.id, vector, of)?;
+                let code = &mut writer.code;
+                match instruction {
+                    Instruction::Two(form) => code.three(form, to, a, b),
+                    Instruction::Turned(form) => code.three(form, to, b, a),
+                    Instruction::One(form) => code.two(form, to, a),
+                    Instruction::MulAdd => code.fused(n::MUL_ADD, to, a, b, c),
+                    Instruction::MulSub => code.fused(n::MUL_SUB, to, a, b, c),
+                    Instruction::SubMul => code.fused(n::SUB_MUL, to, a, b, c),
+                    Instruction::Copy | Instruction::Select if to == a => {}
+                    Instruction::Copy | Instruction::Select => code.move_vector(to, a),
+                }
+                Some(to)
+            }
+        }
+    }
+}
+
 impl Writer<'_, Code> {
     /// Of vectors, the sum overwrites its term, which may have to change its sign before: the factors must then be elsewhere.
     fn fused(&mut self, words: Words, negated: bool, id: u32, vector: usize, of: &[Value]) -> Option<u8> {
@@ -239,8 +244,8 @@ impl Writer<'_, Code> {
         let (first, second) = (self.registers.of(a)?, self.registers.of(b)?);
         let mut apart = [first, second];
         if !negated {
-            // A product of the term itself is added to it as any other: all operands are read before the result is written. The place of
-            // the other factor is no place for it.
+            // A product of the term itself is added to it as any other: all operands are read before the result is written. The
+            // place of the other factor is no place for it.
             apart = [first, second].map(|factor| if factor != term { factor } else { u8::MAX });
         }
         let to = self.result_over(id, vector, of, &[c], &apart)?;

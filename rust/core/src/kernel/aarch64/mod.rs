@@ -1,6 +1,6 @@
 //! Machine code for AArch64, with NEON: vectors of two numbers of 64 bits, or of four of 32.
 //!
-//! [`instructions`] selects them for operations, [`encode`] has their bytes.
+//! `instructions` selects them for operations, `encode` has their bytes.
 
 #[allow(
     missing_docs,

@@ -1,12 +1,12 @@
 //! How many cycles a step of one member takes, by a model of a CPU that executes out of order.
 //!
-//! Each operation begins when its operands are there and a unit for it is free. Several steps are gone through, since a step begins before
-//! the one before it has ended. The numbers were measured on Zen 4, within 5 % of what the kernels take; Intel's CPUs have other numbers of
-//! the same order.
+//! Each operation begins when its operands are there and a unit for it is free. Several steps are gone through, since a step
+//! begins before the one before it has ended. The numbers were measured on Zen 4, within 5 % of what the kernels take; Intel's
+//! CPUs have other numbers of the same order.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-use super::{Make, Move, Packed};
+use super::packed::{Make, Move, Packed};
 use crate::tape::Op;
 
 /// Operations that a CPU begins in a cycle.
@@ -50,7 +50,7 @@ fn timing(make: &Make) -> Option<(usize, u64, u64)> {
 struct Unit {
     busy: Vec<u8>,
     units: u8,
-    /// All cycles before it are full, or earlier than anything that is still to come: operations ask in the order in which they are ready.
+    /// No request will start before this cycle: operations ask in the order in which they are ready.
     from: u64,
 }
 
@@ -79,7 +79,7 @@ impl Unit {
 }
 
 /// Cycles of a step, with the units that there are (`limited`) or with as many as there are operations.
-pub fn cycles(packed: &Packed, limited: bool) -> f64 {
+pub(crate) fn cycles(packed: &Packed, limited: bool) -> f64 {
     let count = packed.vectors.len();
     let timings: Vec<_> = packed.vectors.iter().map(|vector| timing(&vector.make)).collect();
     let made: Vec<usize> = (0..count).filter(|at| timings[*at].is_some()).collect();
@@ -128,6 +128,6 @@ pub fn cycles(packed: &Packed, limited: bool) -> f64 {
 }
 
 /// After how many cycles a vector is there, when what it is made of is.
-pub fn wait(make: &Make) -> u64 {
+pub(crate) fn wait(make: &Make) -> u64 {
     timing(make).map_or(0, |(_, _, wait)| wait)
 }

@@ -1,21 +1,21 @@
 //! Finds operations of one member that can be lanes of one vector.
 //!
-//! The lanes of a vector are operations of one kind at the same *height*: the longest chain of operations below them. So no lane depends on
-//! another, nor vectors on each other in a circle. It begins with what is surely worth it, roots and quotients, or with the next values of
-//! successive numbers of the state, such as the coordinates of a body. From each vector it goes on to the operands of its lanes and to
-//! what is made of them: if these are operations that fit, they become a vector, too.
+//! The lanes of a vector are operations of one kind at the same *height*: the longest chain of operations below them. So no lane
+//! depends on another, nor vectors on each other in a circle. It begins with what is surely worth it, roots and quotients, or
+//! with the next values of successive numbers of the state, such as the coordinates of a body. From each vector it goes on to the
+//! operands of its lanes and to what is made of them: if these are operations that fit, they become a vector, too.
 
 use std::{
     collections::VecDeque,
     hash::{DefaultHasher, Hash, Hasher},
 };
 
-use super::{MOST_LANES, Trial};
+use super::packed::{MOST_LANES, Trial};
 use crate::tape::{Id, Op, split::Body};
 
 /// Operations that are lanes of one vector.
 #[derive(Debug)]
-pub struct Packs {
+pub(crate) struct Packs {
     /// The operations of the body; of some that commute the operands have changed places, so that those of a vector are alike.
     pub ops: Vec<Op>,
     /// Two to four operations each.
@@ -26,17 +26,17 @@ pub struct Packs {
 
 impl Packs {
     /// Every operation alone.
-    pub fn none(body: &Body) -> Packs {
+    pub(crate) fn none(body: &Body) -> Packs {
         Packs { ops: body.ops.clone(), packs: Vec::new(), of: vec![None; body.ops.len()] }
     }
 
     /// Whether every operation is alone.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.packs.is_empty()
     }
 
     /// What a trial finds.
-    pub fn find(body: &Body, trial: Trial) -> Packs {
+    pub(crate) fn find(body: &Body, trial: Trial) -> Packs {
         let mut finder = Finder::new(body);
         if trial.together > 1 {
             for numbers in finder.successive(body, trial.together) {

@@ -1,15 +1,19 @@
 //! From operations that are lanes of one vector to vectors, with what moves numbers between lanes.
 //!
-//! An operation may need numbers that are in other vectors, or in another order. Then they are moved; or, where that is asked for and
-//! the numbers are there sooner so, they are made a second time in that order. So the places
-//! of bodies as pairs have them are kept beside the places themselves, from step to step, and nothing is moved before distances are known.
+//! An operation may need numbers that are in other vectors, or in another order. Then they are moved; or, where that is asked for
+//! and the numbers are there sooner so, they are made a second time in that order. So the places of bodies as pairs have them are
+//! kept beside the places themselves, from step to step, and nothing is moved before distances are known.
 
 use std::{
     cmp::Reverse,
     collections::{BinaryHeap, HashMap},
 };
 
-use super::{Make, Move, Packed, StateVector, Vector, estimate, find::Packs};
+use super::{
+    estimate,
+    find::Packs,
+    packed::{Make, Move, Packed, StateVector, Vector},
+};
 use crate::tape::{Id, Op, split::Body};
 
 /// So many operations are gone back to see when numbers would be there if they were made a second time.
@@ -18,7 +22,7 @@ const DEPTH: usize = 6;
 const MOST_AGAIN: f64 = 0.5;
 
 /// The vectors of a body; None if they depend on each other in a circle, which operations of the same height do not.
-pub fn lower(body: &Body, packs: &Packs, again: bool) -> Option<Packed> {
+pub(crate) fn lower(body: &Body, packs: &Packs, again: bool) -> Option<Packed> {
     let count = body.ops.len();
     let mut leaves: Vec<Vec<Id>> = vec![Vec::new(); body.next.len()];
     for (id, op) in body.ops.iter().enumerate() {
@@ -217,7 +221,8 @@ impl Lower<'_> {
         vector
     }
 
-    /// When these numbers can be there, in cycles from the start of the step, if they are moved and if they are made a second time.
+    /// When these numbers can be there, in cycles from the start of the step, if they are moved and if they are made a second
+    /// time.
     fn times(&self, ids: &[Id], depth: usize) -> (u64, Option<u64>) {
         let places: Option<Vec<(u32, u8)>> = ids.iter().map(|id| self.places[*id as usize]).collect();
         // Each a lane of a vector, which is only needed in another order.

@@ -2,22 +2,22 @@
 
 use std::collections::HashMap;
 
-use super::{MOST_LANES, Make, Packed};
+use super::packed::{MOST_LANES, Make, Packed};
 use crate::{
     kernel::{
-        machine::Machine,
-        plan::{Packing, Plan, Source, Step, masks},
+        instruction_set::InstructionSet,
+        plan::{KernelPlan, Packing, Source, Step, masks},
     },
     tape::{Op, split::Body},
 };
 
-impl<D: Copy> Plan<D> {
+impl<I: Copy> KernelPlan<I> {
     /// For vectors of one member's numbers. None if the machine has no instructions for them.
-    pub fn packed<M: Machine<Doing = D>>(body: &Body, packed: &Packed, machine: &M) -> Option<Plan<D>> {
+    pub(crate) fn packed<M: InstructionSet<Instruction = I>>(body: &Body, packed: &Packed, machine: &M) -> Option<KernelPlan<I>> {
         if !M::PACKS {
             return None;
         }
-        let mut plan = Plan {
+        let mut plan = KernelPlan {
             sources: Vec::with_capacity(packed.vectors.len() + 1),
             steps: Vec::with_capacity(packed.vectors.len()),
             next: packed.state.iter().map(|state| Some(state.next)).collect(),
@@ -56,16 +56,16 @@ impl<D: Copy> Plan<D> {
             let step = match &vector.make {
                 Make::Move(to) => Step::new(machine.moving(*to), id as u32, vector.of()),
                 Make::Op(Op::Neg(_)) => match machine.negate() {
-                    (doing, None) => Step::new(doing, id as u32, vector.of()),
-                    (doing, Some(bits)) => {
+                    (instruction, None) => Step::new(instruction, id as u32, vector.of()),
+                    (instruction, Some(bits)) => {
                         let constant = homes.known.get(&bits).copied();
                         let sign = constant.unwrap_or_else(|| packed.vectors.len() as u32 + homes.known.len() as u32);
                         homes.known.insert(bits, sign);
-                        Step::new(doing, id as u32, &[vector.of[0], sign])
+                        Step::new(instruction, id as u32, &[vector.of[0], sign])
                     }
                 },
                 Make::Op(Op::Select(..)) => Step::new(machine.select(is_mask(0)), id as u32, vector.of()),
-                Make::Op(op) => Step::new(machine.doing(*op), id as u32, vector.of()),
+                Make::Op(op) => Step::new(machine.instruction(*op), id as u32, vector.of()),
                 Make::State(_) | Make::Fixed(_) | Make::Now(_) => continue,
             };
             plan.steps.push(step);

@@ -1,6 +1,6 @@
 //! Whether vectors are what the writer relies on: nothing outside of a tile is read or written.
 
-use super::{MOST_LANES, Make, Move, Packed, Vector};
+use super::packed::{MOST_LANES, Make, Move, Packed, Vector};
 use crate::tape::{Op, split::Body};
 
 impl Packed {
@@ -28,7 +28,8 @@ impl Packed {
             Make::Move(_) => 1,
             Make::State(_) | Make::Fixed(_) | Make::Now(_) => 0,
         };
-        // What changes from step to step is a single number in memory: only moves, which fetch it, may take it for the lane of a vector.
+        // What changes from step to step is a single number in memory: only moves, which fetch it, may take it for the lane of a
+        // vector.
         let is_whole = |of: &u32| vector.width == 1 || !matches!(self.vectors[*of as usize].make, Make::Now(_));
         matches!(vector.width, 1 | 2 | 4)
             && vector.operands as usize == operands

@@ -1,12 +1,12 @@
 //! The bytes of instructions: the few dozen forms that kernels are made of.
 //!
-//! An instruction on vectors is prefix, opcode, operands, and perhaps a byte behind. The prefix is VEX (AVX2: 16 registers, a memory
-//! operand is a whole vector) or EVEX (AVX-512: 32 registers, a memory operand may be one number for all lanes). Both say the same
-//! things, so that one table of [`Form`]s serves both. Intel's manual, volume 2, sections 2.3 and 2.7.
+//! An instruction on vectors is prefix, opcode, operands, and perhaps a byte behind. The prefix is VEX (AVX2: 16 registers, a
+//! memory operand is a whole vector) or EVEX (AVX-512: 32 registers, a memory operand may be one number for all lanes). Both say
+//! the same things, so that one table of [`Form`]s serves both. Intel's manual, volume 2, sections 2.3 and 2.7.
 
 /// An opcode and what selects it.
 #[derive(Clone, Copy, Debug)]
-pub struct Form {
+pub(crate) struct Form {
     /// The opcode map: 1 is 0F, 2 is 0F 38, 3 is 0F 3A.
     pub map: u8,
     /// Of numbers of 64 bits.
@@ -19,7 +19,7 @@ pub struct Form {
 
 /// The mandatory prefix (0 none, 1 is 66, 2 is F3, 3 is F2) and the opcode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Codes {
+pub(crate) struct Codes {
     /// Over vectors.
     pub vector: (u8, u8),
     /// For the first number of a vector only, if there is such an instruction.
@@ -58,24 +58,24 @@ const P66: u8 = 1;
 const PF3: u8 = 2;
 const PF2: u8 = 3;
 
-pub const ADD: Form = arithmetic(0x58);
-pub const MUL: Form = arithmetic(0x59);
-pub const SUB: Form = arithmetic(0x5C);
-pub const DIV: Form = arithmetic(0x5E);
+pub(crate) const ADD: Form = arithmetic(0x58);
+pub(crate) const MUL: Form = arithmetic(0x59);
+pub(crate) const SUB: Form = arithmetic(0x5C);
+pub(crate) const DIV: Form = arithmetic(0x5E);
 /// The lesser, or the greater of two; the second if either is a NaN or both are zeros.
-pub const MINIMUM: Form = arithmetic(0x5D);
-pub const MAXIMUM: Form = arithmetic(0x5F);
-pub const SQRT: Form = arithmetic(0x51);
-pub const COMPARE: Form = arithmetic(0xC2);
+pub(crate) const MINIMUM: Form = arithmetic(0x5D);
+pub(crate) const MAXIMUM: Form = arithmetic(0x5F);
+pub(crate) const SQRT: Form = arithmetic(0x51);
+pub(crate) const COMPARE: Form = arithmetic(0xC2);
 /// Rounds to a whole number as the byte behind says.
-pub const ROUND: Form = Form {
+pub(crate) const ROUND: Form = Form {
     double: Codes { first: Some((P66, 0x0B)), ..codes(P66, 0x09) },
     single: Codes { first: Some((P66, 0x0A)), ..codes(P66, 0x08) },
     ..form(3, P66, 0x09)
 };
 /// A fused multiply-add overwrites one of its operands; which one, the instruction says.
 #[derive(Clone, Copy, Debug)]
-pub struct Fused {
+pub(crate) struct Fused {
     /// to ← to · second ± first
     pub over_factor: Form,
     /// to ← first · to ± second
@@ -93,48 +93,48 @@ const fn fused(opcode: u8) -> Fused {
 }
 
 /// a · b + c
-pub const MUL_ADD: Fused = fused(0x98);
+pub(crate) const MUL_ADD: Fused = fused(0x98);
 /// a · b − c
-pub const MUL_SUB: Fused = fused(0x9A);
+pub(crate) const MUL_SUB: Fused = fused(0x9A);
 /// c − a · b
-pub const SUB_MUL: Fused = fused(0x9C);
-pub const AND: Form = plain(0x54);
+pub(crate) const SUB_MUL: Fused = fused(0x9C);
+pub(crate) const AND: Form = plain(0x54);
 /// Not the first, and the second.
-pub const AND_NOT: Form = plain(0x55);
-pub const OR: Form = plain(0x56);
-pub const XOR: Form = plain(0x57);
-pub const ADD_BITS: Form = sized(1, P66, 0xD4, 0xFE);
+pub(crate) const AND_NOT: Form = plain(0x55);
+pub(crate) const OR: Form = plain(0x56);
+pub(crate) const XOR: Form = plain(0x57);
+pub(crate) const ADD_BITS: Form = sized(1, P66, 0xD4, 0xFE);
 /// Shifts by the byte behind; the place of the result in the operands says which way, [`UP`] or [`DOWN`].
-pub const SHIFT: Form = sized(1, P66, 0x73, 0x72);
-pub const UP: u8 = 6;
-pub const DOWN: u8 = 2;
+pub(crate) const SHIFT: Form = sized(1, P66, 0x73, 0x72);
+pub(crate) const UP: u8 = 6;
+pub(crate) const DOWN: u8 = 2;
 /// The second where a bit of the mask is set, else the first (EVEX).
-pub const BLEND: Form = form(2, P66, 0x65);
+pub(crate) const BLEND: Form = form(2, P66, 0x65);
 /// The second where the sign of a third register is set, else the first (VEX).
-pub const BLEND_BY_SIGN: Form = sized(3, P66, 0x4B, 0x4A);
+pub(crate) const BLEND_BY_SIGN: Form = sized(3, P66, 0x4B, 0x4A);
 /// Any function of three bits (EVEX).
-pub const BITS_OF_THREE: Form = form(3, P66, 0x25);
+pub(crate) const BITS_OF_THREE: Form = form(3, P66, 0x25);
 /// All ones where a bit of the mask is set (EVEX).
-pub const SPREAD_MASK: Form = form(2, PF3, 0x38);
-pub const LOAD: Form = arithmetic(0x10);
-pub const STORE: Form = arithmetic(0x11);
+pub(crate) const SPREAD_MASK: Form = form(2, PF3, 0x38);
+pub(crate) const LOAD: Form = arithmetic(0x10);
+pub(crate) const STORE: Form = arithmetic(0x11);
 /// From register to register.
-pub const MOVE: Form = plain(0x28);
+pub(crate) const MOVE: Form = plain(0x28);
 /// One number to all lanes.
-pub const BROADCAST: Form = sized(2, P66, 0x19, 0x18);
+pub(crate) const BROADCAST: Form = sized(2, P66, 0x19, 0x18);
 
 /// A vector of two: a number of the first and one of the second, by the byte behind.
-pub const PICK: Form = form(1, P66, 0xC6);
+pub(crate) const PICK: Form = form(1, P66, 0xC6);
 /// The high half of a vector of four; the operands are the other way round: the second is the result.
-pub const HIGH: Form = form(3, P66, 0x19);
+pub(crate) const HIGH: Form = form(3, P66, 0x19);
 /// A vector of four: the low half of the first, and the second as the high half.
-pub const JOIN: Form = form(3, P66, 0x18);
+pub(crate) const JOIN: Form = form(3, P66, 0x18);
 /// Numbers of a vector of four in another order, by the byte behind.
-pub const PERMUTE: Form = Form { wide: true, ..form(3, P66, 0x01) };
+pub(crate) const PERMUTE: Form = Form { wide: true, ..form(3, P66, 0x01) };
 
 /// A general register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum General {
+pub(crate) enum General {
     Rax = 0,
     Rcx = 1,
     Rdx = 2,
@@ -149,7 +149,7 @@ pub enum General {
 
 /// A place in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Memory {
+pub(crate) struct Memory {
     pub base: General,
     pub at: i32,
     /// What is in rax is added, as so many numbers.
@@ -159,21 +159,21 @@ pub struct Memory {
 }
 
 impl Memory {
-    pub fn new(base: General, at: i32) -> Memory {
+    pub(crate) fn new(base: General, at: i32) -> Memory {
         Memory { base, at, indexed: false, broadcast: false }
     }
 }
 
 /// Where an operand of a vector instruction is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Operand {
+pub(crate) enum Operand {
     Register(u8),
     Memory(Memory),
 }
 
 /// Instructions, as bytes.
 #[derive(Debug)]
-pub struct Code {
+pub(crate) struct Code {
     pub bytes: Vec<u8>,
     /// EVEX and not VEX.
     pub evex: bool,
@@ -185,24 +185,24 @@ pub struct Code {
 
 impl Code {
     /// What there is of a form for numbers of this size.
-    pub fn codes(&self, form: Form) -> Codes {
+    pub(crate) fn codes(&self, form: Form) -> Codes {
         if self.size == 8 { form.double } else { form.single }
     }
 
-    /// An instruction on vectors: `to` ← `first`, `second`. In a kernel of width one it works on the first number only, where there is
-    /// such an instruction, and on 128 bits otherwise. What has no `first` is given 0.
-    pub fn vector(&mut self, form: Form, to: u8, first: u8, second: Operand) {
+    /// An instruction on vectors: `to` ← `first`, `second`. In a kernel of width one it works on the first number only, where
+    /// there is such an instruction, and on 128 bits otherwise. What has no `first` is given 0.
+    pub(crate) fn vector(&mut self, form: Form, to: u8, first: u8, second: Operand) {
         self.masked(form, to, first, second, 0);
     }
 
     /// As `vector`, with a byte behind.
-    pub fn vector_and_byte(&mut self, form: Form, to: u8, first: u8, second: Operand, byte: u8) {
+    pub(crate) fn vector_and_byte(&mut self, form: Form, to: u8, first: u8, second: Operand, byte: u8) {
         self.vector(form, to, first, second);
         self.bytes.push(byte);
     }
 
     /// As `vector`, with a mask register.
-    pub fn masked(&mut self, form: Form, to: u8, first: u8, second: Operand, mask: u8) {
+    pub(crate) fn masked(&mut self, form: Form, to: u8, first: u8, second: Operand, mask: u8) {
         let codes = self.codes(form);
         let first_only = codes.first.filter(|_| self.width == 1);
         let (prefix, opcode) = first_only.unwrap_or(codes.vector);
@@ -270,29 +270,30 @@ impl Code {
         self.operand(register & 7, operand, 1);
     }
 
-    pub fn load_general(&mut self, to: General, from: Memory) {
+    pub(crate) fn load_general(&mut self, to: General, from: Memory) {
         self.general(0x8B, to as u8, Operand::Memory(from));
     }
 
-    pub fn move_general(&mut self, to: General, from: General) {
+    pub(crate) fn move_general(&mut self, to: General, from: General) {
         self.general(0x8B, to as u8, Operand::Register(from as u8));
     }
 
     /// A number of at most 31 bits.
-    pub fn set_general(&mut self, to: General, value: i32) {
+    pub(crate) fn set_general(&mut self, to: General, value: i32) {
         self.general(0xC7, 0, Operand::Register(to as u8));
         self.bytes.extend(value.to_le_bytes());
     }
 
-    pub fn add_general(&mut self, to: General, value: i32) {
+    pub(crate) fn add_general(&mut self, to: General, value: i32) {
         if value != 0 {
             self.general(0x81, 0, Operand::Register(to as u8));
             self.bytes.extend(value.to_le_bytes());
         }
     }
 
-    /// Pads with nops, so that what follows stands at a multiple of 64 bytes: a loop then takes as few lines of the cache as it can.
-    pub fn pad(&mut self) {
+    /// Pads with nops, so that what follows stands at a multiple of 64 bytes: a loop then takes as few lines of the cache as it
+    /// can.
+    pub(crate) fn pad(&mut self) {
         while !self.bytes.len().is_multiple_of(64) {
             // Nops of up to eight bytes, as the manual recommends them.
             const NOPS: [&[u8]; 8] = [
@@ -311,7 +312,7 @@ impl Code {
     }
 
     /// Counts down, and jumps back unless that makes zero.
-    pub fn decrement_and_jump(&mut self, counter: General, to: usize) {
+    pub(crate) fn decrement_and_jump(&mut self, counter: General, to: usize) {
         self.general(0xFF, 1, Operand::Register(counter as u8));
         let from = self.bytes.len() + 6;
         self.bytes.extend([0x0F, 0x85]);
@@ -319,24 +320,24 @@ impl Code {
     }
 
     /// Keeps rbx, which belongs to the caller, and puts the argument there.
-    pub fn keep_rbx(&mut self, argument: General) {
+    pub(crate) fn keep_rbx(&mut self, argument: General) {
         self.bytes.push(0x53);
         self.move_general(General::Rbx, argument);
     }
 
     /// Gives rbx back, and returns.
-    pub fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         self.bytes.extend([0xC5, 0xF8, 0x77]); // vzeroupper
         self.bytes.extend([0x5B, 0xC3]); // pop rbx, ret
     }
 
     /// Keeps how numbers are rounded.
-    pub fn keep_rounding(&mut self, to: Memory) {
+    pub(crate) fn keep_rounding(&mut self, to: Memory) {
         self.bytes.extend([0x0F, 0xAE]);
         self.operand(3, Operand::Memory(to), 1);
     }
 
-    pub fn set_rounding(&mut self, from: Memory) {
+    pub(crate) fn set_rounding(&mut self, from: Memory) {
         self.bytes.extend([0x0F, 0xAE]);
         self.operand(2, Operand::Memory(from), 1);
     }

@@ -1,25 +1,26 @@
 //! The instructions of AVX2 and AVX-512 for the operations of a tape.
 //!
-//! **To add an operation**, give it a line in `doing`; if it is of a new kind, an arm in `make` as well.
+//! **To add an operation**, give it a line in `instruction`; if it is of a new kind, an arm in `make` as well.
 
 use super::encode::{self as x, Code, Form, General, Memory, Operand};
 use crate::{
     isa::Level,
     kernel::{
         frame::place,
+        instruction_set::InstructionSet,
         machine::{Base, Counter, Machine, Place},
         pack::Move,
         plan::{Source, Step},
         registers::NONE,
         shape::Shape,
-        write::{Value, Where, Writer},
+        write::{MakeOperation, Value, Where, Writer},
     },
     tape::Op,
 };
 
 /// An instruction, or a few that belong together.
 #[derive(Clone, Copy, Debug)]
-pub enum Doing {
+pub(crate) enum Instruction {
     /// Of two values. Whether they may be exchanged.
     Two(Form, bool),
     /// Of one, with or without an immediate byte.
@@ -47,7 +48,7 @@ const EQUAL: u8 = 0;
 const FLOOR: u8 = 9;
 
 /// The predicate that says the same of two values in the other order.
-pub fn turned(predicate: u8) -> u8 {
+pub(crate) fn turned(predicate: u8) -> u8 {
     match predicate {
         LESS => 0x1E,
         LESS_EQUAL => 0x1D,
@@ -90,13 +91,61 @@ fn memory(place: Place) -> Memory {
     Memory { indexed: place.held.is_some(), ..Memory::new(pointer(place.base), place.at) }
 }
 
-impl Machine for Code {
-    type Doing = Doing;
-
-    // Jumps fit into 31 bits: an operation takes at most some hundred bytes.
-    const MOST_OPERATIONS: usize = 1 << 22;
+impl InstructionSet for Code {
+    type Instruction = Instruction;
 
     const PACKS: bool = true;
+
+    fn instruction(&self, op: Op) -> Instruction {
+        match op {
+            Op::Add(..) => Instruction::Two(x::ADD, true),
+            Op::Sub(..) => Instruction::Two(x::SUB, false),
+            Op::Mul(..) => Instruction::Two(x::MUL, true),
+            Op::Div(..) => Instruction::Two(x::DIV, false),
+            Op::MulAdd(..) => Instruction::Fused(x::MUL_ADD),
+            Op::MulSub(..) => Instruction::Fused(x::MUL_SUB),
+            Op::SubMul(..) => Instruction::Fused(x::SUB_MUL),
+            Op::And(..) => Instruction::Two(x::AND, true),
+            Op::Or(..) => Instruction::Two(x::OR, true),
+            Op::Xor(..) => Instruction::Two(x::XOR, true),
+            Op::AddBits(..) => Instruction::Two(x::ADD_BITS, true),
+            Op::Sqrt(_) => Instruction::One(x::SQRT, None),
+            Op::Floor(_) => Instruction::One(x::ROUND, Some(FLOOR)),
+            Op::ShiftUp(_, n) => Instruction::Shift(x::UP, n as u8),
+            Op::ShiftDown(_, n) => Instruction::Shift(x::DOWN, n as u8),
+            Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) => Instruction::Compare(predicate(op)),
+            // What is not asked for gets a default here.
+            Op::Copy(_) | Op::Neg(_) | Op::Select(..) => Instruction::Copy,
+            Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => Instruction::Copy,
+            Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => Instruction::Copy,
+        }
+    }
+
+    fn negate(&self) -> (Instruction, Option<u64>) {
+        (Instruction::Two(x::XOR, true), Some(1 << (8 * self.size - 1)))
+    }
+
+    fn select(&self, is_mask: bool) -> Instruction {
+        Instruction::Select(is_mask)
+    }
+
+    /// With a mask register.
+    fn pick(&self, comparison: Op) -> Option<Instruction> {
+        self.evex.then(|| Instruction::Pick(predicate(comparison)))
+    }
+
+    fn min_or_max(&self, is_greater: bool) -> Option<Instruction> {
+        Some(Instruction::Two(if is_greater { x::MAXIMUM } else { x::MINIMUM }, false))
+    }
+
+    fn moving(&self, to: Move) -> Instruction {
+        Instruction::Move(to)
+    }
+}
+
+impl Machine for Code {
+    // Jumps fit into 31 bits: an operation takes at most some hundred bytes.
+    const MOST_OPERATIONS: usize = 1 << 22;
 
     fn new(shape: Shape, instructions: usize) -> Code {
         Code {
@@ -107,120 +156,8 @@ impl Machine for Code {
         }
     }
 
-    fn doing(&self, op: Op) -> Doing {
-        match op {
-            Op::Add(..) => Doing::Two(x::ADD, true),
-            Op::Sub(..) => Doing::Two(x::SUB, false),
-            Op::Mul(..) => Doing::Two(x::MUL, true),
-            Op::Div(..) => Doing::Two(x::DIV, false),
-            Op::MulAdd(..) => Doing::Fused(x::MUL_ADD),
-            Op::MulSub(..) => Doing::Fused(x::MUL_SUB),
-            Op::SubMul(..) => Doing::Fused(x::SUB_MUL),
-            Op::And(..) => Doing::Two(x::AND, true),
-            Op::Or(..) => Doing::Two(x::OR, true),
-            Op::Xor(..) => Doing::Two(x::XOR, true),
-            Op::AddBits(..) => Doing::Two(x::ADD_BITS, true),
-            Op::Sqrt(_) => Doing::One(x::SQRT, None),
-            Op::Floor(_) => Doing::One(x::ROUND, Some(FLOOR)),
-            Op::ShiftUp(_, n) => Doing::Shift(x::UP, n as u8),
-            Op::ShiftDown(_, n) => Doing::Shift(x::DOWN, n as u8),
-            Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) => Doing::Compare(predicate(op)),
-            // What is not asked for gets a default here.
-            Op::Copy(_) | Op::Neg(_) | Op::Select(..) => Doing::Copy,
-            Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => Doing::Copy,
-            Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => Doing::Copy,
-        }
-    }
-
-    fn negate(&self) -> (Doing, Option<u64>) {
-        (Doing::Two(x::XOR, true), Some(1 << (8 * self.size - 1)))
-    }
-
-    fn select(&self, is_mask: bool) -> Doing {
-        Doing::Select(is_mask)
-    }
-
-    /// With a mask register.
-    fn pick(&self, comparison: Op) -> Option<Doing> {
-        self.evex.then(|| Doing::Pick(predicate(comparison)))
-    }
-
-    fn min_or_max(&self, is_greater: bool) -> Option<Doing> {
-        Some(Doing::Two(if is_greater { x::MAXIMUM } else { x::MINIMUM }, false))
-    }
-
-    fn moving(&self, to: Move) -> Doing {
-        Doing::Move(to)
-    }
-
     fn of_width(&mut self, width: usize) {
         self.width = width;
-    }
-
-    fn make(writer: &mut Writer<Code>, step: &Step<Doing>, vector: usize, of: &[Value]) -> Option<u8> {
-        Some(match step.doing {
-            Doing::Two(form, commutes) => {
-                let (first, second) = if commutes { writer.in_order(of[0], of[1]) } else { (of[0], of[1]) };
-                let first = writer.fetch(first)?;
-                let second = writer.operand(second, form)?;
-                let to = writer.result(step.id, vector, of)?;
-                writer.code.vector(form, to, first, second);
-                to
-            }
-            Doing::One(form, byte) => {
-                // Of single numbers such an instruction has two operands: the other lanes are those of the first.
-                let single = writer.code.width == 1 && form.double.first.is_some();
-                let second = if single { Operand::Register(writer.fetch(of[0])?) } else { writer.operand(of[0], form)? };
-                let first = if let (true, Operand::Register(register)) = (single, second) { register } else { 0 };
-                let to = writer.result(step.id, vector, of)?;
-                writer.code.vector(form, to, first, second);
-                writer.code.bytes.extend(byte);
-                to
-            }
-            Doing::Fused(fused) => writer.fused(fused, step, vector, of)?,
-            Doing::Shift(way, places) => {
-                let second =
-                    if writer.code.evex { writer.operand(of[0], x::SHIFT)? } else { Operand::Register(writer.fetch(of[0])?) };
-                let to = writer.result(step.id, vector, of)?;
-                writer.code.vector_and_byte(x::SHIFT, way, to, second, places);
-                to
-            }
-            Doing::Compare(predicate) => {
-                let (first, second, predicate) = writer.compared(of[0], of[1], predicate)?;
-                let to = writer.result(step.id, vector, of)?;
-                if writer.code.evex {
-                    writer.code.vector_and_byte(x::COMPARE, 1, first, second, predicate);
-                    writer.code.vector(x::SPREAD_MASK, to, 0, Operand::Register(1));
-                } else {
-                    writer.code.vector_and_byte(x::COMPARE, to, first, second, predicate);
-                }
-                to
-            }
-            Doing::Pick(predicate) => {
-                let (first, second, predicate) = writer.compared(of[0], of[1], predicate)?;
-                writer.code.vector_and_byte(x::COMPARE, 1, first, second, predicate);
-                let no = writer.fetch(of[3])?;
-                let yes = writer.operand(of[2], x::BLEND)?;
-                let to = writer.result(step.id, vector, of)?;
-                writer.code.masked(x::BLEND, to, no, yes, 1);
-                to
-            }
-            Doing::Select(is_mask) => writer.select(is_mask, step, vector, of)?,
-            Doing::Move(to) => writer.moved(to, step, vector, of)?,
-            Doing::Copy => {
-                let from = writer.operand(of[0], x::LOAD)?;
-                let to = writer.result(step.id, vector, of)?;
-                match from {
-                    Operand::Register(from) if from == to => {}
-                    Operand::Register(_) => writer.code.vector(x::MOVE, to, 0, from),
-                    Operand::Memory(_) => {
-                        writer.load(of[0], to);
-                        writer.registers.release(of[0]);
-                    }
-                }
-                to
-            }
-        })
     }
 
     fn load(&mut self, register: u8, from: Place) {
@@ -292,6 +229,74 @@ impl Machine for Code {
     }
 }
 
+impl MakeOperation for Code {
+    fn make(writer: &mut Writer<Code>, step: &Step<Instruction>, vector: usize, of: &[Value]) -> Option<u8> {
+        Some(match step.instruction {
+            Instruction::Two(form, commutes) => {
+                let (first, second) = if commutes { writer.in_order(of[0], of[1]) } else { (of[0], of[1]) };
+                let first = writer.fetch(first)?;
+                let second = writer.operand(second, form)?;
+                let to = writer.result(step.id, vector, of)?;
+                writer.code.vector(form, to, first, second);
+                to
+            }
+            Instruction::One(form, byte) => {
+                // Of single numbers such an instruction has two operands: the other lanes are those of the first.
+                let single = writer.code.width == 1 && form.double.first.is_some();
+                let second = if single { Operand::Register(writer.fetch(of[0])?) } else { writer.operand(of[0], form)? };
+                let first = if let (true, Operand::Register(register)) = (single, second) { register } else { 0 };
+                let to = writer.result(step.id, vector, of)?;
+                writer.code.vector(form, to, first, second);
+                writer.code.bytes.extend(byte);
+                to
+            }
+            Instruction::Fused(fused) => writer.fused(fused, step, vector, of)?,
+            Instruction::Shift(way, places) => {
+                let second =
+                    if writer.code.evex { writer.operand(of[0], x::SHIFT)? } else { Operand::Register(writer.fetch(of[0])?) };
+                let to = writer.result(step.id, vector, of)?;
+                writer.code.vector_and_byte(x::SHIFT, way, to, second, places);
+                to
+            }
+            Instruction::Compare(predicate) => {
+                let (first, second, predicate) = writer.compared(of[0], of[1], predicate)?;
+                let to = writer.result(step.id, vector, of)?;
+                if writer.code.evex {
+                    writer.code.vector_and_byte(x::COMPARE, 1, first, second, predicate);
+                    writer.code.vector(x::SPREAD_MASK, to, 0, Operand::Register(1));
+                } else {
+                    writer.code.vector_and_byte(x::COMPARE, to, first, second, predicate);
+                }
+                to
+            }
+            Instruction::Pick(predicate) => {
+                let (first, second, predicate) = writer.compared(of[0], of[1], predicate)?;
+                writer.code.vector_and_byte(x::COMPARE, 1, first, second, predicate);
+                let no = writer.fetch(of[3])?;
+                let yes = writer.operand(of[2], x::BLEND)?;
+                let to = writer.result(step.id, vector, of)?;
+                writer.code.masked(x::BLEND, to, no, yes, 1);
+                to
+            }
+            Instruction::Select(is_mask) => writer.select(is_mask, step, vector, of)?,
+            Instruction::Move(to) => writer.moved(to, step, vector, of)?,
+            Instruction::Copy => {
+                let from = writer.operand(of[0], x::LOAD)?;
+                let to = writer.result(step.id, vector, of)?;
+                match from {
+                    Operand::Register(from) if from == to => {}
+                    Operand::Register(_) => writer.code.vector(x::MOVE, to, 0, from),
+                    Operand::Memory(_) => {
+                        writer.load(of[0], to);
+                        writer.registers.release(of[0]);
+                    }
+                }
+                to
+            }
+        })
+    }
+}
+
 impl Writer<'_, Code> {
     /// The value in memory as an operand, if this instruction can take it from there.
     fn in_place(&self, value: Value, form: Form) -> Option<Memory> {
@@ -337,7 +342,7 @@ impl Writer<'_, Code> {
     }
 
     /// All operands are fetched: they may be shorter in memory than what an instruction would read there.
-    fn moved(&mut self, how: Move, step: &Step<Doing>, vector: usize, of: &[Value]) -> Option<u8> {
+    fn moved(&mut self, how: Move, step: &Step<Instruction>, vector: usize, of: &[Value]) -> Option<u8> {
         let first = self.fetch(of[0])?;
         let second = match of.get(1) {
             Some(value) => self.fetch(*value)?,
@@ -376,7 +381,7 @@ impl Writer<'_, Code> {
     }
 
     /// One of three operands is overwritten, and one may come from memory.
-    fn fused(&mut self, fused: x::Fused, step: &Step<Doing>, vector: usize, of: &[Value]) -> Option<u8> {
+    fn fused(&mut self, fused: x::Fused, step: &Step<Instruction>, vector: usize, of: &[Value]) -> Option<u8> {
         let &[a, b, c] = of else { return None };
         let (a, b) = self.in_order(a, b);
         let a = self.fetch(a)?;
@@ -413,7 +418,7 @@ impl Writer<'_, Code> {
         Some(to)
     }
 
-    fn select(&mut self, is_mask: bool, step: &Step<Doing>, vector: usize, of: &[Value]) -> Option<u8> {
+    fn select(&mut self, is_mask: bool, step: &Step<Instruction>, vector: usize, of: &[Value]) -> Option<u8> {
         let &[m, a, b] = of else { return None };
         if self.code.evex {
             // A function of three bits overwrites one of its operands; which one decides the table of the function.

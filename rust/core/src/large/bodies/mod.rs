@@ -1,4 +1,4 @@
-//! Many bodies ([`crate::systems::nbody`]), eight of them side by side, the forces on as many threads as there are.
+//! Many bodies ([`crate::model::systems::nbody`]), eight of them side by side, the forces on as many threads as there are.
 
 mod quantities;
 mod share;
@@ -6,7 +6,7 @@ mod share;
 use std::sync::atomic::Ordering::Relaxed;
 
 use stepwell_base::{
-    bodies::{LANES, Law, partners},
+    bodies::{Law, partners},
     forces::{Distances, Kernel, Meeting, Round, Sums},
 };
 
@@ -14,12 +14,14 @@ use self::{
     quantities::{Quantity, Record, kinetic, total},
     share::{Share, add, share},
 };
-use super::{Asked, Facts, Rates};
-use crate::{run::workers::Stop, spec::Spec, systems::nbody};
+use super::rates::{RateTraits, Rates, RatesRequest};
+use crate::{
+    model::{spec::Spec, systems::nbody},
+    stage::Stop,
+};
 
-/// Bodies that are taken side by side, and parts in which sums over bodies are kept.
-const SIDE: usize = LANES;
-/// Bodies from which on threads are worthwhile. They are started anew for each force, which takes some hundredths of a millisecond.
+/// Bodies from which on threads are worthwhile. They are started anew for each force, which takes some hundredths of a
+/// millisecond.
 const MIN_BODIES_FOR_THREADS: usize = 1024;
 
 /// The bodies of one member, scaled to the step.
@@ -41,8 +43,9 @@ struct Bodies {
     shares: Vec<Share>,
     record: Vec<Quantity>,
     stop: Stop,
-    /// Whether `dv` are the forces at `y`. They are kept for a state that is projected or recorded, since the next step begins with
-    /// them; for many bodies always, so that a run that is stopped within a step has the forces at the end of the step before.
+    /// Whether `dv` are the forces at `y`. They are kept for a state that is projected or recorded, since the next step begins
+    /// with them; for many bodies always, so that a run that is stopped within a step has the forces at the end of the step
+    /// before.
     has_forces: bool,
     /// Whether `potential` is that at `y`, too.
     has_potentials: bool,
@@ -51,9 +54,9 @@ struct Bodies {
 }
 
 /// The rates of many bodies.
-pub fn make(asked: &Asked) -> Box<dyn Rates> {
-    let (n, dim, machine) = (asked.given.count("masses"), asked.given.whole("dim"), asked.machine);
-    let law = nbody::law(asked.given).unwrap_or(Law::Logarithmic);
+pub(crate) fn make(asked: &RatesRequest) -> Box<dyn Rates> {
+    let (n, dim, machine) = (asked.signature.count("masses"), asked.signature.whole("dim"), asked.machine);
+    let law = nbody::law(asked.signature).unwrap_or(Law::Logarithmic);
     let ends = |group: Vec<usize>| Some((*group.first()?, *group.last()?));
     let slabs: Vec<Vec<Distances>> = partners(n).into_iter().map(|slab| slab.into_iter().filter_map(ends).collect()).collect();
     let round = Round::new(n, dim);
@@ -145,12 +148,12 @@ impl Bodies {
 }
 
 impl Rates for Bodies {
-    fn facts(&self) -> Facts {
-        Facts { second_order: true, reads_v: false, stretched: false }
+    fn traits(&self) -> RateTraits {
+        RateTraits { second_order: true, reads_v: false, stretched: false }
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
-        let row = |name: &str, i: usize| spec.given.place(name).map_or(f64::NAN, |place| spec.rows[place + i].at(first));
+        let row = |name: &str, i: usize| spec.signature.place(name).map_or(f64::NAN, |place| spec.rows[place + i].at(first));
         let softening = row("softening", 0);
         self.round.take(self.n, |i| self.h * row("strength", i), softening * softening);
         for i in 0..self.n {

@@ -2,8 +2,13 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
-use super::SIDE;
-use crate::isa::{Level, Task, with_isa};
+use crate::{
+    bodies::LANES,
+    isa::{Level, Task, with_isa},
+};
+
+/// Bodies that are taken side by side, and parts in which sums over bodies are kept.
+pub(super) const SIDE: usize = LANES;
 
 /// A quantity of a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,11 +2,8 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
-use super::{
-    SIDE,
-    order::{MARGIN, Order},
-};
-use crate::{isa::Task, run::aligned::Aligned};
+use super::order::{MARGIN, Order, SIDE};
+use crate::{aligned::Aligned, isa::Task};
 
 type Vector = [f64; SIDE];
 
@@ -29,7 +26,7 @@ const LANES: [[u64; SIDE]; 1 << SIDE] = {
 };
 
 /// The numbers of a net: a row for each direction of what is a vector.
-pub struct Rows {
+pub(crate) struct Rows {
     /// The length of a row of particles.
     pub particles: usize,
     /// The length of a row of forces.
@@ -81,7 +78,7 @@ fn apart<const D: usize>(block: &[f64], rows: &mut [f64], length: usize) {
 }
 
 /// The rate of v from the state, in D directions.
-pub struct Forces<'a, const D: usize, const DAMPED: bool> {
+pub(crate) struct Forces<'a, const D: usize, const DAMPED: bool> {
     pub order: &'a Order,
     pub rows: &'a mut Rows,
     pub v: &'a [f64],

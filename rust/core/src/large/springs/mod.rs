@@ -1,22 +1,21 @@
-//! The rates of a large net of springs ([`crate::systems::springs`]): springs, then particles, each as vectors.
+//! The rates of a large net of springs ([`crate::model::systems::springs`]): springs, then particles, each as vectors.
 
 mod kernel;
 mod order;
 
 use self::{
     kernel::{Forces, Rows},
-    order::{MARGIN, Order},
+    order::{MARGIN, Order, SIDE},
 };
-use super::{Asked, Facts, Rates};
+use super::rates::{RateTraits, Rates, RatesRequest};
 use crate::{
+    aligned::Aligned,
     isa::{Level, with_isa},
-    run::aligned::Aligned,
-    spec::{Parameters, Spec},
-    systems::springs::{self, net},
+    model::{
+        spec::{Parameters, Spec},
+        systems::springs::{self, net},
+    },
 };
-
-/// Springs or particles of a vector.
-const SIDE: usize = 8;
 
 struct Springs {
     level: Level,
@@ -33,14 +32,14 @@ struct Springs {
 }
 
 /// The rates of a net.
-pub fn make(asked: &Asked) -> Box<dyn Rates> {
-    let given = asked.given;
-    let (n, dim) = (given.whole("n"), given.whole("dim"));
+pub(crate) fn make(asked: &RatesRequest) -> Box<dyn Rates> {
+    let signature = asked.signature;
+    let (n, dim) = (signature.whole("n"), signature.whole("dim"));
     let mut is_fixed = vec![false; n];
-    given.list("fixed").iter().for_each(|particle| is_fixed[*particle as usize] = true);
-    let order = Order::new(n, given.list("pairs"), &is_fixed);
+    signature.list("fixed").iter().for_each(|particle| is_fixed[*particle as usize] = true);
+    let order = Order::new(n, signature.list("pairs"), &is_fixed);
     let (particles, springs) = (n.next_multiple_of(SIDE), order.springs.len());
-    let (has_damping, has_drag) = (given.has("damping"), given.has("drag"));
+    let (has_damping, has_drag) = (signature.has("damping"), signature.has("drag"));
     let room = |there: bool, numbers: usize| Aligned::new(if there { numbers } else { 0 });
     let rows = Rows {
         particles,
@@ -76,13 +75,13 @@ impl Springs {
 }
 
 impl Rates for Springs {
-    fn facts(&self) -> Facts {
-        Facts { second_order: true, reads_v: self.reads_v, stretched: false }
+    fn traits(&self) -> RateTraits {
+        RateTraits { second_order: true, reads_v: self.reads_v, stretched: false }
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
         let numbers = spec.rows.iter().map(|row| row.at(first)).collect();
-        let net = net(&Parameters { given: &spec.given, h: self.h, numbers, sample: |_, _| f64::NAN });
+        let net = net(&Parameters { signature: &spec.signature, h: self.h, numbers, sample: |_, _| f64::NAN });
         let Springs { order, rows, n, .. } = self;
         for (at, spring) in order.springs.iter().enumerate() {
             let [stiffness, held, damping] = net.spring(*spring as usize);

@@ -1,20 +1,20 @@
 //! In which order the springs of a net are computed, and from where each particle takes its forces.
 //!
 //! A vector of springs or of particles loads fast only what lies side by side. In a lattice it mostly does: springs sorted by the
-//! distance of their ends' numbers, and then by their first end, form runs, in which both ends go up by one from spring to spring.
-//! The order in which springs are computed changes no bit. The order of a particle's sum does: it is that of the springs as they are
-//! given. What a particle does not take part in adds −0 to its sum, which changes no number.
+//! distance of their ends' numbers, and then by their first end, form runs, in which both ends go up by one from spring to
+//! spring. The order in which springs are computed changes no bit. The order of a particle's sum does: it is that of the springs
+//! as they are given. What a particle does not take part in adds −0 to its sum, which changes no number.
 
-use super::SIDE;
-
+/// Springs or particles of a vector.
+pub(super) const SIDE: usize = 8;
 /// Before and behind the forces there is room for what a vector reaches beyond them.
-pub const MARGIN: usize = SIDE;
+pub(crate) const MARGIN: usize = SIDE;
 /// Forces that a vector of them must give to particles on average; with fewer it is faster to add them one by one.
 const MIN_FORCES_PER_ADDEND: usize = 2;
 
 /// A vector of springs whose ends are particles side by side.
 #[derive(Clone, Copy, Debug)]
-pub struct Run {
+pub(crate) struct Run {
     /// The place of the first spring.
     pub at: u32,
     /// The first ends of the first spring, and its second.
@@ -23,7 +23,7 @@ pub struct Run {
 
 /// A vector of forces, side by side, that are added to particles side by side.
 #[derive(Clone, Copy, Debug)]
-pub struct Addend {
+pub(crate) struct Addend {
     /// The place of the force on the first particle, with the margin before it.
     pub at: u32,
     /// The particles that take part, a bit for each.
@@ -34,7 +34,7 @@ pub struct Addend {
 
 /// A force that is added to a particle by itself.
 #[derive(Clone, Copy, Debug)]
-pub struct Single {
+pub(crate) struct Single {
     /// The place of the force, with the margin before it.
     pub at: u32,
     /// As of an [`Addend`].
@@ -42,7 +42,7 @@ pub struct Single {
 }
 
 /// The order of a net.
-pub struct Order {
+pub(crate) struct Order {
     /// Of each place the spring that is computed there; the last are filled with the last spring.
     pub springs: Vec<u32>,
     /// Vectors of springs in runs.
@@ -68,7 +68,7 @@ fn ends_of(pairs: &[u32], spring: u32) -> [u32; 2] {
 
 impl Order {
     /// Of the springs between these pairs of particles, of which there are `n`; what is fixed adds no forces.
-    pub fn new(n: usize, pairs: &[u32], is_fixed: &[bool]) -> Order {
+    pub(crate) fn new(n: usize, pairs: &[u32], is_fixed: &[bool]) -> Order {
         let mut springs: Vec<u32> = (0..(pairs.len() / 2) as u32).collect();
         let key = |spring: &u32| {
             let [i, j] = ends_of(pairs, *spring);
@@ -80,7 +80,8 @@ impl Order {
         let mut runs = Vec::new();
         let mut at = 0;
         for run in &long {
-            // The last vector of a run overlaps with the one before it: springs that are computed twice are so with the same result.
+            // The last vector of a run overlaps with the one before it: springs that are computed twice are so with the same
+            // result.
             for from in (0..run.len()).step_by(SIDE).map(|from| from.min(run.len() - SIDE)) {
                 runs.push(Run { at: (at + from) as u32, ends: ends_of(pairs, run[from]) });
             }

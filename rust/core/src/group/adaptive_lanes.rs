@@ -1,0 +1,169 @@
+//! Members with adaptive steps, each in a lane with a time and a step of its own.
+
+use std::sync::Arc;
+
+use super::AdaptiveBatch;
+use crate::{
+    aligned::Aligned,
+    error::Error,
+    isa::Level,
+    model::spec::Spec,
+    stage::{Clock, PreparedStage, Stage},
+    step::{
+        key::StepKind,
+        pace::Pace,
+        tapes::{Tapes, Traced},
+    },
+};
+
+/// Members of a system whose whole attempt is one tape.
+pub struct AdaptiveLanes {
+    tapes: Arc<Tapes>,
+    /// Numbers of v and y, and those that stand behind the pace.
+    numbers: usize,
+    scales: usize,
+    step: PreparedStage,
+    /// Rows of v, of y, of the paces, of the sizes and, of a series, of its coefficients.
+    state: Aligned,
+    /// What goes by one lane at a time, from its first use on: attempts by known coefficients, and where a member stands at the
+    /// start.
+    by_terms: Option<OneLane>,
+    begin: Option<OneLane>,
+    level: Level,
+    budget: f64,
+}
+
+/// A stage that is run for one lane alone.
+struct OneLane {
+    step: PreparedStage,
+    /// The member whose parameters it has.
+    member: Option<usize>,
+    /// The numbers of the lane.
+    numbers: Aligned,
+}
+
+impl OneLane {
+    fn new(stage: &Stage, spec: &Spec, level: Level, budget: f64) -> OneLane {
+        let numbers = Aligned::new(stage.split.body.next.len());
+        OneLane { step: PreparedStage::new(stage, spec, level, 1, &Clock::NONE, budget), member: None, numbers }
+    }
+
+    /// Runs it with a member's parameters, and the numbers of a lane from rows of so many lanes.
+    fn run(&mut self, stage: &Stage, spec: &Spec, member: usize, rows: &[f64], (lane, lanes): (usize, usize)) -> &[f64] {
+        if self.member != Some(member) {
+            self.step.prepare_lane(stage, spec, 0, member);
+            self.member = Some(member);
+        }
+        for (number, row) in self.numbers.iter_mut().zip(rows.chunks_exact(lanes)) {
+            *number = row[lane];
+        }
+        self.step.advance(stage, &Clock::NONE, 0, 1, &mut self.numbers);
+        &self.numbers
+    }
+}
+
+impl AdaptiveLanes {
+    /// For a run of so many members.
+    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, budget: f64) -> Result<AdaptiveLanes, Error> {
+        let tapes = traced.tapes()?;
+        let step = PreparedStage::new(&tapes.step, spec, level, members, &Clock::NONE, budget);
+        let StepKind::Attempts { acceptance, .. } = &traced.key().how else { return Err(Error::NoEstimate) };
+        let (numbers, scales) = (traced.shape.v + traced.shape.y, acceptance.numbers(traced.shape.v, traced.shape.y));
+        let all = tapes.step.split.body.next.len();
+        let state = Aligned::new(all * step.lanes());
+        Ok(AdaptiveLanes { state, step, numbers, scales, by_terms: None, begin: None, level, budget, tapes })
+    }
+}
+
+impl AdaptiveBatch for AdaptiveLanes {
+    fn lanes(&self) -> usize {
+        self.step.lanes()
+    }
+
+    fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize) {
+        self.step.prepare_lane(&self.tapes.step, spec, lane, member);
+    }
+
+    fn set_state(&mut self, lane: usize, state: &[f64]) {
+        let lanes = self.step.lanes();
+        for (row, number) in self.state.chunks_exact_mut(lanes).zip(state) {
+            row[lane] = *number;
+        }
+    }
+
+    fn state(&self, lane: usize) -> Vec<f64> {
+        let lanes = self.step.lanes();
+        self.state.chunks_exact(lanes).take(self.numbers).map(|row| row[lane]).collect()
+    }
+
+    fn pace(&self, lane: usize) -> Pace<f64> {
+        let (lanes, before) = (self.step.lanes(), self.numbers);
+        Pace::of(std::array::from_fn(|i| self.state[(before + i) * lanes + lane]))
+    }
+
+    fn row(&self, number: usize) -> Option<&[f64]> {
+        self.state.chunks_exact(self.step.lanes()).nth(number)
+    }
+
+    fn set_pace(&mut self, lane: usize, pace: Pace<f64>) {
+        let (lanes, before) = (self.step.lanes(), self.numbers);
+        for (i, number) in pace.numbers().into_iter().enumerate() {
+            self.state[(before + i) * lanes + lane] = number;
+        }
+    }
+
+    fn scales(&self, lane: usize) -> Vec<f64> {
+        let (lanes, before) = (self.step.lanes(), self.numbers + Pace::<f64>::NUMBERS);
+        (0..self.scales).map(|i| self.state[(before + i) * lanes + lane]).collect()
+    }
+
+    fn set_scales(&mut self, lane: usize, numbers: &[f64]) {
+        let (lanes, before) = (self.step.lanes(), self.numbers + Pace::<f64>::NUMBERS);
+        for (i, number) in numbers.iter().enumerate() {
+            self.state[(before + i) * lanes + lane] = *number;
+        }
+    }
+
+    fn begins(&self) -> bool {
+        self.tapes.begin.is_some()
+    }
+
+    fn begin(&mut self, spec: &Spec, lane: usize, member: usize) {
+        let Some(stage) = &self.tapes.begin else { return };
+        let lanes = self.step.lanes();
+        let one = self.begin.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
+        let begun = one.run(stage, spec, member, &self.state, (lane, lanes));
+        for (row, number) in self.state.chunks_exact_mut(lanes).zip(begun) {
+            row[lane] = *number;
+        }
+    }
+
+    fn attempt(&mut self, attempts: usize) {
+        self.step.advance(&self.tapes.step, &Clock::NONE, 0, attempts, &mut self.state);
+    }
+
+    fn has_terms(&self) -> bool {
+        self.tapes.by_terms.is_some()
+    }
+
+    fn find_running(&self, budget: f64, runs: &mut [bool]) {
+        let lanes = self.step.lanes();
+        Pace::find_running(|i| &self.state[(self.numbers + i) * lanes..][..lanes], budget, runs);
+    }
+
+    fn steps_left(&self) -> f64 {
+        let lanes = self.step.lanes();
+        Pace::steps_left(|i| &self.state[(self.numbers + i) * lanes..][..lanes])
+    }
+
+    fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {
+        let Some(stage) = &self.tapes.by_terms else { return };
+        let lanes = self.step.lanes();
+        let one = self.by_terms.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
+        let made = one.run(stage, spec, member, &self.state, (lane, lanes));
+        for (row, number) in self.state.chunks_exact_mut(lanes).zip(made).take(self.numbers + Pace::<f64>::NUMBERS + self.scales)
+        {
+            row[lane] = *number;
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Groups: members stepped together. Here are those whose whole step is one tape; [`crate::large`] has others.
+
+pub mod adaptive_lanes;
+pub mod lanes;
+
+use crate::{
+    model::spec::Spec,
+    stage::{Force, Stop},
+    step::pace::Pace,
+    tape::real::Real,
+};
+
+/// Members stepped together.
+///
+/// `v` and `y` are rows of [`Group::lanes`] numbers, one row per number of a member's block. The `v` slot holds what the
+/// method carries between steps: the velocity, unless its record names another carry.
+pub trait Group<T: Real = f64>: Send + Sync {
+    /// How many members it steps together.
+    fn lanes(&self) -> usize;
+
+    /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
+    fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
+
+    /// Takes the force from outside for the members from `first`, for the steps to come.
+    fn set_force(&mut self, _force: &Force<T>, _first: usize, _count: usize) {}
+
+    /// Compiles now instead of after some interpreted steps: for real-time loops.
+    fn compile_now(&mut self) {}
+
+    /// Sets the flag at which a step that may take long stops early.
+    fn set_stop_flag(&mut self, _stop: &Stop) {}
+
+    /// Both slots.
+    fn slots(&self) -> (&[T], &[T]);
+
+    /// Both slots, to write.
+    fn slots_mut(&mut self) -> (&mut [T], &mut [T]);
+
+    /// Turns velocities in the `v` slot into what the method carries, at step `k`.
+    fn start(&mut self, k: i64);
+
+    /// `n` steps from step `k`.
+    fn advance(&mut self, k: i64, n: i64);
+
+    /// How many steps of these members, which were prepared before, one call of [`Group::advance_unrolled`] makes; 0 if that is
+    /// not faster than step by step.
+    fn unrolled(&mut self, _spec: &Spec, _first: usize, _count: usize) -> usize {
+        0
+    }
+
+    /// Makes that many steps from step `k`, a multiple of their number. Returns the velocities before each step, then the
+    /// coordinates before each step.
+    fn advance_unrolled(&mut self, _k: i64) -> &[T] {
+        &[]
+    }
+
+    /// Turns what the method carries into velocities, at step `k`: the inverse of `start`.
+    fn finish(&mut self, k: i64);
+
+    /// How many numbers of a member it records.
+    fn recorded(&self) -> usize;
+
+    /// Records the present state, whose v slot is finished: rows of lanes.
+    fn record(&mut self, rows: &mut [T]);
+
+    /// The sums over the steps, such as the work of a control, and what is watched: rows of lanes, or nothing.
+    fn tally(&self) -> &[T];
+
+    /// The same sums, to write.
+    fn tally_mut(&mut self) -> &mut [T];
+}
+
+/// A batch of members with adaptive steps; their rates are scaled to a step of 1.
+pub trait AdaptiveBatch: Send {
+    /// How many members there are.
+    fn lanes(&self) -> usize;
+
+    /// Takes the parameters of a member into one lane.
+    fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize);
+
+    /// Puts a state, v and y, into a lane.
+    fn set_state(&mut self, lane: usize, state: &[f64]);
+
+    /// The state of a lane.
+    fn state(&self, lane: usize) -> Vec<f64>;
+
+    /// The step-size control of a lane.
+    fn pace(&self, lane: usize) -> Pace<f64>;
+
+    /// One number of all lanes: of v, of y or, behind these, of the step-size control. None where lanes do not stand side by
+    /// side.
+    fn row(&self, _number: usize) -> Option<&[f64]> {
+        None
+    }
+
+    /// Sets the step-size control of a lane.
+    fn set_pace(&mut self, lane: usize, pace: Pace<f64>);
+
+    /// What stands behind the step-size control of a lane: the largest sizes of its groups, and tolerances of their own.
+    fn scales(&self, lane: usize) -> Vec<f64>;
+
+    /// Sets it.
+    fn set_scales(&mut self, lane: usize, numbers: &[f64]);
+
+    /// Whether it knows where a member stands at the start, so that [`AdaptiveBatch::begin`] can be asked.
+    fn begins(&self) -> bool {
+        false
+    }
+
+    /// Brings the step-size control of a lane to what it is at the start of that member.
+    fn begin(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
+
+    /// So many attempts of every lane that runs.
+    fn attempt(&mut self, attempts: usize);
+
+    /// Whether the coefficients of a series are known after an attempt, so that [`AdaptiveBatch::attempt_by_terms`] needs no
+    /// others.
+    fn has_terms(&self) -> bool {
+        false
+    }
+
+    /// Writes whether each lane has a step of the run to try.
+    fn find_running(&self, budget: f64, runs: &mut [bool]) {
+        runs.iter_mut().enumerate().for_each(|(lane, runs)| *runs = self.pace(lane).runs(budget));
+    }
+
+    /// How many steps of the present length lanes have left to their next saved times, in the mean of those that are not there.
+    fn steps_left(&self) -> f64 {
+        1.0
+    }
+
+    /// One attempt of one lane, at the start of a step whose coefficients are known.
+    fn attempt_by_terms(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
+
+    /// Sets the flag at which an attempt that may take long stops early.
+    fn set_stop_flag(&mut self, _stop: &Stop) {}
+}

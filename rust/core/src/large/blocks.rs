@@ -1,0 +1,110 @@
+//! Rates, and the rows of blocks in which a method uses them.
+
+use std::sync::{Arc, LazyLock};
+
+use super::{
+    executor::{Executor, stride},
+    rates::{RateTraits, Rates},
+    schedule::{BlockSchedule, Goal},
+};
+use crate::{
+    aligned::Aligned,
+    error::Error,
+    isa::Level,
+    model::{
+        program::{Block, Program},
+        steppers::method,
+        system::Shape,
+    },
+    stage::Clock,
+    step::{cache::Cache, key::StepKind},
+};
+
+/// The schedules of a method, for one kind of rates.
+pub struct Schedules {
+    /// A step, or an attempt at one.
+    pub step: BlockSchedule,
+    /// Turns velocities into what the method carries.
+    pub start: Option<BlockSchedule>,
+    /// Turns what the method carries into velocities.
+    pub finish: Option<BlockSchedule>,
+}
+
+/// The name of the method, its way to start in steps of fixed length, and what it relies on.
+type SchedulesKey = (String, Option<usize>, RateTraits, Shape);
+
+impl Schedules {
+    /// Of a method that steps so, for rates with these traits: found before, or made now.
+    pub fn of(how: &StepKind, traits: RateTraits, shape: Shape) -> Result<Arc<Schedules>, Error> {
+        static CACHE: LazyLock<Cache<SchedulesKey, Schedules>> = LazyLock::new(Cache::default);
+        let (name, choice) = match how {
+            StepKind::Method { name, choice } => (name.as_str(), Some(*choice)),
+            StepKind::Attempts { name, .. } => (name.as_str(), None),
+            StepKind::Step(_) | StepKind::Matrix { .. } => ("", None), // it has no method, which the next line says
+        };
+        CACHE.find(&(name.to_owned(), choice, traits, shape), || {
+            let schedules = Schedules::new(name, choice, traits, shape)?;
+            let size = schedules.all().map(BlockSchedule::size).sum::<usize>();
+            Ok((schedules, size))
+        })
+    }
+
+    fn new(name: &str, choice: Option<usize>, traits: RateTraits, shape: Shape) -> Result<Schedules, Error> {
+        let method = method(name)?;
+        let schedule = |program: Program| {
+            // A program of one result changes the block v alone.
+            let results: Vec<Block> = match program.results[..] {
+                [v] => vec![v, Block::Y],
+                _ => program.results.clone(),
+            };
+            BlockSchedule::new(&program, &results, if choice.is_some() { Goal::State } else { Goal::Attempt }, traits, shape)
+        };
+        let step = if choice.is_some() { Some(method.program()) } else { method.attempt() };
+        Ok(Schedules {
+            step: schedule(step.ok_or(Error::NoEstimate)?),
+            start: choice.and_then(|choice| method.start(choice)).map(schedule),
+            finish: choice.and_then(|choice| method.finish(choice)).map(schedule),
+        })
+    }
+
+    fn all(&self) -> impl Iterator<Item = &BlockSchedule> {
+        [Some(&self.step), self.start.as_ref(), self.finish.as_ref()].into_iter().flatten()
+    }
+
+    /// StepKind many rows an arena for all of them has.
+    fn rows(&self) -> usize {
+        self.all().map(|schedule| schedule.rows).max().unwrap_or(2)
+    }
+}
+
+/// Rates, and the arena in which a method uses them.
+pub(super) struct Blocks {
+    pub schedules: Arc<Schedules>,
+    pub rates: Box<dyn Rates>,
+    pub arena: Aligned,
+    /// Numbers of both blocks, of all lanes.
+    pub sizes: [usize; 2],
+    pub stride: usize,
+}
+
+impl Blocks {
+    pub(crate) fn new(schedules: Arc<Schedules>, rates: Box<dyn Rates>, shape: Shape) -> Blocks {
+        let sizes = [shape.v * rates.lanes(), shape.y * rates.lanes()];
+        let stride = stride(sizes[0].max(sizes[1]));
+        Blocks { arena: Aligned::new(schedules.rows() * stride), schedules, rates, sizes, stride }
+    }
+
+    pub(crate) fn executor(&self, schedule: &BlockSchedule, level: Level, clock: &Clock) -> Executor {
+        Executor::new(schedule, level, self.stride, clock)
+    }
+
+    pub(crate) fn slots(&self) -> (&[f64], &[f64]) {
+        let (v, y) = self.arena.split_at(self.stride);
+        (&v[..self.sizes[0]], &y[..self.sizes[1]])
+    }
+
+    pub(crate) fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+        let (v, y) = self.arena.split_at_mut(self.stride);
+        (&mut v[..self.sizes[0]], &mut y[..self.sizes[1]])
+    }
+}

@@ -1,0 +1,241 @@
+//! Contact of points with planes and spheres (§1, elastic reflection): what happens to a point after the step that met one.
+//!
+//! The rows of the blocks are points. A surface of the way `spring` adds a force to the rates; the others act after the step, on
+//! the state that the method made, knowing the one before. What is computed, and why no energy is added, is in
+//! `reference/contact.py` and docs/howto/contact.md.
+//!
+//! Given: the list `fixed` (maybe), points that no surface acts on; the whole number `contacts`; for surface i, with `contact_i`
+//! before each name, a word, `plane` or `sphere`, the word `_way`, and `_restitution`, `_friction` (maybe), `_omega` (of a
+//! spring); of a plane the vector `_normal` and `_offset`; of a sphere the word `_side`, `inside` or `outside`, the vector
+//! `_centre` and `_radius`.
+
+mod joined;
+mod meet;
+mod rods;
+mod surface;
+
+use meet::{OPERATIONS, Step};
+use rods::RodContacts;
+use surface::{ContactMode, Surface};
+
+use crate::{
+    error::Error,
+    model::{
+        method::Record,
+        program::Program,
+        spec::{Parameters, Signature},
+        system::{Block, Shape, System},
+    },
+    tape::number::Number,
+};
+
+/// Whether points meet any surface.
+pub(crate) fn is_given(signature: &Signature) -> bool {
+    signature.whole("contacts") > 0
+}
+
+/// Approximate number of operations that surfaces add to a step of blocks of this size.
+pub(crate) fn operations(signature: &Signature, shape: Shape) -> usize {
+    let dim = dimensions(signature);
+    if is_given(signature) && are_rods(signature) {
+        return rods::operations(signature, shape.y / dim, dim);
+    }
+    OPERATIONS * signature.whole("contacts") * shape.y / dim
+}
+
+/// Whether the points are joined by rods.
+fn are_rods(signature: &Signature) -> bool {
+    matches!(signature.system.as_str(), "rods" | "pendulum_3d")
+}
+
+/// An error if the surfaces that are given are wrong.
+pub(crate) fn check(signature: &Signature, shape: Shape) -> Result<(), Error> {
+    let dim = dimensions(signature);
+    for i in 0..signature.whole("contacts") {
+        surface::check(signature, i, dim)?;
+        if are_rods(signature) && signature.word(&format!("contact_{i}_way")) != "safe" {
+            return Err(signature.unknown(&format!("contact_{i}_way")));
+        }
+    }
+    if is_given(signature) && (shape.v != shape.y || !shape.y.is_multiple_of(dim)) {
+        return Err(Error::Shape { what: "points that meet a surface", expected: dim, got: shape.y });
+    }
+    Ok(())
+}
+
+/// How many numbers a point has.
+pub(crate) fn dimensions(signature: &Signature) -> usize {
+    signature.count("contact_0_normal").max(signature.count("contact_0_centre")).max(1)
+}
+
+/// Fixed points, sorted: no surface acts on them.
+fn fixed(signature: &Signature) -> Vec<u32> {
+    let mut fixed = signature.list("fixed").to_vec();
+    fixed.sort_unstable();
+    fixed
+}
+
+fn is_among(points: &[u32], point: usize) -> bool {
+    u32::try_from(point).is_ok_and(|point| points.binary_search(&point).is_ok())
+}
+
+/// The surfaces that act after a step.
+pub struct Contacts<N: Number> {
+    h: N,
+    dim: usize,
+    fixed: Vec<u32>,
+    surfaces: Vec<Surface<N>>,
+    /// If the points are joined by rods.
+    rods: Option<RodContacts<N>>,
+    /// Whether the energy is compared: along one plane without friction it is right by itself.
+    is_limited: bool,
+}
+
+impl<N: Number> Contacts<N> {
+    /// The surfaces that are given; None if none acts after a step.
+    pub fn new(p: &Parameters<N>) -> Option<Contacts<N>> {
+        let surfaces = surface::all(p, |way| way != ContactMode::Spring);
+        let safe: Vec<_> = surfaces.iter().filter(|surface| surface.way == ContactMode::Safe).collect();
+        let is_limited = safe.len() > 1 || safe.iter().any(|surface| surface.is_curved() || surface.friction.is_some());
+        let (dim, fixed) = (dimensions(p.signature), fixed(p.signature));
+        (!surfaces.is_empty()).then(|| Contacts { h: p.h, dim, fixed, surfaces, rods: RodContacts::new(p), is_limited })
+    }
+
+    /// Whether the points are joined by rods, so that all of them are to be resolved together.
+    pub(crate) fn are_joined(&self) -> bool {
+        self.rods.is_some()
+    }
+
+    /// What becomes of points on rods, in place. The state before the step comes first.
+    pub(crate) fn resolve_joined(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) {
+        if let Some(rods) = &self.rods {
+            rods.resolve(&self.surfaces, before, v, y);
+        }
+    }
+
+    /// What becomes of a point, in place, and whether it met a surface. The state before the step comes first.
+    pub(crate) fn resolve_point(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) -> Option<N::Truth> {
+        let step = Step::new(self.h, before, [v, y]);
+        let mut touched: Option<N::Truth> = None;
+        for surface in &self.surfaces {
+            let touches = meet::meet(surface, &step, v, y);
+            touched = Some(touched.map_or(touches, |before| before | touches));
+        }
+        if let (true, Some(touched)) = (self.is_limited, touched) {
+            meet::limit(&step, touched, v, y);
+        }
+        touched
+    }
+
+    /// Whether surfaces act on a point: not if it is fixed.
+    pub(crate) fn acts_on(&self, point: usize) -> bool {
+        !is_among(&self.fixed, point)
+    }
+
+    /// Which points met a surface in a step, None for those that no surface acts on, and the state after that.
+    fn resolve(&self, before: [&Block<N>; 2], [mut v, mut y]: [Block<N>; 2]) -> (Vec<Option<N::Truth>>, [Block<N>; 2]) {
+        let mut touched = vec![None; y.len() / self.dim];
+        if self.are_joined() {
+            self.resolve_joined(before.map(Block::as_slice), [v.as_mut_slice(), y.as_mut_slice()]);
+            return (touched, [v, y]); // only methods without a carry step them
+        }
+        for (i, touched) in touched.iter_mut().enumerate().filter(|(i, _)| self.acts_on(*i)) {
+            let (from, to) = (self.dim * i, self.dim * (i + 1));
+            let [v0, y0] = before.map(|block| &block.as_slice()[from..to]);
+            *touched = self.resolve_point([v0, y0], [&mut v.as_mut_slice()[from..to], &mut y.as_mut_slice()[from..to]]);
+        }
+        (touched, [v, y])
+    }
+
+    /// The state after a step of a method. What it carries begins anew where a point met a surface.
+    pub fn after(
+        &self,
+        carry: Option<&[Program; 2]>,
+        s: &dyn System<N>,
+        t: N,
+        before: [&Block<N>; 2],
+        after: [Block<N>; 2],
+    ) -> [Block<N>; 2] {
+        let Some([start, finish]) = carry else { return self.resolve(before, after).1 };
+        let first = |program: &Program, t: N, v: &Block<N>, y: &Block<N>| {
+            program.run(s, t, self.h, v, y).into_iter().next().unwrap_or_else(|| v.clone())
+        };
+        let (end, [slot, y1]) = (t + self.h, after);
+        let (v0, v1) = (first(finish, t, before[0], before[1]), first(finish, end, &slot, &y1));
+        let (touched, [v, y]) = self.resolve([&v0, before[1]], [v1, y1]);
+        let anew = first(start, end, &v, &y);
+        let slot = Block::from_fn(slot.len(), |i, _| touched[i / self.dim].map_or(slot[i], |it| N::choose(it, anew[i], slot[i])));
+        [slot, y]
+    }
+}
+
+impl Contacts<f64> {
+    /// Whether any point on rods may have met a surface in a step.
+    pub(crate) fn is_any_near(&self, before: &[f64], y: &[f64]) -> bool {
+        self.rods.as_ref().is_some_and(|rods| rods.is_near(&self.surfaces, before, y))
+    }
+
+    /// Whether a point may have met a surface in a step, from where it was and is.
+    pub(crate) fn is_near(&self, before: &[f64], y: &[f64]) -> bool {
+        self.surfaces.iter().any(|surface| surface.reaches(before, y))
+    }
+}
+
+/// The programs with which a method goes from velocities to what it carries, and back.
+pub fn carry(method: &Record, choice: usize) -> Option<[Program; 2]> {
+    Some([method.start(choice)?, method.finish(choice)?])
+}
+
+/// A system with the springs that are given, or the system itself.
+pub(crate) fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn System<N>> {
+    match Springs::new(p) {
+        Some(springs) => Box::new(Sprung { system, springs }),
+        None => system,
+    }
+}
+
+/// Surfaces that push points back by springs.
+pub(crate) struct Springs<N: Number> {
+    dim: usize,
+    fixed: Vec<u32>,
+    surfaces: Vec<Surface<N>>,
+}
+
+impl<N: Number> Springs<N> {
+    /// Those that are given; None without any.
+    pub(crate) fn new(p: &Parameters<N>) -> Option<Springs<N>> {
+        let surfaces = surface::all(p, |way| way == ContactMode::Spring);
+        (!surfaces.is_empty()).then(|| Springs { dim: dimensions(p.signature), fixed: fixed(p.signature), surfaces })
+    }
+
+    /// Adds their pushes to increments of the velocities of points that are there.
+    pub(crate) fn push(&self, y: &[N], dv: &mut [N]) {
+        let points = y.chunks(self.dim).zip(dv.chunks_mut(self.dim)).enumerate();
+        for (_, (y, dv)) in points.filter(|(i, _)| !is_among(&self.fixed, *i)) {
+            for surface in &self.surfaces {
+                surface.push(y, dv);
+            }
+        }
+    }
+}
+
+struct Sprung<N: Number> {
+    system: Box<dyn System<N>>,
+    springs: Springs<N>,
+}
+
+impl<N: Number> System<N> for Sprung<N> {
+    fn inner(&self) -> Option<&dyn System<N>> {
+        Some(self.system.as_ref())
+    }
+
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        let mut dv = self.system.dv(t, v, y);
+        self.springs.push(y.as_slice(), dv.as_mut_slice());
+        dv
+    }
+
+    fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.system.dy(t, v, y)
+    }
+}

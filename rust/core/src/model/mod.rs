@@ -1,0 +1,13 @@
+//! What is stepped, and how: systems and methods over any kind of number, and what is around a system.
+
+pub mod around;
+mod elimination;
+pub mod method;
+pub mod program;
+pub(crate) mod signal;
+pub mod spec;
+pub mod steppers;
+pub mod system;
+pub mod systems;
+mod tableau;
+pub(crate) mod window;

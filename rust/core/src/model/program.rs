@@ -1,0 +1,330 @@
+//! The step program: a method, recorded over blocks.
+//!
+//! A method says which value of which block is used, whatever a block is made of. So it is run once with
+//! [`Block`]s that only record the operations on them: rates, sums, products with numbers. The program is then executed over
+//! vectors of numbers or of symbols ([`Program::run`]; the latter gives a tape), or over long rows on the heap (`large/`).
+
+use std::{
+    cell::RefCell,
+    collections::HashMap,
+    ops::{Add, Mul, Sub},
+};
+
+use nalgebra::DVector;
+
+use super::system::System;
+use crate::tape::number::{Branch, Number, Series};
+
+/// A velocity or coordinate block, by the number of the entry that makes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Block(u32);
+
+/// A length of time, as a share of the step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Length(f64);
+
+/// A time within a step, by its distance from the start as a share of the step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Time(f64);
+
+impl Mul<Length> for f64 {
+    type Output = Length;
+    fn mul(self, h: Length) -> Length {
+        Length(self * h.0)
+    }
+}
+
+impl Add<Length> for Time {
+    type Output = Time;
+    fn add(self, length: Length) -> Time {
+        Time(self.0 + length.0)
+    }
+}
+
+impl Time {
+    /// The start of the step.
+    pub(crate) const START: Time = Time(0.0);
+
+    /// Its distance from the start of the step, as a share of the step.
+    pub fn node(self) -> f64 {
+        self.0
+    }
+
+    /// t + node·h in numbers.
+    pub(crate) fn at<N: Number>(self, t: N, h: N) -> N {
+        match self.0 {
+            0.0 => t,
+            1.0 => t + h,
+            node => t + N::of(node) * h,
+        }
+    }
+}
+
+/// One entry of a program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Entry {
+    /// The v slot at the start of the step: v, or the carry.
+    V,
+    /// The coordinates at the start of the step.
+    Y,
+    /// h·v̇ at a time and a state.
+    Dv(Time, Block, Block),
+    /// h·ẏ at a time and a state.
+    Dy(Time, Block, Block),
+    /// The velocity whose increment of y is this block.
+    Velocity(Block),
+    /// a + b
+    Add(Block, Block),
+    /// a − b
+    Sub(Block, Block),
+    /// c·a
+    Scale(f64, Block),
+    /// The Taylor coefficient of that order of v, in powers of the share of the step, around the start of the step at a state.
+    SeriesV(u32, Block, Block),
+    /// Likewise of y.
+    SeriesY(u32, Block, Block),
+}
+
+impl Entry {
+    /// The blocks that it reads.
+    pub fn operands(self) -> Vec<Block> {
+        match self {
+            Entry::V | Entry::Y => vec![],
+            Entry::Velocity(a) | Entry::Scale(_, a) => vec![a],
+            Entry::Dv(_, a, b) | Entry::Dy(_, a, b) | Entry::Add(a, b) | Entry::Sub(a, b) => vec![a, b],
+            Entry::SeriesV(_, a, b) | Entry::SeriesY(_, a, b) => vec![a, b],
+        }
+    }
+
+    /// The same of the blocks that are now at other places.
+    fn moved(self, to: impl Fn(Block) -> Block) -> Entry {
+        match self {
+            Entry::V | Entry::Y => self,
+            Entry::Dv(t, a, b) => Entry::Dv(t, to(a), to(b)),
+            Entry::Dy(t, a, b) => Entry::Dy(t, to(a), to(b)),
+            Entry::Velocity(a) => Entry::Velocity(to(a)),
+            Entry::Add(a, b) => Entry::Add(to(a), to(b)),
+            Entry::Sub(a, b) => Entry::Sub(to(a), to(b)),
+            Entry::Scale(c, a) => Entry::Scale(c, to(a)),
+            Entry::SeriesV(k, a, b) => Entry::SeriesV(k, to(a), to(b)),
+            Entry::SeriesY(k, a, b) => Entry::SeriesY(k, to(a), to(b)),
+        }
+    }
+
+    /// Its key for equality. Numbers are compared by their bits.
+    fn key(self) -> (u8, u64, u32, u32) {
+        match self {
+            Entry::V => (0, 0, 0, 0),
+            Entry::Y => (1, 0, 0, 0),
+            Entry::Dv(t, a, b) => (2, t.0.to_bits(), a.0, b.0),
+            Entry::Dy(t, a, b) => (3, t.0.to_bits(), a.0, b.0),
+            Entry::Velocity(a) => (4, 0, a.0, 0),
+            Entry::Add(a, b) => (5, 0, a.0, b.0),
+            Entry::Sub(a, b) => (6, 0, a.0, b.0),
+            Entry::Scale(c, a) => (7, c.to_bits(), a.0, 0),
+            Entry::SeriesV(k, a, b) => (8, u64::from(k), a.0, b.0),
+            Entry::SeriesY(k, a, b) => (9, u64::from(k), a.0, b.0),
+        }
+    }
+}
+
+#[derive(Debug, Default)]
+struct Recording {
+    entries: Vec<Entry>,
+    seen: HashMap<(u8, u64, u32, u32), Block>,
+}
+
+thread_local! {
+    static RECORDING: RefCell<Recording> = RefCell::new(Recording::default());
+}
+
+fn write(entry: Entry) -> Block {
+    RECORDING.with_borrow_mut(|recording| {
+        let next = Block(recording.entries.len() as u32);
+        *recording.seen.entry(entry.key()).or_insert_with(|| {
+            recording.entries.push(entry);
+            next
+        })
+    })
+}
+
+impl Add for Block {
+    type Output = Block;
+    fn add(self, other: Block) -> Block {
+        write(Entry::Add(self, other))
+    }
+}
+
+impl Sub for Block {
+    type Output = Block;
+    fn sub(self, other: Block) -> Block {
+        write(Entry::Sub(self, other))
+    }
+}
+
+impl Mul<Block> for f64 {
+    type Output = Block;
+    fn mul(self, block: Block) -> Block {
+        write(Entry::Scale(self, block))
+    }
+}
+
+/// The system as a method sees it: increments of both blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates(());
+
+impl Rates {
+    /// h·v̇(t, v, y)
+    pub(crate) fn dv(self, t: Time, v: Block, y: Block) -> Block {
+        write(Entry::Dv(t, v, y))
+    }
+
+    /// h·ẏ(t, v, y)
+    pub(crate) fn dy(self, t: Time, v: Block, y: Block) -> Block {
+        write(Entry::Dy(t, v, y))
+    }
+
+    /// The Taylor coefficients of v and y around the start of the step, from the first to that order; the increment of the step
+    /// is their sum.
+    pub(crate) fn series(self, order: u32, v: Block, y: Block) -> Vec<(Block, Block)> {
+        (1..=order).map(|k| (write(Entry::SeriesV(k, v, y)), write(Entry::SeriesY(k, v, y)))).collect()
+    }
+
+    /// The velocity whose increment of y is d, in a second-order system.
+    pub(crate) fn velocity(self, d: Block) -> Block {
+        write(Entry::Velocity(d))
+    }
+}
+
+/// The operations of a method on blocks, in order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    /// The entries, each after what it reads.
+    pub entries: Vec<Entry>,
+    /// The blocks that it is for: of a step the new v and y, then those of estimates of the error.
+    pub results: Vec<Block>,
+}
+
+impl Program {
+    /// Records the operations of a method.
+    pub(crate) fn record(method: impl FnOnce(Rates, Time, Length, Block, Block) -> Vec<Block>) -> Program {
+        let outer = RECORDING.take();
+        let (v, y) = (write(Entry::V), write(Entry::Y));
+        let results = method(Rates(()), Time(0.0), Length(1.0), v, y);
+        let recording = RECORDING.replace(outer);
+        Program { entries: recording.entries, results }.without_unused()
+    }
+
+    /// The same without entries that no result is made of, such as a stage that counts only in an estimate of the error. The
+    /// state stays, at its place.
+    fn without_unused(self) -> Program {
+        let mut used = vec![false; self.entries.len()];
+        used[..2].fill(true);
+        self.results.iter().for_each(|result| used[result.index()] = true);
+        for (i, entry) in self.entries.iter().enumerate().rev() {
+            if used[i] {
+                entry.operands().iter().for_each(|operand| used[operand.index()] = true);
+            }
+        }
+        let mut place = Vec::with_capacity(used.len());
+        let mut entries = Vec::with_capacity(used.len());
+        for (entry, used) in self.entries.into_iter().zip(used) {
+            place.push(Block(entries.len() as u32));
+            if used {
+                entries.push(entry.moved(|block| place[block.index()]));
+            }
+        }
+        Program { entries, results: self.results.into_iter().map(|result| place[result.index()]).collect() }
+    }
+
+    /// Number of evaluations of the rate of v. Each order of a series counts as one.
+    pub fn evaluations(&self) -> usize {
+        self.entries.iter().filter(|entry| matches!(entry, Entry::Dv(..) | Entry::SeriesV(..))).count()
+    }
+
+    /// The highest order of a series; 0 without one.
+    pub fn series_order(&self) -> u32 {
+        let order = |entry: &Entry| if let Entry::SeriesV(k, ..) | Entry::SeriesY(k, ..) = entry { *k } else { 0 };
+        self.entries.iter().map(order).max().unwrap_or(0)
+    }
+
+    /// Times within a step at which the rates are evaluated, as fractions of the step, ascending.
+    ///
+    /// `of_y`: those of ẏ count too; of a second-order system it does not depend on the time.
+    pub fn nodes(&self, of_y: bool) -> Vec<f64> {
+        let mut nodes: Vec<f64> = Vec::new();
+        for entry in &self.entries {
+            match entry {
+                Entry::Dv(t, ..) => nodes.push(t.0),
+                Entry::Dy(t, ..) if of_y => nodes.push(t.0),
+                Entry::SeriesV(..) | Entry::SeriesY(..) => nodes.push(0.0),
+                _ => {}
+            }
+        }
+        nodes.sort_by(f64::total_cmp);
+        nodes.dedup();
+        nodes
+    }
+
+    /// Executes the program over vectors of numbers, and returns its results.
+    pub fn run<N: Number>(&self, s: &dyn System<N>, t: N, h: N, v: &DVector<N>, y: &DVector<N>) -> Vec<DVector<N>> {
+        let mut blocks: Vec<DVector<N>> = Vec::with_capacity(self.entries.len());
+        let mut series: Option<Vec<(DVector<N>, DVector<N>)>> = None;
+        for entry in &self.entries {
+            let of = |block: Block| &blocks[block.0 as usize];
+            let made = match *entry {
+                Entry::V => v.clone(),
+                Entry::Y => y.clone(),
+                Entry::Dv(at, v, y) => s.dv(at.at(t, h), of(v), of(y)),
+                Entry::Dy(at, v, y) => s.dy(at.at(t, h), of(v), of(y)),
+                Entry::Velocity(d) => s.velocity(of(d)),
+                Entry::Add(a, b) => of(a).zip_map(of(b), |a, b| a + b),
+                Entry::Sub(a, b) => of(a).zip_map(of(b), |a, b| a - b),
+                Entry::Scale(c, a) => of(a).map(|a| N::of(c) * a),
+                Entry::SeriesV(k, v, y) | Entry::SeriesY(k, v, y) => {
+                    let made = series.get_or_insert_with(|| {
+                        let made = coefficients(s, self.series_order(), [t, h, N::of(1.0)], of(v), of(y));
+                        made.0
+                    });
+                    let (v, y) = &made[k as usize - 1];
+                    if matches!(entry, Entry::SeriesV(..)) { v.clone() } else { y.clone() }
+                }
+            };
+            blocks.push(made);
+        }
+        self.results.iter().map(|block| blocks[block.0 as usize].clone()).collect()
+    }
+}
+
+/// Coefficients of v and y, from the first on.
+pub(crate) type Terms<N> = Vec<(DVector<N>, DVector<N>)>;
+
+/// The Taylor coefficients of v and y around a state, from the first on, and the branches of functions that the rates are on; NaN
+/// of numbers, which have no series. The time is that of [`Number::series`].
+pub(crate) fn coefficients<N: Number>(
+    s: &dyn System<N>,
+    order: u32,
+    time: [N; 3],
+    v: &DVector<N>,
+    y: &DVector<N>,
+) -> (Terms<N>, Vec<Branch<N>>) {
+    let start: Vec<N> = v.iter().chain(y).copied().collect();
+    let t = time[0];
+    let mut rates = || s.dv(t, v, y).iter().chain(&s.dy(t, v, y)).copied().collect();
+    let Some(Series { terms, branches }) = N::series(order, &start, time, &mut rates) else {
+        let unknown = N::of(f64::NAN);
+        return ((1..=order).map(|_| (v.map(|_| unknown), y.map(|_| unknown))).collect(), Vec::new());
+    };
+    let block = |numbers: &[N]| DVector::from_column_slice(numbers);
+    (terms.iter().map(|numbers| (block(&numbers[..v.len()]), block(&numbers[v.len()..]))).collect(), branches)
+}
+
+impl Block {
+    /// The coordinates at the start of the step, in every program.
+    pub(crate) const Y: Block = Block(1);
+
+    /// The number of the entry that makes it.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}

@@ -1,0 +1,76 @@
+//! The linear oscillator ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x + a (§3), in canonical and physical form.
+//!
+//! | form | v̇ | ẏ |
+//! |---|---|---|
+//! | canonical | −ω₀(y + 2Dv − x) + a/ω₀ | ω₀v |
+//! | physical | −ω₀²y − 2Dω₀v + ω₀²x + a | v |
+
+use crate::{
+    error::Error,
+    model::{
+        signal::Signal,
+        spec::{Parameters, Signature},
+        system::{Block, Kind, Shape, System},
+    },
+    tape::number::Number,
+};
+
+/// What the core knows of it. Given: `form`; `omega`, `damping` or `drag` (maybe); the inputs `x` and `a` (maybe).
+pub const KIND: Kind = Kind {
+    name: "oscillator",
+    shape,
+    velocity_term: |signature| ["damping", "drag"].into_iter().find(|term| signature.has(term)),
+    quantities: |_| Vec::new(),
+    operations: |_| 40,
+    make,
+};
+
+fn shape(signature: &Signature) -> Result<Shape, Error> {
+    signature.expect("omega", 1)?;
+    match signature.word("form") {
+        "canonical" | "physical" => Ok(Shape { v: 1, y: 1 }),
+        _ => Err(signature.unknown("form")),
+    }
+}
+
+struct Oscillator<N: Number> {
+    stiffness: N,
+    speed: N,
+    drag: Option<N>,
+    inputs: Vec<Signal<N>>,
+}
+
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+    let (h, omega) = (p.h, p.number("omega"));
+    let canonical = p.signature.word("form") == "canonical";
+    let stiffness = if canonical { h * omega } else { h * (omega * omega) };
+    let (speed, by_a) = if canonical { (stiffness, h / omega) } else { (h, h) };
+    let inputs: Vec<_> =
+        [(p.signal("x"), stiffness), (p.signal("a"), by_a)].into_iter().filter_map(|(x, by)| Some(x?.scaled(by))).collect();
+    // A driven oscillator always has its damping term.
+    let damping = p.maybe("damping").or((!inputs.is_empty()).then(|| N::of(0.0)));
+    let drag = p.maybe("drag").map(|drag| h * drag).or(damping.map(|damping| (N::of(2.0) * damping) * (h * omega)));
+    Box::new(Oscillator { stiffness, speed, drag, inputs })
+}
+
+impl<N: Number> System<N> for Oscillator<N> {
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        let mut dv = -(self.stiffness * y[0]);
+        if let Some(drag) = self.drag {
+            dv -= drag * v[0];
+        }
+        let drive = self.inputs.iter().map(|input| input.at(t)).reduce(|sum, input| sum + input);
+        if let Some(drive) = drive {
+            dv += drive;
+        }
+        Block::from_element(1, dv)
+    }
+
+    fn dy(&self, _t: N, v: &Block<N>, _y: &Block<N>) -> Block<N> {
+        v * self.speed
+    }
+
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        d.map(|d| d / self.speed)
+    }
+}

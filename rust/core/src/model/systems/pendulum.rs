@@ -1,0 +1,64 @@
+//! The pendulum v̇ = −ω₀²·sin y − 2Dω₀v + a, ẏ = v: y is the angle from below and v its velocity.
+
+use crate::{
+    error::Error,
+    functions::sin,
+    model::{
+        signal::Signal,
+        spec::{Parameters, Signature},
+        system::{Block, Kind, Shape, System},
+    },
+    tape::number::Number,
+};
+
+/// What the core knows of it. Given: `omega`, `damping` (maybe); the input `a` (maybe).
+pub const KIND: Kind = Kind {
+    name: "pendulum",
+    shape,
+    velocity_term: |signature| signature.has("damping").then_some("damping"),
+    quantities: |_| Vec::new(),
+    operations: |_| 60,
+    make,
+};
+
+fn shape(signature: &Signature) -> Result<Shape, Error> {
+    signature.expect("omega", 1)?;
+    Ok(Shape { v: 1, y: 1 })
+}
+
+struct Pendulum<N: Number> {
+    h: N,
+    stiffness: N,
+    drag: Option<N>,
+    input: Option<Signal<N>>,
+}
+
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+    let (h, omega) = (p.h, p.number("omega"));
+    let input = p.signal("a").map(|a| a.scaled(h));
+    // A driven pendulum always has its damping term.
+    let damping = p.maybe("damping").or(input.is_some().then(|| N::of(0.0)));
+    let drag = damping.map(|damping| (N::of(2.0) * damping) * (h * omega));
+    Box::new(Pendulum { h, stiffness: h * (omega * omega), drag, input })
+}
+
+impl<N: Number> System<N> for Pendulum<N> {
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        let mut dv = -(self.stiffness * sin(y[0]));
+        if let Some(drag) = self.drag {
+            dv -= drag * v[0];
+        }
+        if let Some(input) = self.input {
+            dv += input.at(t);
+        }
+        Block::from_element(1, dv)
+    }
+
+    fn dy(&self, _t: N, v: &Block<N>, _y: &Block<N>) -> Block<N> {
+        v * self.h
+    }
+
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        d.map(|d| d / self.h)
+    }
+}

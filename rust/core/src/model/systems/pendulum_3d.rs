@@ -1,0 +1,84 @@
+//! One rod from the origin to a point in space: v̇ = −pull·y − g, where the pull follows from the length (§12).
+
+use super::rods::{Keeps, cross, dot, largest};
+use crate::{
+    error::Error,
+    model::{
+        spec::{Parameters, Signature},
+        system::{Block, Kind, Shape, System},
+    },
+    tape::number::Number,
+};
+
+/// What the core knows of it. Given: `length` and `gravity`; the word `keeps` (maybe), and for a control its `strength`.
+pub const KIND: Kind = Kind {
+    name: "pendulum_3d",
+    shape,
+    velocity_term: |_| Some("the pull of its rod"),
+    quantities: |_| vec![("length_error".to_owned(), 1), ("angular_momentum".to_owned(), 3)],
+    operations: |_| 25,
+    make,
+};
+
+fn shape(signature: &Signature) -> Result<Shape, Error> {
+    signature.expect("length", 1)?;
+    signature.expect("gravity", 1)?;
+    Keeps::<f64>::check(signature)?;
+    Ok(Shape { v: 3, y: 3 })
+}
+
+/// C̈ = 0, with C = ½(y·y − l²); under control C̈ + 2αĊ + α²C = 0, α = c/h.
+struct Pendulum3D<N: Number> {
+    h: N,
+    length: N,
+    square: N,
+    fall: N,
+    keeps: Keeps<N>,
+}
+
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+    let (h, length) = (p.h, p.number("length"));
+    Box::new(Pendulum3D { h, length, square: length * length, fall: h * p.number("gravity"), keeps: Keeps::new(p) })
+}
+
+impl<N: Number> System<N> for Pendulum3D<N> {
+    fn dv(&self, _t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        let (v, y) = (v.as_slice(), y.as_slice());
+        let square = dot(y, y);
+        let mut pull = self.h * dot(v, v) - self.fall * y[2];
+        if let Keeps::Control { damping, stiffness } = self.keeps {
+            pull = (pull + damping * dot(y, v)) + stiffness * (square - self.square);
+        }
+        let pull = pull / square;
+        let mut dv = Block::from_iterator(3, y.iter().map(|y| -(pull * *y)));
+        dv[2] -= self.fall;
+        dv
+    }
+
+    fn dy(&self, _t: N, v: &Block<N>, _y: &Block<N>) -> Block<N> {
+        v.map(|v| self.h * v)
+    }
+
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        d.map(|d| d / self.h)
+    }
+
+    fn project(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
+        if !matches!(self.keeps, Keeps::Projection) {
+            return (v, y);
+        }
+        let scale = self.length / dot(y.as_slice(), y.as_slice()).sqrt();
+        let y = y.map(|y| y * scale);
+        let along = dot(y.as_slice(), v.as_slice()) / self.square;
+        (v.zip_map(&y, |v, y| v - along * y), y)
+    }
+
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        let (v, y) = (v.as_slice(), y.as_slice());
+        match quantity {
+            "length_error" => Some(vec![largest([dot(y, y).sqrt() / self.length - N::of(1.0)])]),
+            "angular_momentum" => Some(cross(y, v)),
+            _ => None,
+        }
+    }
+}

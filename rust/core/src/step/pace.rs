@@ -1,0 +1,657 @@
+//! Adaptive steps: a member's own time and step, and the decision after each attempt.
+//!
+//! The increments of a step h are h times those of a step of 1. So a system is scaled once, to 1, and stretched to every step.
+
+use crate::{
+    model::{
+        program::Program,
+        system::{Block, Energies, System},
+    },
+    tape::number::Number,
+};
+
+/// A new step is the old one times SAFETY·r^(−5/32)·p^(1/16), r being the error over the tolerance and p that of the step before
+/// (PI control, Gustafsson 1988), held between MIN_FACTOR and MAX_FACTOR; after a rejected step there is no p and no growth.
+/// Where the error is estimated in a higher order than [`LOW`], it is SAFETY·r^(−3/32)·p^(1/32).
+const SAFETY: f64 = 0.9;
+const MIN_FACTOR: f64 = 0.2;
+pub(crate) const MAX_FACTOR: f64 = 5.0;
+/// r below this counts as this.
+const TINY: f64 = 1e-10;
+/// The sixteenth root of the least p, 1e-4, and its thirty-second.
+const CALM_ROOTS: [f64; 2] = [0.562_341_325_190_349_1, 0.749_894_209_332_455_8];
+/// The highest order of an estimate that counts as low.
+const LOW: u32 = 5;
+
+/// A change of y in a step that is smaller than this, relative to the largest size of y so far, is lost in rounding, with some
+/// margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
+/// rounding.
+pub(crate) const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+/// A component that has been zero so far counts as this part of the largest in its block. A cascade or a wave reaches one
+/// component after the other, each at first with a power of the time that is beyond the order of the method: relative to itself
+/// its first step would always be all wrong, however short.
+pub(crate) const ONSET: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// The first step is the fraction FIRST of the time in which the state changes, at the start and at two times ahead: rather too
+/// short than too long, since it then grows by MAX_FACTOR a step. It is at least MOVES times the time of the start, 2¹²
+/// roundings. After a jump it is MIN_FACTOR times the step before.
+const FIRST: f64 = 0.01;
+const MOVES: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of the length that the push would
+/// have made in this part of the time since the start: it must be long beside the roundings of time, and short beside the motion
+/// that follows.
+const PUSHED: f64 = 1.0 / 64.0;
+/// A step in which nothing moves and no stage saw a rate has an estimate of zero that says nothing. The next step is then no
+/// longer than QUIET times the time since the start, or than this one.
+const QUIET: f64 = 1.0 / 32.0;
+/// The most by which a coarse estimate e₃ may exceed a finer one, times √e₃, e₃ relative to the size: a constant of smooth
+/// motions.
+const SMOOTH: f64 = 32.0;
+/// Rates that differ within a step by more than WILD of the size while the finer estimate is more than CHANCE times less: a pole
+/// within the step, of which the method happens to be exact.
+const WILD: f64 = 0.5;
+const CHANCE: f64 = 1024.0;
+/// The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
+const OUTSIDE: f64 = 16.0;
+
+/// What a step must satisfy to be accepted.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Acceptance {
+    /// For each number of v, then of y, the group to which it belongs, counted from 0 without gaps, those of v first. The error
+    /// of a group is the length of its numbers. Empty if v is one group and y is another.
+    pub groups: Vec<u32>,
+    /// Whether each group has tolerances of its own.
+    pub own: bool,
+    /// Numbers of v, then of y, by their places, that must not become negative.
+    pub positive: Vec<u32>,
+}
+
+impl Acceptance {
+    /// How many groups v and y have, of so many numbers.
+    pub(crate) fn counts(&self, v: usize, y: usize) -> [usize; 2] {
+        if self.groups.is_empty() {
+            return [v, y].map(|numbers| usize::from(numbers > 0));
+        }
+        let counted = |groups: &[u32]| groups.iter().max().map_or(0, |last| *last as usize + 1);
+        let of_v = counted(self.groups.get(..v).unwrap_or_default());
+        [of_v, counted(&self.groups) - of_v]
+    }
+
+    /// How many numbers stand behind those of the pace: the largest sizes, and the tolerances of their own.
+    pub fn numbers(&self, v: usize, y: usize) -> usize {
+        let [of_v, of_y] = self.counts(v, y);
+        (of_v + of_y) * if self.own { 3 } else { 1 }
+    }
+
+    /// The size of each group of components: of one number its absolute value, of several their length.
+    pub(crate) fn sizes<N: Number>(&self, v: &[N], y: &[N]) -> Vec<N> {
+        if self.groups.is_empty() {
+            return [v, y].into_iter().filter(|block| !block.is_empty()).map(|block| length(block.iter())).collect();
+        }
+        let [of_v, of_y] = self.counts(v.len(), y.len());
+        let mut members = vec![Vec::new(); of_v + of_y];
+        for (group, number) in self.groups.iter().zip(v.iter().chain(y)) {
+            members[*group as usize].push(number);
+        }
+        members.into_iter().map(|numbers| length(numbers.into_iter())).collect()
+    }
+}
+
+/// The length of some numbers; of one number its absolute value.
+fn length<'a, N: Number>(mut numbers: impl ExactSizeIterator<Item = &'a N>) -> N {
+    match numbers.len() {
+        1 => numbers.next().map_or_else(|| N::of(0.0), |number| absolute(*number)),
+        _ => numbers.fold(N::of(0.0), |total, number| total + *number * *number).sqrt(),
+    }
+}
+
+/// Sizes of the groups of components, and what is tolerated of them. They stand behind the pace, in this order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scales<N> {
+    /// The largest size so far of each group.
+    pub longest: Vec<N>,
+    /// Tolerances of their own: the relative one of each group, then the absolute one of each; empty if there are none.
+    pub own: Vec<N>,
+}
+
+impl<N: Number> Scales<N> {
+    /// From its numbers.
+    pub(crate) fn of(numbers: &[N], own: bool) -> Self {
+        let (longest, own) = numbers.split_at(if own { numbers.len() / 3 } else { numbers.len() });
+        Scales { longest: longest.to_vec(), own: own.to_vec() }
+    }
+
+    /// The relative and the absolute tolerance of a group.
+    pub(crate) fn tolerances(&self, group: usize, pace: &Pace<N>) -> [N; 2] {
+        match self.own.get(group).zip(self.own.get(self.longest.len() + group)) {
+            Some((relative, absolute)) => [*relative, *absolute],
+            None => [pace.relative, pace.absolute],
+        }
+    }
+}
+
+/// The time of a member and the state of its step-size controller. Steps do not depend on the saved times: a step that passes the
+/// next of them is held, not taken, until the states within it are saved. Each is computed by an extra step from the start of the
+/// held one. An extra step whose error is not tolerated shows that the held one missed something: that one is then rejected.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace<N> {
+    /// Its time.
+    pub t: N,
+    /// The step that it will try next.
+    pub h: N,
+    /// The next output time.
+    pub target: N,
+    /// Above zero: the length of the extra step that comes next, to a saved time.
+    pub extra: N,
+    /// 1 if the next step is held: it was accepted, but passes the target.
+    pub held: N,
+    /// Tolerated error of a step, relative to the size of a group of components.
+    pub relative: N,
+    /// Tolerated error in addition to the relative one.
+    pub absolute: N,
+    /// 1 if errors are relative to the largest size of a group so far, 0 if they are relative to its present size.
+    pub lasts: N,
+    /// The time of the start.
+    pub begin: N,
+    /// The longest step while inputs change from sample to sample: it skips no sample.
+    pub interval: N,
+    /// The time until which inputs change from sample to sample.
+    pub until: N,
+    /// The longest step.
+    pub most_step: N,
+    /// The time that no step crosses, just before the next jump.
+    pub wall: N,
+    /// The sixteenth root of the last accepted error, or its thirty-second.
+    pub before: N,
+    /// How much the next step may grow.
+    pub most: N,
+    /// Accepted attempts.
+    pub accepted: N,
+    /// Rejected attempts.
+    pub rejected: N,
+    /// Steps for saved states: the extra ones, and those that were held and are made once more.
+    pub extra_steps: N,
+    /// The last error over the tolerance.
+    pub error: N,
+    /// The energy that a control or projection added in accepted steps; for a control the sum over their evaluations.
+    pub work: N,
+}
+
+/// The next attempt.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outlook<N: Number> {
+    /// How long the step is.
+    pub step: N,
+    /// Whether it is an extra one.
+    pub is_extra: N::Truth,
+    /// Whether it ends at the wall.
+    pub ends: N::Truth,
+    /// Whether it is a step of the run: not at the target, not held, not out of attempts, and the time moves.
+    pub runs: N::Truth,
+}
+
+impl Pace<f64> {
+    /// Whether there is a step of the run to try.
+    pub(crate) fn runs(&self, budget: f64) -> bool {
+        self.outlook(budget).runs
+    }
+
+    /// The same of many members, from rows of their numbers: without moving what is not needed, for this is asked after every
+    /// attempt.
+    pub(crate) fn find_running<'a>(row: impl Fn(usize) -> &'a [f64], budget: f64, runs: &mut [bool]) {
+        let places = Pace::of(std::array::from_fn(|i| i as f64));
+        let row = |place: f64| row(place as usize);
+        let (t, h, target, wall, held) = (row(places.t), row(places.h), row(places.target), row(places.wall), row(places.held));
+        let (extra, accepted, rejected) = (row(places.extra), row(places.accepted), row(places.rejected));
+        let times = t.iter().zip(h).zip(target.iter().zip(wall));
+        let counts = held.iter().zip(extra).zip(accepted.iter().zip(rejected));
+        for (runs, (((t, h), (target, wall)), ((held, extra), (accepted, rejected)))) in runs.iter_mut().zip(times.zip(counts)) {
+            let moves = (*t < *target) & (*t < *wall) & (*t < *t + *h);
+            *runs = moves & (*accepted + *rejected < budget) & (*held <= 0.0) & (*extra <= 0.0);
+        }
+    }
+
+    /// How many steps of the present length are left to the next output times, in the mean of those members that are not there.
+    pub(crate) fn steps_left<'a>(row: impl Fn(usize) -> &'a [f64]) -> f64 {
+        let places = Pace::of(std::array::from_fn(|i| i as f64));
+        let [t, h, target] = [places.t, places.h, places.target].map(|place| row(place as usize));
+        let left = t.iter().zip(h).zip(target).filter(|((t, _), target)| t < target).map(|((t, h), target)| (target - t) / h);
+        let (count, sum) = left.fold((0.0, 0.0), |(n, sum), left| (n + 1.0, sum + left));
+        if count > 0.0 { sum / count } else { 0.0 }
+    }
+
+    /// Whether the next output time is within the held step.
+    pub(crate) fn holds(&self) -> bool {
+        self.held > 0.0 && self.target < self.reach().0
+    }
+
+    /// Where a member goes on that has come to a wall: from a time just after the jump, to the next wall, with a step that is
+    /// chosen anew. A series chooses its step by itself.
+    #[must_use]
+    pub(crate) fn crossed(self, after: f64, wall: f64, series: bool) -> Self {
+        let (least, first) = (MOVES * after.abs(), MIN_FACTOR * self.h);
+        let h = if series { self.h } else { longer(first, least) };
+        let before = if series { MIN_FACTOR * self.before } else { 1.0 };
+        Pace { t: after, wall, h, before, most: MAX_FACTOR, ..self }
+    }
+
+    /// The same where nothing runs.
+    #[must_use]
+    pub(crate) fn idle(self) -> Self {
+        Pace { target: self.t, extra: 0.0, held: 0.0, ..self }
+    }
+}
+
+impl<N: Number> Pace<N> {
+    /// How many numbers it has.
+    pub const NUMBERS: usize = 20;
+    /// Places of the time and of the step to try next among them.
+    pub(crate) const PLACES: [usize; 2] = [0, 1];
+
+    /// From its numbers.
+    pub fn of(numbers: [N; 20]) -> Self {
+        let [t, h, target, extra, held, relative, absolute, lasts, begin, interval, rest @ ..] = numbers;
+        let [until, most_step, wall, before, most, accepted, rejected, extra_steps, error, work] = rest;
+        Pace {
+            t,
+            h,
+            target,
+            extra,
+            held,
+            relative,
+            absolute,
+            lasts,
+            begin,
+            interval,
+            until,
+            most_step,
+            wall,
+            before,
+            most,
+            accepted,
+            rejected,
+            extra_steps,
+            error,
+            work,
+        }
+    }
+
+    /// Its numbers.
+    pub fn numbers(&self) -> [N; 20] {
+        let Pace { t, h, target, extra, held, relative, absolute, lasts, begin, interval, .. } = *self;
+        let Pace { until, most_step, wall, before, most, accepted, rejected, extra_steps, error, work, .. } = *self;
+        [
+            t,
+            h,
+            target,
+            extra,
+            held,
+            relative,
+            absolute,
+            lasts,
+            begin,
+            interval,
+            until,
+            most_step,
+            wall,
+            before,
+            most,
+            accepted,
+            rejected,
+            extra_steps,
+            error,
+            work,
+        ]
+    }
+
+    /// Where a member stands at the start, and the sizes of its groups. A step to try first that is below zero is chosen here: a
+    /// share of the shortest time in which a group changes by its size. `s` is scaled to a step of 1; `series` says whether the
+    /// method is one.
+    #[must_use]
+    pub(crate) fn begun(
+        self,
+        s: &dyn System<N>,
+        acceptance: &Acceptance,
+        series: bool,
+        v: &Block<N>,
+        y: &Block<N>,
+    ) -> (Self, Vec<N>) {
+        let zero = N::of(0.0);
+        let rates = [s.dv(self.t, v, y), s.dy(self.t, v, y)];
+        let longest = acceptance.sizes(v.as_slice(), y.as_slice());
+        let counts = acceptance.counts(v.len(), y.len());
+        let shortest = |rates: &[Block<N>; 2]| {
+            let rates = acceptance.sizes(rates[0].as_slice(), rates[1].as_slice());
+            let mut times: Vec<N> = longest.iter().zip(&rates).map(|(length, rate)| *length / *rate).collect();
+            if counts[0] > 0 && counts[1] > 0 {
+                let lengths = paired(&longest[counts[0]..], counts[0]);
+                times.extend(lengths.into_iter().zip(&rates).map(|(length, rate)| (length / *rate).sqrt()));
+            }
+            let shorter = |least: N, time: N| N::choose(zero.below(time) & time.below(least), time, least);
+            times.into_iter().fold(N::of(f64::INFINITY), shorter)
+        };
+        let least = N::of(MOVES) * longer(self.t, -self.t);
+        let time = shortest(&rates);
+        // Where no component changes by its size, the times of whole blocks count, whatever the units of their components.
+        let changes = acceptance.sizes(rates[0].as_slice(), rates[1].as_slice());
+        let of_block = |least: N, block: std::ops::Range<usize>| {
+            let time = total(&longest[block.clone()]) / total(&changes[block.clone()]);
+            let shorter = N::choose(zero.below(time) & time.below(least), time, least);
+            if block.is_empty() { least } else { shorter }
+        };
+        let blocks = [0..counts[0], counts[0]..counts[0] + counts[1]].into_iter().fold(N::of(f64::INFINITY), of_block);
+        let time = N::choose(time.below(N::of(f64::INFINITY)), time, blocks);
+        let chosen = longer(N::choose(time.below(N::of(f64::INFINITY)), N::of(FIRST) * time, -self.h), least);
+        let mut h = chosen;
+        for part in [0.5, 1.0] {
+            let ahead = N::of(part) * chosen;
+            let t = self.t + ahead;
+            let [v, y] = [(v, &rates[0]), (y, &rates[1])].map(|(block, rate)| block.zip_map(rate, |x, rate| x + ahead * rate));
+            let time = N::of(FIRST) * shortest(&[s.dv(t, &v, &y), s.dy(t, &v, &y)]);
+            h = N::choose(time.below(h), time, h);
+        }
+        let h = self.shortened(N::choose(zero.below(self.h), self.h, longer(h, least)), self.t);
+        (Pace { h, before: if series { h } else { self.before }, ..self }, longest)
+    }
+
+    /// Where the next step ends, and whether that is at the wall.
+    fn reach(&self) -> (N, N::Truth) {
+        let ends = self.wall.below(self.t + self.h);
+        (N::choose(ends, self.wall, self.t + self.h), ends)
+    }
+
+    /// What comes next.
+    pub(crate) fn outlook(&self, budget: N) -> Outlook<N> {
+        let zero = N::of(0.0);
+        let is_extra = zero.below(self.extra);
+        let ends = self.reach().1;
+        let moves = self.t.below(self.t + self.h);
+        let left = (self.accepted + self.rejected).below(budget);
+        let waits = self.t.below(self.target) & self.t.below(self.wall);
+        let runs = waits & moves & left & self.held.at_most(zero) & !is_extra;
+        let step = N::choose(is_extra, self.extra, N::choose(ends, self.wall - self.t, self.h));
+        Outlook { step, is_extra, ends, runs }
+    }
+
+    /// A step from t, no longer than is allowed there.
+    pub(crate) fn shortened(&self, h: N, t: N) -> N {
+        let most = N::choose(t.below(self.until) & self.interval.below(self.most_step), self.interval, self.most_step);
+        N::choose(most.below(h), most, h)
+    }
+}
+
+/// For each group of v the size of its y; where they are not so many, the largest.
+fn paired<N: Number>(of_y: &[N], number: usize) -> Vec<N> {
+    if of_y.len() == number { of_y.to_vec() } else { vec![largest(of_y); number] }
+}
+
+/// A system scaled to a step of 1, stretched to another.
+pub(crate) struct Stretched<N: Number> {
+    /// The system.
+    pub s: Box<dyn System<N>>,
+    /// The step.
+    pub h: N,
+}
+
+impl<N: Number> System<N> for Stretched<N> {
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.s.dv(t, v, y).map(|dv| self.h * dv)
+    }
+
+    fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.s.dy(t, v, y).map(|dy| self.h * dy)
+    }
+
+    fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
+        let Energies { dv, kinetic, whole } = self.s.energies(v, y)?;
+        Some(Energies { dv: dv.map(|dv| self.h * dv), kinetic: self.h * kinetic, whole: self.h * whole })
+    }
+}
+
+/// How an attempt uses a system.
+pub(crate) struct Attempted<'a, N: Number> {
+    /// The rates for a step, under a control if there is one.
+    pub rates: &'a dyn Fn(N) -> Box<dyn System<N>>,
+    /// The system scaled to 1, under a projection if there is one.
+    pub projected: &'a dyn System<N>,
+}
+
+/// What an attempt made: squares are nowhere, only sizes of groups.
+#[derive(Debug)]
+pub(crate) struct Made<N> {
+    /// Before the step.
+    pub old: Vec<N>,
+    /// After it.
+    pub new: Vec<N>,
+    /// Of one or two estimates of the error.
+    pub errors: Vec<Vec<N>>,
+    /// The numbers that have to stay positive.
+    pub positive: Vec<N>,
+}
+
+impl<N: Number> Made<N> {
+    /// From the state before, and behind the state after it the estimates, both blocks of each in turn.
+    pub(crate) fn of(acceptance: &Acceptance, old: [&[N]; 2], blocks: &[&[N]]) -> Self {
+        let sizes = |pair: &[&[N]]| acceptance.sizes(pair[0], pair[1]);
+        let mut pairs = blocks.chunks_exact(2);
+        let after = pairs.next().unwrap_or(&[&[], &[]]);
+        let component = |place: u32| after.iter().copied().flatten().nth(place as usize).copied();
+        Made {
+            old: sizes(&old),
+            new: sizes(after),
+            errors: pairs.map(sizes).collect(),
+            positive: acceptance.positive.iter().filter_map(|place| component(*place)).collect(),
+        }
+    }
+}
+
+/// One attempt at a step: the state goes on, projected, if its error is tolerated. `order` is that of the estimate. An extra step
+/// that is accepted leaves the pace as it is, and its state has to be put back. Also the largest sizes so far.
+#[allow(clippy::too_many_arguments, reason = "all that an attempt depends on")]
+pub(crate) fn attempt<N: Number>(
+    program: &Program,
+    system: &Attempted<N>,
+    order: u32,
+    acceptance: &Acceptance,
+    (pace, scales): (Pace<N>, &Scales<N>),
+    budget: N,
+    v: &Block<N>,
+    y: &Block<N>,
+) -> (Pace<N>, Vec<N>, Block<N>, Block<N>) {
+    let outlook = pace.outlook(budget);
+    let s = (system.rates)(outlook.step);
+    let mut made = program.run(s.as_ref(), pace.t, outlook.step, v, y);
+    let blocks: Vec<&[N]> = made.iter().map(Block::as_slice).collect();
+    let sizes = Made::of(acceptance, [v.as_slice(), y.as_slice()], &blocks);
+    let (next, longest, took) = judge(&pace, scales, order, acceptance.counts(v.len(), y.len()), &sizes, outlook);
+    made.truncate(2);
+    let (Some(new_y), Some(new_v)) = (made.pop(), made.pop()) else { return (next, longest, v.clone(), y.clone()) };
+    let (new_v, new_y) = system.projected.project(new_v, new_y);
+    let pushed = s.tally().map(|tally| tally / outlook.step);
+    let next = match pushed.or(system.projected.tally()) {
+        Some(done) => Pace { work: N::choose(took & !outlook.is_extra, pace.work + done, pace.work), ..next },
+        None => next,
+    };
+    let goes_on = |new: &Block<N>, old: &Block<N>| new.zip_map(old, |new, old| N::choose(took, new, old));
+    (next, longest, goes_on(&new_v, v), goes_on(&new_y, y))
+}
+
+/// What comes after an attempt, the largest sizes so far, and whether the state goes on. `counts` are how many groups v and y
+/// have.
+pub(crate) fn judge<N: Number>(
+    pace: &Pace<N>,
+    scales: &Scales<N>,
+    order: u32,
+    counts: [usize; 2],
+    made: &Made<N>,
+    outlook: Outlook<N>,
+) -> (Pace<N>, Vec<N>, N::Truth) {
+    let zero = N::of(0.0);
+    let (least, bound) = pace.tolerated(scales, outlook.step, counts, &made.old, &made.new);
+    let mut r = made.errors.first().map_or(zero, |error| over(error, &bound));
+    if let Some(coarse) = made.errors.get(1) {
+        let size: Vec<N> = scales.longest.iter().zip(&made.new).map(|(so_far, new)| longer(*so_far, *new)).collect();
+        let (second, share) = (over(coarse, &bound), over(coarse, &size));
+        let other = second / r;
+        let by_chance = N::of(CHANCE).below(other) & N::of(WILD).below(share);
+        if order > LOW {
+            // Where rates jump, the finer estimate may be next to nothing by chance: it is corrected only where both are as of
+            // smooth rates.
+            let smooth = (other * other * share).below(N::of(SMOOTH * SMOOTH));
+            r = N::choose(zero.below(r) & smooth, r / (N::of(1.0) + N::of(0.01) * (other * other)).sqrt(), r);
+        }
+        r = N::choose(by_chance, second, r);
+    }
+    // Sizes that overflow would tolerate any error, so they count as not finite; and so does a stage that only the estimate sees.
+    let all = made.errors.first().map_or(total(&made.new), |error| total(&made.new) + total(error));
+    r = N::choose(all.below(N::of(f64::INFINITY)), r, N::of(f64::INFINITY));
+    for number in &made.positive {
+        r = N::choose(number.below(zero), longer(r, N::of(OUTSIDE)), r);
+    }
+    let changes: Vec<N> = made.new.iter().zip(&made.old).map(|(new, old)| absolute(*new - *old)).collect();
+    let moved = made.errors.first().map_or(total(&changes), |error| total(error) + total(&changes));
+    let rests = moved.at_most(zero);
+    pace.decided(order > LOW, (r, rests), (&scales.longest, &least), outlook)
+}
+
+/// The largest error of a group over what is tolerated. A group that is zero, as it has always been, tolerates no error and has
+/// none.
+pub(crate) fn over<N: Number>(error: &[N], bound: &[N]) -> N {
+    let zero = N::of(0.0);
+    let shares = error.iter().zip(bound).map(|(error, bound)| N::choose(error.at_most(zero), zero, *error / *bound));
+    shares.reduce(longer).unwrap_or(zero)
+}
+
+/// |x|
+fn absolute<N: Number>(x: N) -> N {
+    x.and_bits(u64::MAX >> 1)
+}
+
+/// The larger of two sizes.
+pub(crate) fn longer<N: Number>(a: N, b: N) -> N {
+    N::choose(a.below(b), b, a)
+}
+
+/// The largest of some sizes.
+pub(crate) fn largest<N: Number>(sizes: &[N]) -> N {
+    sizes.iter().copied().reduce(longer).unwrap_or_else(|| N::of(0.0))
+}
+
+/// The sum of some sizes.
+pub(crate) fn total<N: Number>(sizes: &[N]) -> N {
+    sizes.iter().copied().reduce(|total, size| total + size).unwrap_or_else(|| N::of(0.0))
+}
+
+impl<N: Number> Pace<N> {
+    /// Of each group the size that it has at least after the step, and the error that is tolerated. `counts` are how many groups
+    /// v and y have; `old` and `new` are their sizes before and after the step.
+    fn tolerated(&self, scales: &Scales<N>, step: N, counts: [usize; 2], old: &[N], new: &[N]) -> (Vec<N>, Vec<N>) {
+        let zero = N::of(0.0);
+        // A state at zero so far on which a force sets in counts as long as that force would have made it in a part of the time
+        // since.
+        let since = longer(N::of(1.0), N::of(PUSHED) * ((self.t + step - self.begin) / step));
+        let rested = total(&scales.longest).at_most(zero);
+        let (mut lasting, mut least) = (Vec::new(), Vec::new());
+        let of_v = counts[0];
+        for block in [0..of_v, of_v..of_v + counts[1]] {
+            let (longest, after) = (&scales.longest[block.clone()], &new[block]);
+            if let ([size], [now]) = (longest, after) {
+                lasting.push(N::choose(rested, *now * since, *size));
+                least.push(*now);
+            } else if !after.is_empty() {
+                let onset = N::of(ONSET) * longer(largest(longest), largest(after));
+                for (size, now) in longest.iter().zip(after) {
+                    let been = zero.below(*size);
+                    lasting.push(N::choose(been, *size, N::choose(rested, *now * since, onset)));
+                    least.push(N::choose(been | rested, *now, longer(*now, onset)));
+                }
+            }
+        }
+        if counts[0] > 0 && counts[1] > 0 {
+            let lost = N::of(ROUNDING) / step;
+            for (size, of_y) in lasting.iter_mut().zip(paired(&scales.longest[of_v..], of_v)) {
+                *size = longer(*size, of_y * lost);
+            }
+        }
+        let bound = |group: usize| {
+            let size = longer(N::choose(zero.below(self.lasts), lasting[group], old[group]), new[group]);
+            let [relative, absolute] = scales.tolerances(group, self);
+            absolute + relative * size
+        };
+        let bound = (0..new.len()).map(bound).collect();
+        (least, bound)
+    }
+
+    /// What comes after an attempt with this error, the largest sizes so far, and whether the state goes on. `high`: the estimate
+    /// is of a high order; `rests`: nothing moved; `longest` and `new` are the largest sizes before, and those that the groups
+    /// would have.
+    fn decided(
+        &self,
+        high: bool,
+        (r, rests): (N, N::Truth),
+        (longest, new): (&[N], &[N]),
+        outlook: Outlook<N>,
+    ) -> (Pace<N>, Vec<N>, N::Truth) {
+        let number = N::of;
+        let Outlook { step, is_extra, ends, runs } = outlook;
+        let good = r.at_most(number(1.0)); // NaN is not
+        let floored = N::choose(number(TINY).below(r), r, number(TINY));
+        let r8 = floored.sqrt().sqrt().sqrt(); // the eighth root of r
+        let r16 = r8.sqrt();
+        let r32 = r16.sqrt();
+        let factor = number(SAFETY) / (if high { r16 } else { r8 } * r32);
+        let factor = N::choose(good, factor * self.before, factor);
+        let factor = N::choose(number(MIN_FACTOR).below(factor), factor, number(MIN_FACTOR));
+        let ceiling = N::choose(good, self.most, number(1.0));
+        let factor = N::choose(factor.below(ceiling), factor, ceiling);
+        let factor = N::choose(r.below(number(f64::INFINITY)), factor, number(MIN_FACTOR));
+        let reached = N::choose(ends, self.wall, self.t + step);
+        let passes = self.target.below(reached);
+        let (takes, holds, fails) = (runs & good & !passes, runs & good & passes, (runs | is_extra) & !good);
+        let decides = takes | fails;
+        let (root, calm) = if high { (r32, CALM_ROOTS[1]) } else { (r16, CALM_ROOTS[0]) };
+        let root = N::choose(number(calm).below(root), root, number(calm));
+        let count = |truth: N::Truth| N::choose(truth, number(1.0), number(0.0));
+        let t = N::choose(takes, reached, self.t);
+        let grown = N::choose(takes & ends, self.h, step * factor);
+        let quiet = longer(step, number(QUIET) * (reached - self.begin));
+        let grown = self.shortened(N::choose(takes & rests & quiet.below(grown), quiet, grown), t);
+        let next = Pace {
+            t,
+            h: N::choose(decides, grown, self.h),
+            extra: N::choose(is_extra, number(0.0), self.extra),
+            held: N::choose(holds, number(1.0), N::choose(fails, number(0.0), self.held)),
+            before: N::choose(takes, root, self.before),
+            most: N::choose(decides, N::choose(good, number(MAX_FACTOR), number(1.0)), self.most),
+            accepted: self.accepted + count(takes),
+            rejected: self.rejected + count(fails),
+            extra_steps: self.extra_steps + count(holds | (is_extra & good)),
+            error: N::choose(decides, r, self.error),
+            ..*self
+        };
+        let grows = longest.iter().zip(new).map(|(so_far, new)| N::choose(takes & so_far.below(*new), *new, *so_far));
+        (next, grows.collect(), takes | (is_extra & good))
+    }
+}
+
+/// A system whose time runs backward: it is scaled to a step of −1, and the time is that of the run, negated.
+pub(crate) struct Backward<N: Number>(pub Box<dyn System<N>>);
+
+impl<N: Number> System<N> for Backward<N> {
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.0.dv(-t, v, y)
+    }
+
+    fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.0.dy(-t, v, y)
+    }
+
+    fn project(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
+        self.0.project(v, y)
+    }
+
+    fn tally(&self) -> Option<N> {
+        self.0.tally()
+    }
+}

@@ -1,0 +1,85 @@
+//! What is known of a step before it is traced: sizes and approximate numbers of operations.
+
+use super::key::StepKind;
+use crate::{
+    error::Error,
+    model::{
+        around::{self, contact, controls},
+        spec::Signature,
+        steppers::method,
+        system::Shape,
+        systems::{equations, kind},
+    },
+};
+
+/// The most operations of a step that is a single tape. Writing the code of one operation takes about a microsecond, and longer
+/// code would not stay in the instruction cache.
+pub(crate) const MAX_TAPE_OPERATIONS: usize = 4000;
+
+/// The size of the blocks of a scene, or an error if its parameters are wrong or the method cannot step it.
+pub(crate) fn shape(signature: &Signature, how: &StepKind) -> Result<Shape, Error> {
+    match how {
+        StepKind::Matrix { .. } => {
+            let (n, v) = (signature.whole("n"), signature.whole("n_v").min(signature.whole("n")));
+            Ok(Shape { v, y: n - v })
+        }
+        StepKind::Step(step) => equations::fit(step, signature),
+        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => {
+            around::fit(kind(signature)?, signature, method(name)?)
+        }
+    }
+}
+
+/// Numbers of a recorded quantity.
+fn quantity(signature: &Signature, name: &str) -> Result<usize, Error> {
+    let known = (kind(signature)?.quantities)(signature);
+    let found = known.iter().find(|(known, _)| *known == name);
+    found
+        .map(|(_, numbers)| *numbers)
+        .ok_or_else(|| Error::Options { system: signature.system.clone(), options: format!("record {name}") })
+}
+
+/// How many numbers are recorded in all.
+pub(crate) fn recorded(signature: &Signature, names: &[String]) -> Result<usize, Error> {
+    names.iter().try_fold(0, |sum, name| Ok(sum + quantity(signature, name)?))
+}
+
+/// Approximate numbers of operations of the rates of a scene and of a step.
+pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) -> Result<(usize, usize), Error> {
+    Ok(match how {
+        StepKind::Matrix { nodes } => {
+            let n = shape.v + shape.y;
+            let products = n * (n + signature.whole("inputs") * nodes.len());
+            (2 * products, 2 * products)
+        }
+        StepKind::Step(step) => (step.operations(), step.operations()),
+        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => {
+            let rates = (kind(signature)?.operations)(signature);
+            let method = method(name)?;
+            let attempt = if matches!(how, StepKind::Attempts { .. }) { method.attempt() } else { None };
+            // Potentials take as long as forces, and are found at the end of a step, too, where a projection asks for them.
+            let controls = if controls::is_given(signature) { 2 } else { 1 };
+            let contacts = contact::operations(signature, shape);
+            let program = attempt.unwrap_or_else(|| method.program());
+            // The coefficient k of a product is a sum of k + 1 products.
+            let order = match how {
+                StepKind::Attempts { order, .. } if *order > 0 && program.series_order() > 0 => *order as usize,
+                _ => program.series_order() as usize,
+            };
+            let evaluations = if order > 0 { order * (order + 1) / 2 } else { program.evaluations() };
+            (controls * rates, controls * rates * evaluations + contacts)
+        }
+    })
+}
+
+/// Whether steps are made by a series of the solution.
+pub(super) fn has_series(how: &StepKind) -> Result<bool, Error> {
+    Ok(match how {
+        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => method(name)?.program().series_order() > 0,
+        StepKind::Step(_) | StepKind::Matrix { .. } => false,
+    })
+}
+
+/// The most operations, approximately, of a step that is one tape in any case: by a series, one that is given, or one of members
+/// that have times of their own. It takes some ten nanoseconds a byte to compile.
+pub(super) const MAX_LONG_TAPE_OPERATIONS: usize = 100_000;

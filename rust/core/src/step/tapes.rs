@@ -1,0 +1,238 @@
+//! The tapes of a step and its properties, each found on first use and kept.
+
+use std::sync::{Arc, LazyLock, OnceLock};
+
+use super::{
+    cache::Cache,
+    key::{StepKind, TapeKey},
+    leaves::BEGINS,
+    properties::{MAX_LONG_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, has_series, operations, recorded, shape},
+    trace::{trace_begin, trace_by_terms, trace_record, trace_slot, trace_step},
+    watch,
+};
+use crate::{
+    error::Error,
+    model::{
+        around::{self, controls},
+        steppers::method,
+        system::Shape,
+    },
+    stage::Stage,
+    tape::{
+        Counts, Id, Tape,
+        fuse::fuse,
+        real::{Precision, Real},
+    },
+};
+
+/// The tapes of a step.
+pub struct Tapes<T: Real = f64> {
+    /// One step, or one attempt, of the whole state. Attempts by a series return its coefficients behind the state.
+    pub step: Stage<T>,
+    /// The same attempt by coefficients that are known, behind the state: saved states, and a held step when it is taken. Not
+    /// where operations are fused, for the attempt may fuse what made the coefficients.
+    pub by_terms: Option<Stage<T>>,
+    /// Of attempts: the pace behind the state, as it is at the start: see `Pace::begun`. Its operations are never fused.
+    pub begin: Option<Stage<T>>,
+    /// Turns velocities into what the method carries.
+    pub start: Option<Stage<T>>,
+    /// Turns what the method carries into velocities.
+    pub finish: Option<Stage<T>>,
+    /// A step that also returns the velocities before it, after the next state, for a run that saves all of them; None if the
+    /// state has them already.
+    pub step_with_velocities: Option<Stage<T>>,
+    /// The recorded numbers, behind v and y.
+    pub record: Option<Stage<T>>,
+    /// Operations of a step before equal ones were merged, but for those that a method does to blocks.
+    pub written: Counts,
+    /// To how many evaluations of the rates a step with a series is equal, by the operations; 0 without one.
+    pub series_evaluations: usize,
+}
+
+/// The properties and tapes of a step. Expensive ones are found on first use.
+pub struct Traced {
+    key: TapeKey,
+    /// How large the blocks are.
+    pub shape: Shape,
+    /// How many numbers of the state stand behind v and y: a sum over the steps, the tally, if the system has one; what is
+    /// watched.
+    pub tally: usize,
+    /// How many numbers are recorded.
+    pub recorded: usize,
+    /// Whether the method has a carry instead of v between steps.
+    pub carries: bool,
+    /// Whether steps are made by a series, which is one tape however long.
+    pub series: bool,
+    /// Approximate numbers of operations of the rates and of a step.
+    pub operations: (usize, usize),
+    tapes: OnceLock<Arc<Tapes>>,
+    /// The same for numbers of 32 bits.
+    singles: OnceLock<Arc<Tapes<f32>>>,
+}
+
+impl TapeKey {
+    /// What is known of it, or was found before.
+    pub fn traced(&self) -> Result<Arc<Traced>, Error> {
+        static CACHE: LazyLock<Cache<TapeKey, Traced>> = LazyLock::new(Cache::default);
+        CACHE.find(self, || {
+            let shape = shape(&self.signature, &self.how)?;
+            let operations = operations(&self.signature, &self.how, shape)?;
+            let series = has_series(&self.how)?;
+            if series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
+                return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
+            }
+            if self.fused && !series && operations.1 > MAX_TAPE_OPERATIONS {
+                return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
+            }
+            let own_times = self.signature.count(BEGINS) > 0;
+            if own_times && operations.1 > MAX_LONG_TAPE_OPERATIONS {
+                return Err(Error::TooLongForTimes { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
+            }
+            if self.precision == Precision::Single {
+                self.fits_single(operations.1)?;
+            }
+            let (mut tally, mut carries) = (0, false);
+            if let StepKind::Method { name, .. } = &self.how {
+                watch::check(&self.signature, shape)?;
+                tally = usize::from(controls::is_given(&self.signature)) + watch::numbers(&self.signature);
+                carries = method(name)?.carry.is_some();
+            }
+            if let StepKind::Attempts { name, .. } = &self.how {
+                around::only_fixed(&self.signature)?;
+                method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?;
+            }
+            let traced = Traced {
+                shape,
+                tally,
+                carries,
+                series,
+                recorded: recorded(&self.signature, &self.record)?,
+                operations,
+                tapes: OnceLock::new(),
+                singles: OnceLock::new(),
+                key: self.clone(),
+            };
+            let is_one = series || own_times || matches!(self.how, StepKind::Step(_));
+            let most = if is_one { MAX_LONG_TAPE_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
+            Ok((traced, operations.1.min(most)))
+        })
+    }
+}
+
+/// Operations of a step from which on it may take so long that Ctrl-C must be answered within it.
+const LONG_STEP_OPERATIONS: usize = 1 << 24;
+
+impl Traced {
+    /// Whether a step of so many members may take long.
+    pub(crate) fn is_long(&self, members: usize) -> bool {
+        self.operations.1.saturating_mul(members) >= LONG_STEP_OPERATIONS
+    }
+
+    /// How many steps of so many members have that many operations; one or more.
+    pub(crate) fn steps_of(&self, members: usize, operations: usize) -> i64 {
+        (operations / self.operations.1.saturating_mul(members).max(1)).max(1) as i64
+    }
+
+    /// Its key.
+    pub(crate) fn key(&self) -> &TapeKey {
+        &self.key
+    }
+
+    /// The tapes of all that a run needs.
+    pub fn tapes(&self) -> Result<Arc<Tapes>, Error> {
+        self.tapes_of()
+    }
+
+    /// The same, for numbers of the key's precision.
+    pub(crate) fn tapes_of<T: Traceable>(&self) -> Result<Arc<Tapes<T>>, Error> {
+        let known = T::known(self);
+        if let Some(tapes) = known.get() {
+            return Ok(Arc::clone(tapes));
+        }
+        let tapes = Arc::new(self.key.trace()?);
+        Ok(Arc::clone(known.get_or_init(|| tapes)))
+    }
+}
+
+/// Numbers whose tapes are kept.
+pub trait Traceable: Real {
+    /// Where.
+    fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<Self>>>;
+}
+
+impl Traceable for f64 {
+    fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<f64>>> {
+        &traced.tapes
+    }
+}
+
+impl Traceable for f32 {
+    fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<f32>>> {
+        &traced.singles
+    }
+}
+
+impl TapeKey {
+    /// An error if a step of so many operations cannot be computed with numbers of 32 bits.
+    fn fits_single(&self, operations: usize) -> Result<(), Error> {
+        if operations > MAX_TAPE_OPERATIONS {
+            return Err(Error::TooLongForSingle { operations, most: MAX_TAPE_OPERATIONS });
+        }
+        let of = match (&self.how, self.signature.tables.first()) {
+            (StepKind::Attempts { .. }, _) => "adaptive steps",
+            (StepKind::Matrix { .. }, _) => "the matrix form",
+            (_, Some(_)) => "sampled inputs",
+            _ if self.signature.watched.is_some() => "events",
+            _ if has_series(&self.how)? => "the series of a solution",
+            _ => return Ok(()),
+        };
+        Err(Error::NotSingle { of })
+    }
+
+    /// Traces all that a run needs, anew.
+    pub(crate) fn trace<T: Real>(&self) -> Result<Tapes<T>, Error> {
+        debug_assert!(T::PRECISION == self.precision, "the tapes of a step have its precision");
+        let new = || Tape::new(T::PRECISION);
+        let steps = trace_step(new(), &self.signature, &self.how)?;
+        let fused = |tape: Tape, next: Vec<Id>| if self.fused { fuse(&tape, &next) } else { (tape, next) };
+        let (mut start, mut finish) = (None, None);
+        if let StepKind::Method { name, choice } = &self.how {
+            let method = method(name)?;
+            for (slot, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
+                if let Some(program) = program {
+                    let (tape, next) = trace_slot(new(), &self.signature, &program)?;
+                    *slot = Some(fused(tape, next));
+                }
+            }
+        }
+        let begin = match &self.how {
+            StepKind::Attempts { .. } => Some(Stage::cut(&self.signature, &trace_begin(new(), &self.signature, &self.how)?)),
+            _ => None,
+        };
+        let mut quantities = None;
+        if !self.record.is_empty() {
+            quantities = Some(Stage::cut(&self.signature, &trace_record(new(), &self.signature, &self.record)?));
+        }
+        let written = steps.tape.written(steps.next.iter().copied());
+        let series_evaluations = steps.tape.series_evaluations();
+        let (mut next, mut by_terms) = (steps.next, None);
+        if !steps.terms.is_empty() && !self.fused {
+            by_terms = Some(Stage::cut(
+                &self.signature,
+                &trace_by_terms(new(), &self.signature, &self.how, steps.shape, steps.terms.len())?,
+            ));
+            next.extend(steps.terms);
+        }
+        let step = fused(steps.tape, next);
+        let step_with_velocities = finish.as_ref().map(|(tape, velocities): &(Tape, Vec<Id>)| {
+            let (mut both, mut next) = step.clone();
+            let place = both.take_over(tape);
+            next.extend(velocities[..steps.shape.v].iter().map(|id| place[*id as usize]));
+            (both, next)
+        });
+        let [start, finish, step_with_velocities] =
+            [start, finish, step_with_velocities].map(|made| made.map(|made| Stage::cut(&self.signature, &made)));
+        let step = Stage::cut(&self.signature, &step);
+        Ok(Tapes { step, by_terms, begin, start, finish, step_with_velocities, record: quantities, written, series_evaluations })
+    }
+}

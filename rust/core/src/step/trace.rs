@@ -1,0 +1,225 @@
+//! Traces a system and a method to tapes.
+
+use super::{
+    attempts::AttemptsOf,
+    key::StepKind,
+    leaves::{block, ids, parameters, time},
+    pace::Pace,
+    properties::{recorded, shape},
+    watch,
+};
+use crate::{
+    error::Error,
+    model::{
+        around::{
+            self,
+            contact::{self, Contacts},
+        },
+        method::Record,
+        program::{Program, Terms},
+        spec::Signature,
+        steppers::method,
+        system::{Kind, Shape},
+        systems::{equations::next_state, kind, linear::products},
+        window,
+    },
+    tape::{
+        Id, Op, Tape,
+        number::{Number, Symbol, record},
+    },
+};
+
+/// A traced step, before it is cut: for tests, listings and comparisons.
+#[derive(Clone, Debug)]
+pub(crate) struct Steps {
+    /// The tape.
+    pub tape: Tape,
+    /// The next state.
+    pub next: Vec<Id>,
+    /// How large the blocks are.
+    pub shape: Shape,
+    /// The coefficients of a series, of adaptive steps.
+    pub terms: Vec<Id>,
+}
+
+/// Traces one step of a scene onto a tape that may hold something already.
+pub(crate) fn trace_step(tape: Tape, signature: &Signature, how: &StepKind) -> Result<Steps, Error> {
+    let shape = shape(signature, how)?;
+    match how {
+        StepKind::Matrix { nodes } => {
+            let (tape, next) = record(tape, || matrix(signature, shape, nodes));
+            Ok(Steps { tape, next, shape, terms: Vec::new() })
+        }
+        StepKind::Step(step) => {
+            let (tape, next) = record(tape, || {
+                let p = parameters(signature, Symbol::new(Op::Step));
+                let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+                ids([&next_state(step, &p, time(signature), &v, &y)])
+            });
+            Ok(Steps { tape, next, shape, terms: Vec::new() })
+        }
+        StepKind::Method { name, choice } => {
+            let (kind, method) = (kind(signature)?, method(name)?);
+            let carries = method.carry.is_some();
+            let seen = || window::of_step(time(signature), Symbol::new(Op::Step), carries);
+            let (tape, next) = record(tape, || window::over(signature, seen, || step(kind, signature, shape, method, *choice)));
+            Ok(Steps { tape, next, shape, terms: Vec::new() })
+        }
+        StepKind::Attempts { name, order, acceptance, backward } => {
+            let (kind, method) = (kind(signature)?, method(name)?);
+            let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
+            if contact::is_given(signature) {
+                return Err(signature.unknown("contact_0"));
+            }
+            let attempts = AttemptsOf { kind, signature, shape, acceptance, backward: *backward };
+            let (tape, (next, terms)) = record(tape, || match series_order(&program, *order) {
+                Some(order) => attempts.series(order),
+                None => (attempts.attempts(&program, estimate.order), Vec::new()),
+            });
+            Ok(Steps { tape, next, shape, terms })
+        }
+    }
+}
+
+/// The order of the series of attempts, if the method has one: the one that was asked for, or that of steps of fixed length.
+fn series_order(program: &Program, asked: u32) -> Option<u32> {
+    match program.series_order() {
+        0 => None,
+        own if asked == 0 => Some(own),
+        _ => Some(asked),
+    }
+}
+
+fn step(kind: &Kind, signature: &Signature, shape: Shape, method: &Record, choice: usize) -> Vec<Id> {
+    let (h, t) = (Symbol::new(Op::Step), time(signature));
+    let (v0, y0) = (block(0, shape.v), block(shape.v, shape.y));
+    let p = parameters(signature, h);
+    let tally = Symbol::new(Op::State((shape.v + shape.y) as u32));
+    let s = around::wrap(&p, (kind.make)(&p), tally);
+    let mut made = method.program().run(s.as_ref(), t, h, &v0, &y0).into_iter();
+    let (new_v, new_y) = (made.next().unwrap_or_else(|| v0.clone()), made.next().unwrap_or_else(|| y0.clone()));
+    let (mut v, mut y) = s.project(s.bring_to_rest(t, (&v0, &y0), new_v), new_y);
+    if let Some(contacts) = Contacts::new(&p) {
+        let carry = contact::carry(method, choice);
+        [v, y] = contacts.after(carry.as_ref(), s.as_ref(), t, [&v0, &y0], [v, y]);
+    }
+    let mut next = ids([&v, &y]);
+    next.extend(s.tally().map(|tally| tally.0));
+    let first = next.len();
+    next.extend(watch::next(kind, &p, method, choice, t, [&v0, &y0], first));
+    next
+}
+
+/// Traces where a member stands at the start, without control, onto a tape that may hold something already.
+pub(super) fn trace_begin(tape: Tape, signature: &Signature, how: &StepKind) -> Result<(Tape, Vec<Id>), Error> {
+    let StepKind::Attempts { name, acceptance, backward, .. } = how else { return Err(Error::NoEstimate) };
+    let kind = kind(signature)?;
+    let attempts = AttemptsOf { kind, signature, shape: (kind.shape)(signature)?, acceptance, backward: *backward };
+    let series = method(name)?.program().series_order() > 0;
+    Ok(record(tape, || attempts.begin(series)))
+}
+
+/// Traces an attempt by coefficients that stand behind the rest of the state, where they stay.
+pub(super) fn trace_by_terms(
+    tape: Tape,
+    signature: &Signature,
+    how: &StepKind,
+    shape: Shape,
+    numbers: usize,
+) -> Result<(Tape, Vec<Id>), Error> {
+    let StepKind::Attempts { acceptance, backward, .. } = how else { return Err(Error::NoEstimate) };
+    let attempts = AttemptsOf { kind: kind(signature)?, signature, shape, acceptance, backward: *backward };
+    Ok(record(tape, || {
+        let state = shape.v + shape.y;
+        let first = state + Pace::<Symbol>::NUMBERS + acceptance.numbers(shape.v, shape.y);
+        let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
+        let terms: Terms<Symbol> = (0..numbers / state).map(of).collect();
+        let mut next = attempts.attempt_by((&terms, &[]), None);
+        next.extend(block(first, numbers).iter().map(|symbol| symbol.0));
+        next
+    }))
+}
+
+/// s ← P·s + Σ Q·u; the sums run over s, then over the nodes and their inputs.
+fn matrix(signature: &Signature, shape: Shape, nodes: &[u64]) -> Vec<Id> {
+    let (h, t) = (Symbol::new(Op::Step), time(signature));
+    let p = parameters(signature, h);
+    let n = shape.v + shape.y;
+    let mut columns: Vec<Symbol> = block(0, n).iter().copied().collect();
+    let inputs: Vec<_> = (0..signature.whole("inputs")).filter_map(|i| p.signal(&format!("inputs[{i}]"))).collect();
+    window::over(
+        signature,
+        || window::of_step(t, h, signature.whole("carries") > 0),
+        || {
+            for node in nodes {
+                let at = t + Symbol::of(f64::from_bits(*node)) * h;
+                columns.extend(inputs.iter().map(|input| input.at(at)));
+            }
+        },
+    );
+    let (of_state, of_inputs) = (p.numbers("p"), p.numbers("q"));
+    // P by rows; Q by columns, nodes and inputs, each with a number for every row.
+    let entry = |i: usize, j: usize| if j < n { of_state[i * n + j] } else { of_inputs[(j - n) * n + i] };
+    let made = products(n, columns.len(), |i, j| entry(i, j) * columns[j]);
+    made.into_iter().map(|symbol| symbol.0).collect()
+}
+
+/// Traces a program that changes the block v alone.
+pub(super) fn trace_slot(tape: Tape, signature: &Signature, program: &Program) -> Result<(Tape, Vec<Id>), Error> {
+    let kind = kind(signature)?;
+    let shape = (kind.shape)(signature)?;
+    Ok(record(tape, || {
+        let (h, t) = (Symbol::new(Op::Step), time(signature));
+        let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+        let p = parameters(signature, h);
+        let made = || program.run(around::wrap_for_carry(&p, (kind.make)(&p)).as_ref(), t, h, &v, &y).into_iter().next();
+        ids([&window::over(signature, || window::of_slot(t, h), made).unwrap_or_else(|| v.clone()), &y])
+    }))
+}
+
+/// Traces the recorded quantities of a state onto a tape: a number behind v and y for each.
+pub(crate) fn trace_record(tape: Tape, signature: &Signature, names: &[String]) -> Result<(Tape, Vec<Id>), Error> {
+    let kind = kind(signature)?;
+    let shape = (kind.shape)(signature)?;
+    recorded(signature, names)?;
+    Ok(record(tape, || {
+        let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+        let s = (kind.make)(&parameters(signature, Symbol::new(Op::Step)));
+        let mut next = ids([&v, &y]);
+        for name in names {
+            next.extend(s.record(name, &v, &y).into_iter().flatten().map(|symbol| symbol.0));
+        }
+        next
+    }))
+}
+
+/// Traces a part of a scene by its name, for comparisons: "step", "attempt", "begin", "start" and "finish" with the number of a
+/// way to start behind them, or "record" with a quantity behind it.
+pub fn trace(tape: Tape, signature: &Signature, how: &StepKind, what: &str) -> Result<(Tape, Vec<Id>), Error> {
+    let (what, which) = what.split_once(' ').unwrap_or((what, ""));
+    let unknown = || Error::Options { system: signature.system.clone(), options: format!("trace {what} {which}") };
+    let name = match how {
+        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => name.as_str(),
+        StepKind::Step(_) | StepKind::Matrix { .. } => "",
+    };
+    let choice = which.parse().unwrap_or(0);
+    match what {
+        "step" => trace_step(tape, signature, &started(how, choice)).map(|steps| (steps.tape, steps.next)),
+        "attempt" if matches!(how, StepKind::Attempts { .. }) => {
+            trace_step(tape, signature, how).map(|steps| (steps.tape, steps.next))
+        }
+        "begin" => trace_begin(tape, signature, how),
+        "start" => trace_slot(tape, signature, &method(name)?.start(choice).ok_or_else(unknown)?),
+        "finish" => trace_slot(tape, signature, &method(name)?.finish(choice).ok_or_else(unknown)?),
+        "record" => trace_record(tape, signature, &[which.to_owned()]),
+        _ => Err(unknown()),
+    }
+}
+
+/// The same method, started in its `choice`-th way.
+fn started(how: &StepKind, choice: usize) -> StepKind {
+    match how {
+        StepKind::Method { name, choice: before } => StepKind::Method { name: name.clone(), choice: choice.max(*before) },
+        other => other.clone(),
+    }
+}
