@@ -20,6 +20,7 @@ from .reference.types import Array as Array
 from .reference.types import Whole
 
 if TYPE_CHECKING:
+    from inspect import Signature
     from pathlib import Path
 
 Shape = tuple[int, ...]
@@ -267,18 +268,19 @@ def callback(argument: str, value: Any) -> Any:
     return value
 
 
-def argument_order(argument: str, function: Any, places: Sequence[str]) -> None:
+def argument_order(argument: str, function: Any, places: Sequence[str], signature: Signature | None = None) -> None:
     """Raise if a function of time and state has the name of one of them at the place of another: it would get other numbers.
 
     Args:
         argument: what the function was given as.
         function: what is called with the time and blocks of the state by position; nothing is known of one without a signature.
+        signature: that of the function, if it is known.
         places: what stands at each place, such as ``("t", "v", "y")``. A state without velocities may be called v.
     """
     import inspect  # which is slow to import, and only functions need it
 
     try:
-        signature = inspect.signature(function)
+        signature = signature or inspect.signature(function)
     except (TypeError, ValueError):  # what is not written in Python may not tell
         return
     by_place = [each for each in signature.parameters.values() if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]

@@ -32,9 +32,9 @@ MOST_NUMBERS = 1_000_000
 #: Of systems of up to so many numbers a state the limit is told, too.
 SMALL_SYSTEM = 8
 
-#: A world looks at its state after so many steps, then after twice as many more, and so on up to the last number: what grows by a
+#: A world checks its state after so many steps, then after twice as many more, and so on up to the last number: what grows by a
 #: thousandth a step has grown a million times by then. Calls of ``step`` may be shorter or longer than that.
-FIRST_LOOK, LAST_LOOK, ENDLESS = 8, 16_384, 1 << 62
+FIRST_CHECK, LAST_CHECK, ENDLESS = 8, 16_384, 1 << 62
 
 
 def lengths(system: System, v: Array, y: Array) -> Array:
@@ -224,22 +224,22 @@ def _shortest(run: Any, start: tuple[Array, Array]) -> float:
 def watched(
     make: Callable[..., None], loop: Any, system: System, method: Method, dt: float, v: Array, y: Array
 ) -> Callable[..., None]:
-    """``make``, the ``step`` of a world, which looks at the state from time to time and warns once of growth by steps alone."""
+    """``make``, the ``step`` of a world, which checks the state from time to time and warns once of growth by steps alone."""
     if v.size + y.size > MOST_NUMBERS:
         return make
     start = np.array(v, dtype=np.float64), np.array(y, dtype=np.float64)
     first, t0 = loop.step_number, loop.t
-    left = every = FIRST_LOOK
+    left = every = FIRST_CHECK
 
-    def look() -> int:
-        """How many steps there are until the next look; endless if there is none."""
+    def check() -> int:
+        """How many steps there are until the next check; endless if there is none."""
         nonlocal every
         grown = growth(system, method, dt, loop.step_number - first, t0, start, (v, y))
         if grown is not None:
             warnings.warn(grown.in_words(v.shape[len(system.v_shape) :]), AccuracyWarning, stacklevel=3)
             return ENDLESS
         every *= 2
-        return every if every <= LAST_LOOK else ENDLESS
+        return every if every <= LAST_CHECK else ENDLESS
 
     def step(n: int = 1) -> None:
         """Make n steps in place."""
@@ -247,6 +247,6 @@ def watched(
         make(n)
         left -= n or 1  # None is one step, too
         if left <= 0:
-            left = look()
+            left = check()
 
     return step

@@ -179,12 +179,13 @@ def _checked(function: Callable[..., Any], state: int) -> dict[str, Any]:
     """The same as ``inspect`` tells them, which takes as long as all else; raise if these are no arguments of such a function."""
     name = function.__name__
     expected = "(t, v, y, *, …)" if state == 3 else "(t, y, *, …)"
-    given = list(inspect.signature(function).parameters.values())
+    signature = inspect.signature(function)
+    given = list(signature.parameters.values())
     positional = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
     if len(positional) < state or any(each.default is not each.empty for each in positional[:state]):
         first_order = "; for ẏ = f(t, y) write sw.system(order=1)" if state == 3 and len(positional) == 2 else ""
         raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))}){first_order}")
-    _checks.argument_order(name, function, ("t", "v", "y") if state == 3 else ("t", "y"))
+    _checks.argument_order(name, function, ("t", "v", "y") if state == 3 else ("t", "y"), signature)
     parameters = {}
     for each in given:
         if each in positional[:state]:

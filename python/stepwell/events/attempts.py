@@ -14,7 +14,7 @@ from ..reference.types import Whole
 from ..systems.base import rows as rows_of
 from .members import Members
 
-#: So many attempts are made between two looks at where members are.
+#: So many attempts are made before it is checked where members are.
 ATTEMPTS = 256
 
 
