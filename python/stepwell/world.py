@@ -61,8 +61,8 @@ class World:
     one happens. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between steps, the method starts
     again from the new values. Ctrl-C leaves the world at the last complete step, or at the one before (leapfrog of many bodies,
     whose velocity there would take long to compute).
-    A world does not check for divergence: use ``numpy.isfinite`` on your arrays. It checks their size now and then after its first
-    steps, and warns once if they grew a million times by steps that are beyond the stability limit. Arrays of another
+    A world does not check for divergence: use ``numpy.isfinite`` on your arrays. It checks their size now and then after its
+    first steps, and warns once if they grew a million times by steps that are beyond the stability limit. Arrays of another
     library are stepped in place, too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
 
     System, method and step are fixed; ``World(…, **world.resume)`` makes another world that continues from here.
