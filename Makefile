@@ -72,6 +72,7 @@ lint-python: .venv/test
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy --no-error-summary
+	$(BIN)/lint-imports --no-cache > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
 	$(BIN)/python -m mypy.stubtest stepwell._core --concise
 
 # The wheel comes first: both are built in one folder, and have the core in common.

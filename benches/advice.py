@@ -21,12 +21,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import stepwell as sw
-from stepwell.advice import Advice, Row
 from stepwell.errors import AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning, UnsupportedError
-from stepwell.method_records import Method
+from stepwell.model.methods import Method
 from stepwell.scenes import Scene
 from stepwell.scenes.table import tabled
 from stepwell.scenes.truth import with_truth
+from stepwell.studies.advice import Advice, Row
 
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 

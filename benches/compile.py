@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import stepwell as sw
-from stepwell import _core, engine
+from stepwell import _core
+from stepwell.runs import engine
 
 MEMBERS, REPEATS = 100_000, 5
 SINE, HELD = sw.Sinusoid(0.5, 1.1, 0.3), sw.Sampled(np.linspace(-1.0, 1.0, 16), 0.02)

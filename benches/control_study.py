@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import stepwell as sw
-from stepwell.charts import ControlSweep, Held
+from stepwell.views.charts import ControlSweep, Held
 
 HERE = Path(__file__).parent
 

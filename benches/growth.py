@@ -23,7 +23,8 @@ import numpy as np
 import stepwell as sw
 from rich.console import Console
 from rich.table import Table
-from stepwell import _core, engine
+from stepwell import _core
+from stepwell.runs import engine
 
 from .compare.machine import describe
 from .compare.peers import c_peer
@@ -275,8 +276,8 @@ def show(name: str, rows: list[dict[str, Any]], console: Console) -> None:
 def draw(told: dict[str, Any]) -> None:
     """A picture of each sweep, and one of the kernels."""
     from matplotlib import rc_context
-    from stepwell.charts import style
-    from stepwell.charts.labels import at_ends, title
+    from stepwell.views.charts import style
+    from stepwell.views.charts.labels import at_ends, title
 
     colours = [style.FAMILIES[each] for each in ("Runge-Kutta", "Heun", "leapfrog", "PEFRL")]
     for name, (x_name, y_name, said) in AXES.items():

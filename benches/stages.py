@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import stepwell as sw
-from stepwell import _core, engine
+from stepwell import _core
+from stepwell.runs import engine
 from stepwell.scenes.builtin.arenstorf import MU
 
 from .compare.chosen.orbits import arenstorf

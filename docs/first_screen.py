@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import stepwell as sw
 from PIL import Image
-from stepwell.charts import labels, style
+from stepwell.views.charts import labels, style
 
 IMAGES = Path(__file__).resolve().parent / "images"
 
@@ -92,7 +92,7 @@ def energy_control(page: str) -> None:
 def five_methods() -> None:
     """Errors against function evaluations on the clover leaf: no time is in it."""
     from matplotlib import rc_context
-    from stepwell.charts.picture import finding
+    from stepwell.views.charts.picture import finding
 
     steps = [round(steps) for steps in np.geomspace(18, 20_000, 27)]
     chart = sw.charts.work_precision("clover", METHODS, steps, tolerances=[])

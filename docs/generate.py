@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import stepwell as sw
-from stepwell.stability.criterion import signed
+from stepwell.analysis.stability.criterion import signed
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import speed

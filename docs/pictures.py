@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import stepwell as sw
 from PIL import Image
-from stepwell import _core, engine
+from stepwell import _core
+from stepwell.runs import engine
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -148,7 +149,7 @@ def contact() -> Figure:
     """What four ways of contact make of the energy, for every phase of the impact."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
-    from stepwell.charts.style import COLOURS, FONT, GREY
+    from stepwell.views.charts.style import COLOURS, FONT, GREY
 
     lines = (
         ("one-sided spring, Φ = 1.5", impacts(sw.Floor(way="spring", omega=1.5)), COLOURS[2], (0.12, 0.83)),
@@ -179,7 +180,7 @@ def tumbling() -> Figure:
     """A dumb-bell that is thrown, tumbles and rests, and what is left of its energy after an elastic impact at every angle."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
-    from stepwell.charts.style import COLOURS, FONT, GREY
+    from stepwell.views.charts.style import COLOURS, FONT, GREY
 
     thrown = sw.Rods([1.0, 2.0], [(0, 1)], 1.0, gravity=9.81, floor=sw.Floor(restitution=0.5, friction=0.3), dim=2)
     start: dict[str, Any] = {"v": [[3.6, 1.0], [2.4, 1.8]], "y": [[0.0, 0.8], [0.8, 1.4]]}

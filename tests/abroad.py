@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 import stepwell as sw
-from stepwell.exports.names import camel
-from stepwell.reference.fused import fma
+from stepwell.reference.tape.fused import fma
+from stepwell.source.exports.names import camel
 
 #: Seconds that compilers and programs may take on a busy machine.
 PATIENCE = 300

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.advice.trials import single_name
 from stepwell.scenes import Scene
+from stepwell.studies.advice.trials import single_name
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 

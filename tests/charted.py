@@ -5,7 +5,7 @@ import sys
 
 import pytest
 import stepwell as sw
-from stepwell.charts import measure
+from stepwell.studies.measuring import measure
 
 #: The scenes with a solution that a fixed step does well; the others have their own test of orders. That of a ball is not smooth.
 HARD = ("bouncing_ball", "figure_eight", "kepler", "pythagorean", "arenstorf", "sliding_block", "sticking_block")
@@ -13,7 +13,7 @@ SCENES = [scene for scene in sw.scenes.scenes() if scene.exact is not None and s
 METHODS = sw.methods()
 
 #: The function hides the module of its name.
-LADDER = sys.modules["stepwell.charts.work_precision"]
+LADDER = sys.modules["stepwell.studies.measuring.work_precision"]
 
 
 @functools.cache

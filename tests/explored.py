@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from abroad import bits, executed
-from stepwell.explorer import sliders
-from stepwell.explorer.page import WEB
+from stepwell.views.explorer import sliders
+from stepwell.views.explorer.page import WEB
 
 #: Steps that are compared to the bit: some impacts of the ball and the stop of the sliding block are among them.
 STEPS = 60

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import stepwell as sw
-from stepwell.method_records import Method
+from stepwell.model.methods import Method
 
 Step = Callable[..., Any]
 

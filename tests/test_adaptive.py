@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, fits
-from stepwell import engine
 from stepwell.errors import ArgumentError, StepwellError, UnsupportedError
 from stepwell.reference import series_pace
-from stepwell.result import Status
+from stepwell.runs import engine
+from stepwell.runs.result import Status
 
 ABLE = [m.name for m in sw.methods() if m.error_order is not None]
 MEMBERS = 21

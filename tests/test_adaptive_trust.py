@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _core, engine
+from stepwell import _core
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.reference.acceptance import Acceptance
 from stepwell.reference.traced import Tracer
-from stepwell.result import Status
+from stepwell.runs import engine
+from stepwell.runs.result import Status
 
 PAIRS = ["merson", "fehlberg", "fehlberg_5", "dop853"]
 ONES, NOTHING = np.ones(3), sw.Sampled([0.0], interval=1.0)

@@ -47,7 +47,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert sorted(name for name, _ in added) == [
         "python/stepwell/reference/steppers/midpoint.py",
         "python/stepwell/reference/systems/van_der_pol.py",
-        "python/stepwell/systems/van_der_pol.py",
+        "python/stepwell/model/systems/van_der_pol.py",
         "rust/core/src/model/steppers/midpoint.rs",
         "rust/core/src/model/systems/van_der_pol.rs",
     ]

@@ -23,11 +23,11 @@ from advised import (  # noqa: F401
     tried,
     unmeasured,
 )
-from stepwell.advice import by_cost_and_error
-from stepwell.advice.candidates import Candidate
-from stepwell.advice.result import about
-from stepwell.advice.search import Search
-from stepwell.advice.trials import Times, Trial, cost_noise
+from stepwell.studies.advice import by_cost_and_error
+from stepwell.studies.advice.candidates import Candidate
+from stepwell.studies.advice.result import about
+from stepwell.studies.advice.search import Search
+from stepwell.studies.advice.trials import Times, Trial, cost_noise
 
 from benches.advice import Brute
 
@@ -154,7 +154,7 @@ def test_the_worst_frame_is_counted() -> None:
 @pytest.mark.usefixtures("unmeasured")
 def test_the_worst_frame_of_many_is_found_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     one = sw.advise("kepler", frame=0.1, tolerance=1e-3, methods=["merson"], cost="evaluations")
-    monkeypatch.setattr("stepwell.advice.adaptive.MAX_PIECES", 30)
+    monkeypatch.setattr("stepwell.studies.advice.adaptive.MAX_PIECES", 30)
     other = sw.advise("kepler", frame=0.1, tolerance=1e-3, methods=["merson"], cost="evaluations")
     rows = [next(row for row in each.ranked if row.tolerance is not None) for each in (one, other)]
     assert rows[0].worst_evaluations == rows[1].worst_evaluations

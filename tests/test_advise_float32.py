@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import stepwell as sw
 from advised import _times_are_measured_once, scene_of, unmeasured  # noqa: F401
-from stepwell import cli
-from stepwell.advice import Row
-from stepwell.advice.motion import motion_of
-from stepwell.advice.trials import Times, Trials, single_name
 from stepwell.scenes import Scene
+from stepwell.studies.advice import Row
+from stepwell.studies.advice.motion import motion_of
+from stepwell.studies.advice.trials import Times, Trials, single_name
+from stepwell.views import cli
 
 METHODS = ["leapfrog", "rk4", "pefrl", "dop853"]
 

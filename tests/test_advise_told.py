@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from advised import _times_are_measured_once, brute_of, scene_of, unmeasured  # noqa: F401
-from stepwell import cli
 from stepwell.errors import ArgumentError, DivergenceWarning, DTypeError
 from stepwell.scenes import Scene
+from stepwell.views import cli
 from truths import CLOSED_FORMS
 
 

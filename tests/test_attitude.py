@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.systems import attitude
+from stepwell.model.systems import attitude
 
 #: Half a unit in the last place of 1.
 U = 2.0**-53

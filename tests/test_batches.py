@@ -10,7 +10,7 @@ import pytest
 import stepwell as sw
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from stepwell import _encounters
+from stepwell.runs import encounters
 
 FREE = sw.Oscillator(1.0)
 
@@ -214,7 +214,8 @@ def test_progress_shows_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: p
 
 @pytest.mark.parametrize("backend", ["rust", "numpy"])
 def test_progress_goes_up(backend: str) -> None:
-    from stepwell import engine, method
+    from stepwell import method
+    from stepwell.runs import engine
 
     shares: list[float] = []
     steps = 10**6 if backend == "rust" else 1000
@@ -269,7 +270,7 @@ def test_collisions_say_who_met_whom_and_when() -> None:
 
 
 def test_a_warning_does_not_run_a_long_run_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_encounters, "MAX_RERUN", 0)
+    monkeypatch.setattr(encounters, "MAX_RERUN", 0)
     equal = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
     with pytest.warns(sw.DivergenceWarning) as caught:
         run = sw.integrate(sw.NBody(), "rk4", v=0.0, y=equal, dt=0.01, steps=3)

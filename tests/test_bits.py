@@ -13,7 +13,7 @@ import stepwell as sw
 from cases import SYSTEMS, Case, assert_same, cases, thinned
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from stepwell._value import changed
+from stepwell.base.immutable import changed
 
 ALL = list(cases())
 DIRECT = [c for c in ALL if c.form == "direct"]

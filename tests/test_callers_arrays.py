@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell._value import Fixed, FixedDict, Value, frozen
+from stepwell.base.immutable import Fixed, FixedDict, Value, frozen
 
 TWO = np.ones(2)
 

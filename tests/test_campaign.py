@@ -22,8 +22,8 @@ import stepwell as sw
 from campaign import calls, disks, fuzz, memory, oracle, processes, threads
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from stepwell import _files
-from stepwell.sweeps import stores
+from stepwell.base import files
+from stepwell.studies.sweeps import stores
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="forks, limits and memory as Linux has them")
 timer = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there is no timer here")
@@ -258,10 +258,10 @@ def test_a_text_takes_its_place_when_it_is_whole(tmp_path: Path) -> None:
     assert (path.read_text(), link.is_symlink(), path.stat().st_mode & 0o777) == (step.source, True, 0o640)
     assert sorted(tmp_path.iterdir()) == [link, path]
     with pytest.raises(UnicodeEncodeError):
-        _files.write_text(path, "half of it" * 10_000 + "\ud800")  # no text of a file
+        files.write_text(path, "half of it" * 10_000 + "\ud800")  # no text of a file
     assert (path.read_text(), sorted(tmp_path.iterdir())) == (step.source, [link, path])
     reader, writer = os.pipe()
-    _files.write_text(Path(f"/dev/fd/{writer}"), "through a pipe")
+    files.write_text(Path(f"/dev/fd/{writer}"), "through a pipe")
     os.close(writer)
     assert os.read(reader, 100) == b"through a pipe"
     os.close(reader)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from charted import LADDER, METHODS, SCENES, the_charts, the_small, the_whole  # noqa: F401
-from stepwell import engine
-from stepwell.charts import data, known, measure, peers
 from stepwell.errors import ArgumentError, UnknownNameError
+from stepwell.runs import engine
+from stepwell.studies.measuring import data, known, measure, peers
 
 UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None]
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from charted import METHODS, SCENES, the_charts, the_small  # noqa: F401
-from stepwell.charts import data, measure, peers, style
 from stepwell.errors import ArgumentError, DTypeError, UnknownNameError, UnsupportedError
+from stepwell.studies.measuring import data, measure, peers
+from stepwell.views.charts import style
 
 
 def read(path):

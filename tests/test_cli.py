@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import cli
+from stepwell.views import cli
 
 
 def told(capsys, *words):
@@ -568,7 +568,7 @@ def test_without_matplotlib_numbers_are_told_and_no_folder_is_made(capsys, monke
 
 def test_a_reader_who_leaves_early_is_no_error():
     """`stepwell methods --json | head`: the pipe is closed before anything is written to it."""
-    code = "import sys; from stepwell.cli import main; sys.stdin.read(); sys.exit(main(['methods', '--json']))"
+    code = "import sys; from stepwell.views.cli import main; sys.stdin.read(); sys.exit(main(['methods', '--json']))"
     process = subprocess.Popen(
         [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )

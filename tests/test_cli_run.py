@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import charts, cli
-from stepwell.cli.settings import scene_with
-from stepwell.cli.verdict import growth_of, tenfold, verdict
+from stepwell.views import charts, cli
+from stepwell.views.cli.settings import scene_with
+from stepwell.views.cli.verdict import growth_of, tenfold, verdict
 
 
 def told(capsys: Any, *words: str) -> tuple[int, str, str]:

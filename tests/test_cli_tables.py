@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 import stepwell as sw
-from stepwell import cli
-from stepwell.cli.table import UNLIMITED, length, lines_of, width_of_terminal
+from stepwell.views import cli
+from stepwell.views.cli.table import UNLIMITED, length, lines_of, width_of_terminal
 
 COLUMNS = ("method", "order>", "step>", "what it is", "file")
 ROWS = [

@@ -13,9 +13,9 @@ from typing import Any
 
 import contacts
 import pytest
-from stepwell.engine import direct
+from stepwell.model.systems import base
 from stepwell.reference import contact
-from stepwell.systems import base
+from stepwell.runs.engine import direct
 
 SOURCE = Path(contact.__file__).read_text(encoding="utf-8")
 

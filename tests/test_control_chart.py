@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import cli
-from stepwell.charts import ControlSweep
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError
+from stepwell.views import cli
+from stepwell.views.charts import ControlSweep
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))

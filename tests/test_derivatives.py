@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from differences import central
 from stepwell import _core
-from stepwell.derivatives import Evaluation, directional, gradient, jacobian, rules
+from stepwell.analysis.derivatives import Evaluation, directional, gradient, jacobian
 from stepwell.errors import UnsupportedError
 from stepwell.reference import bits, marks, trig
 from stepwell.reference.log import log
+from stepwell.reference.tape import rules
 
 EPS = np.finfo(float).eps
 #: Long doubles where the machine has them, else doubles: the differences' bound knows which.

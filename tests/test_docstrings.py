@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import charts, quaternion, stability
+from stepwell.analysis import stability
+from stepwell.model import quaternion
+from stepwell.views import charts
 
 #: Options of every example: arrays may be printed with other spaces by another NumPy.
 OPTIONS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
@@ -31,9 +33,9 @@ def public() -> Iterator[tuple[str, Any]]:
     for module in (charts, stability, quaternion, sw.scenes):
         for name in getattr(module, "__all__", dir(module)):
             thing = getattr(module, name)
-            own = getattr(thing, "__module__", "").startswith(module.__name__)
+            own = "__all__" in vars(module) or getattr(thing, "__module__", "") == module.__name__
             if inspect.isfunction(thing) and own and not name.startswith("_") and not hasattr(thing, "__wrapped__"):
-                yield f"{module.__name__.removeprefix('stepwell.')}.{name}", thing
+                yield f"{module.__name__.rsplit('.', 1)[-1]}.{name}", thing
 
 
 PUBLIC = dict(public())

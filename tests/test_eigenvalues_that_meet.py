@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell._value import same
-from stepwell.stability import KINDS, Mode, StabilityLimits, eigen, exact, operations, parts, series
+from stepwell.analysis.stability import KINDS, Mode, StabilityLimits, eigen, exact, operations, parts, series
+from stepwell.base.immutable import same
 
 METHODS = [m.name for m in sw.methods()]
 DAMPABLE = [m for m in METHODS if not sw.method(m).needs_acceleration]
@@ -305,7 +305,7 @@ def test_copies_of_an_analysis_are_equal(dt: Any) -> None:
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, 0.0, 101.0, "a", None, [[1.0]], 1j])
 def test_bad_angles_are_refused(value: Any) -> None:
     """Pictures of angles far past every limit asked for terabytes."""
-    from stepwell import charts
+    from stepwell.views import charts
 
     for call in (lambda: charts.figures(["rk4"], phi=value), lambda: charts.stability_map("rk4", phi=(0.0, value))):
         with pytest.raises(sw.errors.ArgumentError, match="phi"):

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _doubt, _encounters
 from stepwell.errors import UnsupportedError
+from stepwell.runs import diagnostics, encounters
 
 #: Two unit masses at rest, two apart, under Newton's law: they fall together in π·√(2³/(8·2)), their relative distance obeying
 #: r̈ = −2/r².
@@ -51,7 +51,7 @@ def test_an_energy_that_recovers() -> None:
     through = {"v": np.array([[speed, 0.0], [-speed, 0.0]]), "y": FALL["y"]}
     run, words = told(PAIR, "leapfrog", **through, dt=0.01, steps=200)
     changed = abs(run.energy[-1] - PAIR.energy(through["v"], through["y"]))
-    assert changed < _doubt.DOUBTFUL_CHANGE * speed**2
+    assert changed < diagnostics.DOUBTFUL_CHANGE * speed**2
     assert "another energy" not in words
     assert "bodies 0 and 1 met within step" in words
 
@@ -119,7 +119,7 @@ def test_who_does_not_listen_pays_nothing(monkeypatch: pytest.MonkeyPatch) -> No
     def never(*_: Any, **__: Any) -> Any:
         raise AssertionError
 
-    monkeypatch.setattr(_encounters, "met_in", never)
+    monkeypatch.setattr(encounters, "met_in", never)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sw.AccuracyWarning)
         sw.integrate(PAIR, "leapfrog", **FALL, dt=0.001, steps=4000)
@@ -135,8 +135,8 @@ def test_the_look_ahead_of_floats_and_of_arrays_agree(force: str) -> None:
         bodies = sw.NBody([1.0, 0.0, 2.0], force=force, softening=softening, G=1.5)
         v, y = rng.normal(size=(3, 2, 400)), rng.normal(size=(3, 2, 400))
         for h in (0.003, 0.03):
-            each = _encounters.may_meet_each(bodies, h, 3.0, v, y)
-            one = [_encounters.may_meet(bodies, h, 3.0, v[..., i].tolist(), y[..., i].tolist()) for i in range(400)]
+            each = encounters.may_meet_each(bodies, h, 3.0, v, y)
+            one = [encounters.may_meet(bodies, h, 3.0, v[..., i].tolist(), y[..., i].tolist()) for i in range(400)]
             assert each.tolist() == one
             found += one
     assert 0.02 < np.mean(found) < 0.9
@@ -149,11 +149,11 @@ def test_the_look_at_many_bodies_is_little_work(monkeypatch: pytest.MonkeyPatch)
     """
     sizes = []
 
-    def spread(square: Any, newton: bool, of: Any = _encounters._spread) -> Any:
+    def spread(square: Any, newton: bool, of: Any = encounters._spread) -> Any:
         sizes.append(np.size(square))
         return of(square, newton)
 
-    monkeypatch.setattr(_encounters, "_spread", spread)
+    monkeypatch.setattr(encounters, "_spread", spread)
     rng = np.random.default_rng(1)
     bodies = sw.NBody(np.full(64, 1 / 64), force="newton", dim=3, softening=0.05)
     v, y = 0.1 * rng.normal(size=(64, 3)), rng.normal(size=(64, 3))
@@ -165,13 +165,13 @@ def test_the_look_at_many_bodies_is_little_work(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("batch", [(), (3,), (2, 2)])
 @pytest.mark.parametrize("force", ["newton", "logarithmic", "printed"])
-@pytest.mark.parametrize("n", [_doubt.MIN_BODIES_BY_CORE, 65])
+@pytest.mark.parametrize("n", [diagnostics.MIN_BODIES_BY_CORE, 65])
 def test_energies_that_are_looked_at_are_those_of_the_system(n: int, force: str, batch: tuple[int, ...]) -> None:
     rng = np.random.default_rng(n)
     bodies = sw.NBody(rng.uniform(0.1, 1.0, size=n), force=force, dim=3, softening=0.05)
     v, y = rng.normal(size=(2, n, 3, *batch))
     run = sw.integrate(bodies, "false_euler", v=v, y=y, dt=1e-3, steps=1)
-    np.testing.assert_array_equal(_doubt._energies(run, bodies, v, y), bodies.energy(v, y))
+    np.testing.assert_array_equal(diagnostics._energies(run, bodies, v, y), bodies.energy(v, y))
 
 
 def test_the_look_ahead_is_right_of_two_bodies() -> None:
@@ -184,8 +184,8 @@ def test_the_look_ahead_is_right_of_two_bodies() -> None:
             q = share * 0.5 * h * math.sqrt((2.0 - q) / q)
         far = 2.0 - q
         v, y = [[0.0, 0.0], [0.0, math.sqrt(q / far)]], [[0.0, 0.0], [far, 0.0]]
-        assert _encounters.may_meet(bodies, h, 7.0, v, y) == expected
-        assert not _encounters.may_meet(bodies, h, 0.1, v, y)  # it takes half a period
+        assert encounters.may_meet(bodies, h, 7.0, v, y) == expected
+        assert not encounters.may_meet(bodies, h, 0.1, v, y)  # it takes half a period
 
 
 def test_runs_without_bodies_or_with_a_tolerance_are_refused() -> None:
@@ -216,15 +216,15 @@ def test_bodies_that_others_pull_apart_are_not_looked_for(monkeypatch):
     assert np.array_equal(y[0], -y[1])
     assert not y[2].any()
     assert (masses == 1.0).all()
-    assert not _encounters.may_meet(scene.system, 1e-3, 100.0, v.tolist(), y.tolist())
+    assert not encounters.may_meet(scene.system, 1e-3, 100.0, v.tolist(), y.tolist())
     two = sw.NBody(masses[:2], force="newton")
-    assert _encounters.may_meet(two, 1e-3, 100.0, v[:2].tolist(), y[:2].tolist())
+    assert encounters.may_meet(two, 1e-3, 100.0, v[:2].tolist(), y[:2].tolist())
     light = sw.NBody([1.0, 1.0, 0.24], force="newton")  # 0.24·2/r² is less than 2/(2r)² = 0.25·2/r²
     heavy = sw.NBody([1.0, 1.0, 0.26], force="newton")
     for bodies, expected in ((light, True), (heavy, False)):
-        assert _encounters.may_meet(bodies, 1e-3, 100.0, v.tolist(), y.tolist()) == expected
+        assert encounters.may_meet(bodies, 1e-3, 100.0, v.tolist(), y.tolist()) == expected
     runs = []
-    advance = _encounters.engine.advance
-    monkeypatch.setattr(_encounters.engine, "advance", lambda *given, **how: runs.append(1) or advance(*given, **how))
+    advance = encounters.engine.advance
+    monkeypatch.setattr(encounters.engine, "advance", lambda *given, **how: runs.append(1) or advance(*given, **how))
     sw.integrate(scene.system, "leapfrog", v=scene.v, y=scene.y, dt=6.3e-4, steps=20_000)
     assert len(runs) == 1

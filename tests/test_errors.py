@@ -524,7 +524,8 @@ def test_one_tree() -> None:
 
 def test_the_core_refuses_too() -> None:
     """Python checks first; whoever uses the core directly still gets an error and no panic."""
-    from stepwell import _core, engine
+    from stepwell import _core
+    from stepwell.runs import engine
 
     one, system = np.ones((1, 1)), sw.Oscillator()
     free: dict[str, Any] = {"form": "canonical", "omega": one}

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import SYSTEMS, Case, assert_same, cases, thinned
-from stepwell import engine
-from stepwell.events import collected, driver, trials
-from stepwell.events.members import Members
-from stepwell.events.traced import Quantity
-from stepwell.events.trials import Trials, one_step
+from stepwell.runs import engine
+from stepwell.runs.events import collected, driver, trials
+from stepwell.runs.events.members import Members
+from stepwell.runs.events.traced import Quantity
+from stepwell.runs.events.trials import Trials, one_step
 
 
 def first(*state: Any) -> Any:

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, assert_same, fits
-from stepwell import engine
-from stepwell.events import adaptive, attempts
-from stepwell.events.members import Members
-from stepwell.events.trials import AdaptiveTrials
+from stepwell.runs import engine
+from stepwell.runs.events import adaptive, attempts
+from stepwell.runs.events.members import Members
+from stepwell.runs.events.trials import AdaptiveTrials
 from test_events import assert_same_events, crossing, first
 
 ABLE = [m.name for m in sw.methods() if m.error_order is not None]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 import test_events_adaptive as bits
-from stepwell.events import adaptive, attempts, collected
-from stepwell.events.trials import AdaptiveTrials
+from stepwell.runs.events import adaptive, attempts, collected
+from stepwell.runs.events.trials import AdaptiveTrials
 from test_events_adaptive import ABLE, U
 from test_events_located import error_of_bounces, low_end, straight
 

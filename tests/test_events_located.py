@@ -9,9 +9,9 @@ import mpmath
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.events import collected
-from stepwell.events.trials import Trials
 from stepwell.reference import events
+from stepwell.runs.events import collected
+from stepwell.runs.events.trials import Trials
 
 U = 2.0**-53
 
@@ -366,7 +366,7 @@ def test_mistake_trials_at_another_time_are_noticed(monkeypatch: pytest.MonkeyPa
 
 def test_mistake_trials_from_the_carry_of_the_full_step_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Verlet's previous y is one of h ago; with it, a step of another length is wrong by a share of the whole way."""
-    from stepwell.events import trials
+    from stepwell.runs.events import trials
 
     def wrong(plan: Any, s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
         full = plan.system.scaled(plan.dt, plan.batch)

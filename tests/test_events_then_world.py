@@ -90,7 +90,7 @@ def test_a_world_with_a_terminal_event_is_refused() -> None:
 
 def test_mistake_neighbours_that_begin_anew_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without their carry members of a leapfrog world would have other bits where another bounces."""
-    from stepwell.events import frames
+    from stepwell.runs.events import frames
 
     def forgetful(self: Any, step: int, index: Any, v: Any, y: Any) -> None:
         for block, new in zip(self._blocks, (v, y), strict=True):

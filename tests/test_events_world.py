@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, UnsupportedError
-from stepwell.events import Occurrences
-from stepwell.events.frames import Frames
+from stepwell.runs.events import Occurrences
+from stepwell.runs.events.frames import Frames
 
 
 def crossing(t: Any, v: Any, y: Any) -> Any:
@@ -164,7 +164,7 @@ def test_mistake_the_quantity_of_the_last_call_is_noticed(monkeypatch: pytest.Mo
 
 
 def test_mistake_the_force_of_the_first_call_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from stepwell.events import frames as module
+    from stepwell.runs.events import frames as module
 
     first: list[Any] = []
 

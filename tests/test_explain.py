@@ -17,14 +17,15 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SOME, SYSTEMS, drawn, has_branches
-from stepwell import _core, engine
-from stepwell.engine import direct, linear
-from stepwell.engine.adaptive import evaluated_attempt
-from stepwell.engine.plan import per_step
-from stepwell.explanation import listing
+from stepwell import _core
 from stepwell.reference import adaptive
-from stepwell.reference.fused import fma
+from stepwell.reference.tape.fused import fma
 from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
+from stepwell.runs.engine import direct, linear
+from stepwell.runs.engine.adaptive import evaluated_attempt
+from stepwell.runs.engine.plan import per_step
+from stepwell.source.explanation import listing
 from test_tracing import ABLE, CONTROLS, MEMBERS, METHODS, H, T, assert_computes, fits, made
 
 WRONG: Any = "yes"

@@ -11,11 +11,13 @@ import pytest
 import stepwell as sw
 import test_explain
 from cases import SYSTEMS, drawn
-from stepwell import _core, cli, engine
+from stepwell import _core
 from stepwell.errors import ArgumentError, UnsupportedError
-from stepwell.explanation import listing
-from stepwell.explanation.formula import ALL_SINGLE_BITS, number
-from stepwell.reference.single import fma
+from stepwell.reference.tape.single import fma
+from stepwell.runs import engine
+from stepwell.source.explanation import listing
+from stepwell.source.explanation.formula import ALL_SINGLE_BITS, number
+from stepwell.views import cli
 from test_explain import evaluate, leaves, lines
 from test_tracing import MEMBERS, METHODS, H, T, fits, made
 

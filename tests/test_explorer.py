@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 import stepwell as sw
 from explored import CHANGED, STEPS, data_of, expected, in_node, needs_node, page, races, scene_of
-from stepwell import cli
-from stepwell.explorer import sliders
-from stepwell.explorer.data import of_scene
-from stepwell.explorer.page import MODULES, WEB, script
+from stepwell.views import cli
+from stepwell.views.explorer import sliders
+from stepwell.views.explorer.data import of_scene
+from stepwell.views.explorer.page import MODULES, WEB, script
 
 # ---- steps
 
@@ -134,7 +134,7 @@ def test_sources_are_what_export_prints() -> None:
 
 
 def test_methods_have_the_colours_of_the_charts() -> None:
-    from stepwell.charts.style import look
+    from stepwell.views.charts.style import look
 
     for told in page().data["methods"]:
         assert told["colour"] == look(sw.method(told["name"]))["color"]

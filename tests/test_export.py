@@ -17,12 +17,12 @@ import stepwell as sw
 from abroad import C_FLAGS, PATIENCE, RUST_FLAGS, Journey, executed, missing, run, same
 from cases import SYSTEMS, number
 from stepwell import _core
-from stepwell.exports.functions import FUNCTIONS, argument
-from stepwell.exports.head import EXAMPLE, STEPS
-from stepwell.exports.names import camel, plain, prefix, snake
 from stepwell.reference import bits, log, trig
-from stepwell.reference.fused import Evaluated
+from stepwell.reference.tape.fused import Evaluated
 from stepwell.reference.traced import Tracer
+from stepwell.source.exports.functions import FUNCTIONS, argument
+from stepwell.source.exports.head import EXAMPLE, STEPS
+from stepwell.source.exports.names import camel, plain, prefix, snake
 from test_tracing import CONTROLS, METHODS, fits
 
 WRONG: Any = "yes"
@@ -435,7 +435,7 @@ def test_bits_of_numbers(language: str, tmp_path: Path, monkeypatch: pytest.Monk
             every.append(Journey(Knot(1.1), method.name, v, y, steps=40, options={"backend": "numpy"}))
     for each in every:
         each.options = {}
-    monkeypatch.setattr("stepwell.reference.fused.fused", lambda tape, roots: (list(tape), list(roots)))
+    monkeypatch.setattr("stepwell.reference.tape.fused.fused", lambda tape, roots: (list(tape), list(roots)))
     every += masks()
     assert len({tuple(each.expected) for each in every}) == len(every)
     sources = [each.export(language, f"step_{i}").source for i, each in enumerate(every)]
@@ -744,7 +744,7 @@ class Inward(Reserved):
 
 @languages
 def test_parameters_may_be_called_anything(language: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from stepwell.exports import tapes
+    from stepwell.source.exports import tapes
 
     def renamed(plan: Any) -> Any:
         numbers, tables = parameters(plan)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from abroad import Journey, run
-from stepwell import cli
 from stepwell.errors import ArgumentError, UnsupportedError
+from stepwell.views import cli
 from test_export import LANGUAGES, assert_same, languages, shown
 
 F = np.float32

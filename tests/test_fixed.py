@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import SYSTEMS
-from stepwell._value import Fixed, changed
+from stepwell.base.immutable import Fixed, changed
 from stepwell.errors import FixedError, StepwellError
 
 MADE: dict[str, Callable[[], Any]] = {

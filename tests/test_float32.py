@@ -14,13 +14,14 @@ import stepwell as sw
 from cases import SYSTEMS, Case, assert_same, cases, thinned
 from hypothesis import given
 from hypothesis import strategies as st
-from stepwell import _core, engine
+from stepwell import _core
 from stepwell.errors import ArgumentError, DTypeError, TraceError, UnsupportedError
 from stepwell.reference import functions, trig
 from stepwell.reference.functions import single as own
-from stepwell.reference.fused import odd_sum
-from stepwell.reference.single import evaluated, fma
+from stepwell.reference.tape.fused import odd_sum
+from stepwell.reference.tape.single import evaluated, fma
 from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
 from test_graphs import assert_one_graph, methods
 from test_tracing import made
 

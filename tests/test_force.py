@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import SYSTEMS
-from stepwell import _core, engine
+from stepwell import _core
 from stepwell.errors import ArgumentError, DTypeError, FixedError, ShapeError, UnsupportedError
 from stepwell.reference import around
 from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
 from test_graphs import assert_one_graph, methods
 from test_tracing import made
 

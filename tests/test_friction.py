@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import charts
-from stepwell.charts.verlet_friction import secant_verlet
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference import around, bits
+from stepwell.views import charts
+from stepwell.views.charts.verlet_friction import secant_verlet
 
 ABLE = [method for method in sw.methods() if not method.needs_acceleration]
 REFUSED = [method.name for method in sw.methods() if method.needs_acceleration]

@@ -14,11 +14,12 @@ import stepwell as sw
 from cases import SOME, SYSTEMS, drawn
 from hypothesis import given
 from hypothesis import strategies as st
-from stepwell import _core, engine
-from stepwell.reference.fused import exact_fma, fma, fused
-from stepwell.reference.increments import increments_last
-from stepwell.reference.tape import Operation, needed
+from stepwell import _core
+from stepwell.reference.tape.fused import exact_fma, fma, fused
+from stepwell.reference.tape.increments import increments_last
+from stepwell.reference.tape.operations import Operation, needed
 from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
 from test_tracing import ABLE, CONTROLS, METHODS, fits, made
 
 WRONG: Any = "yes"

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import SYSTEMS
-from stepwell._going_on import identity
-from stepwell._value import changed
+from stepwell.base.immutable import changed
 from stepwell.errors import ArgumentError
+from stepwell.runs.continuation import identity
 
 METHODS = [m.name for m in sw.methods()]
 

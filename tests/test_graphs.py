@@ -13,9 +13,10 @@ import own_systems
 import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, fits
-from stepwell import _core, engine
+from stepwell import _core
 from stepwell.reference import adaptive
 from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
 from test_tracing import ABLE, CONTROLS, METHODS, made
 
 #: Bodies whose graphs are compared with one method of each kind alone: they have tens of thousands of operations.

@@ -15,7 +15,7 @@ from stepwell.errors import ArgumentError, ShapeError, TooLargeError, UnknownNam
 
 gymnasium = pytest.importorskip("gymnasium")
 
-import stepwell.gym  # noqa: E402
+import stepwell.interop.gym  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
@@ -285,10 +285,9 @@ def test_wrong_calls() -> None:
 
 
 def test_gymnasium_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in [name for name in sys.modules if name.startswith("stepwell.gym")]:
+    for name in [name for name in sys.modules if name.startswith("stepwell.interop.gym")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "gymnasium", None)
-    monkeypatch.delattr(sw, "gym", raising=False)
     with pytest.raises(UnsupportedError, match=r"needs gymnasium, which is not installed; pip install 'stepwell\[gym\]'"):
         _ = sw.gym
 

@@ -12,7 +12,7 @@ from stepwell.errors import DTypeError, UnsupportedError
 
 gymnasium = pytest.importorskip("gymnasium")
 
-import stepwell.gym  # noqa: E402
+import stepwell.interop.gym  # noqa: E402
 from gymnasium.spaces import Box  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
@@ -71,7 +71,7 @@ def test_the_steps_are_those_of_integrate() -> None:
     np.testing.assert_array_equal(envs.world.v, run.v[-1])
 
 
-class Stone(stepwell.gym.WorldVectorEnv):  # type: ignore[misc]
+class Stone(stepwell.interop.gym.WorldVectorEnv):  # type: ignore[misc]
     """Falls, in float64 whatever is asked for."""
 
     episode_steps = 5

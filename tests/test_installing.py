@@ -24,7 +24,7 @@ def test_the_project_says_what_an_index_shows() -> None:
     assert len(PROJECT["classifiers"]) > 10
     assert "Typing :: Typed" in PROJECT["classifiers"]
     assert PROJECT["dependencies"] == ["numpy>=1.26"]
-    assert PROJECT["scripts"] == {"stepwell": "stepwell.cli:main"}
+    assert PROJECT["scripts"] == {"stepwell": "stepwell.views.cli:main"}
     assert (ROOT / PROJECT["readme"]).exists()
     assert PROJECT["license"] == "MIT"
 

@@ -205,7 +205,7 @@ def test_a_function_that_goes_on_after_ctrl_c_is_awaited() -> None:
     """By the next computation and by the end of the process: a thread that is joined is taken for dead (CPython gh-90882)."""
     code = """
         import atexit, os, signal, threading, time
-        from stepwell._interrupts import heard
+        from stepwell.base.interrupts import heard
         ends = []
         def function():
             time.sleep(1.0)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import stepwell as sw
 from differences import central
-from stepwell.derivatives import traced
-from stepwell.derivatives.traced import Traced
+from stepwell.analysis.derivatives import traced
+from stepwell.analysis.derivatives.traced import Traced
+from stepwell.analysis.stability import maps
 from stepwell.errors import UnsupportedError
-from stepwell.stability import maps
 
 EPS = np.finfo(float).eps
 

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _core, engine
+from stepwell import _core
+from stepwell.runs import engine
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 

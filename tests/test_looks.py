@@ -6,11 +6,12 @@ import sys
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.charts import labels, style
-from stepwell.charts.figures_picture import finding as figures_finding
-from stepwell.charts.figures_picture import groups
-from stepwell.charts.panel_picture import leader
-from stepwell.charts.picture import finding
+from stepwell.base.pictures import new_figure
+from stepwell.views.charts import labels, style
+from stepwell.views.charts.figures_picture import finding as figures_finding
+from stepwell.views.charts.figures_picture import groups
+from stepwell.views.charts.panel_picture import leader
+from stepwell.views.charts.picture import finding
 
 #: Linear RGB as it is seen without green cones (Machado, Oliveira and Fernandes, 2009, severity 1).
 DEUTERANOPE = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
@@ -80,7 +81,7 @@ def test_methods_of_a_family_are_told_apart_where_no_names_are_beside_them(eye):
 
 
 def test_labels_lie_in_the_axes_and_not_on_each_other():
-    figure = style.new_figure(6.0, 4.0)
+    figure = new_figure(6.0, 4.0)
     axes = figure.add_axes((0.1, 0.1, 0.85, 0.85))
     axes.set(xscale="log", yscale="log", xlim=(1.0, 1e4), ylim=(1e-8, 1.0))
     x = np.geomspace(1.0, 1e4, 30)
@@ -251,7 +252,7 @@ def test_the_title_of_the_figures_counts_what_the_methods_do():
 
 
 def test_names_at_the_ends_of_curves_do_not_cover_each_other():
-    figure = style.new_figure(6.0, 4.0)
+    figure = new_figure(6.0, 4.0)
     axes = figure.add_axes((0.1, 0.1, 0.6, 0.8))
     axes.set(yscale="log", ylim=(1e-3, 1.0), xlim=(0.0, 1.0))
     ends = [(1.0, y, f"curve {i}", "#000000") for i, y in enumerate((0.5, 0.51, 0.9, 0.95, 2e-3))]

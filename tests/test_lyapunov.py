@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.dynamics import Lyapunov, exponents
+from stepwell.analysis.dynamics import Lyapunov, exponents
 from stepwell.errors import UnsupportedError
-from stepwell.systems import System
+from stepwell.model.systems import System
 
 EPS = np.finfo(float).eps
 
@@ -308,7 +308,7 @@ def test_wrong_calls_with_a_tolerance(wrong: dict[str, Any], message: str) -> No
 
 def test_wrong_derivatives_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """With −sin for the derivative of the sine, the sum of a damped pendulum is no longer −2Dω₀."""
-    from stepwell.derivatives import rules
+    from stepwell.reference.tape import rules
 
     monkeypatch.setitem(rules.PARTIALS, "sin", (lambda f, y, x: -1e-3 - f("cos")(x),))
     found = sw.lyapunov(sw.Pendulum(1.5, 0.1), "false_euler", v=0.0, y=2.0, dt=0.1, steps=200, exponents="all")

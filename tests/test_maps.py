@@ -10,9 +10,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.charts.maps import ROUNDING
+from stepwell.analysis.stability import series
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnknownNameError, UnsupportedError
-from stepwell.stability import series
+from stepwell.views.charts.maps import ROUNDING
 from truths import CLOSED_FORMS
 
 METHODS = sw.methods()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell._brief import counted, first_of, in_words, of_member, share
+from stepwell.base.reprs import counted, first_of, in_words, of_member, share
 
 ROOT = Path(__file__).resolve().parent.parent
 FAST: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1000}

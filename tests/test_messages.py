@@ -15,7 +15,7 @@ import pytest
 import stepwell as sw
 from cases import SYSTEMS
 from own_systems import duffing
-from stepwell._value import same
+from stepwell.base.immutable import same
 
 
 def received(what: Any, *, first: int = 1, writeable: bool = False) -> Any:

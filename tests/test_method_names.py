@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 import stepwell as sw
-from stepwell._method_names import _why_not_here, names_of, spelling
 from stepwell.errors import UnknownNameError
+from stepwell.model.method_names import _why_not_here, names_of, spelling
 
 ALL = {m.name: m for m in sw.methods()}
 NAMES = [(m.name, name) for m in sw.methods() for name in (m.name, m.title, *m.other_names)]

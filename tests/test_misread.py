@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _doubt
 from stepwell.errors import ArgumentError, DTypeError
+from stepwell.runs import diagnostics
 
 START: dict[str, Any] = {"v": 0.0, "y": 1.0}
 FIXED = START | {"dt": 0.1, "steps": 10}
@@ -230,10 +230,10 @@ def test_energies_at_both_ends_are_those_of_the_system() -> None:
         for dim in (2, 3):
             bodies = sw.NBody(rng.uniform(0.5, 2.0, 5), force=force, G=1.5, softening=0.2, dim=dim)
             v, y = rng.normal(size=(2, 5, dim))
-            found = _doubt._summed(bodies, v.tolist(), y.tolist())
+            found = diagnostics._summed(bodies, v.tolist(), y.tolist())
             assert np.allclose(found, (bodies.energy(v, y), bodies.kinetic(v)), rtol=1e-14, atol=1e-13)
     together = [[0.0, 0.0]] * 2
-    assert np.isnan(_doubt._summed(sw.NBody([1.0, 1.0], force="newton"), together, together)).all()
+    assert np.isnan(diagnostics._summed(sw.NBody([1.0, 1.0], force="newton"), together, together)).all()
 
 
 def test_bodies_in_a_batch_whose_energy_the_method_made() -> None:

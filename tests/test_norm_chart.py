@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.charts import norm
 from stepwell.errors import ArgumentError, UnsupportedError
+from stepwell.views.charts import norm
 
 GAINS = (0.05, 0.3, 0.9)
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 import stepwell as sw
-from stepwell import _checks, charts, cli
+from stepwell.base import checks
 from stepwell.errors import ArgumentError, DTypeError
+from stepwell.views import charts, cli
 
 #: Each command that writes: its words, what its work is done by, the name of a file, or one that it writes into a folder.
 COMMANDS: dict[str, tuple[list[str], str, str, str | None]] = {
@@ -22,22 +23,27 @@ COMMANDS: dict[str, tuple[list[str], str, str, str | None]] = {
     "run animation": (["run", "clover", "--method", "rk4", "--steps", "5"], "stepwell.scenes.Scene.run", "run.gif", None),
     "advise": (
         ["advise", "oscillator", "--methods", "rk4", "--cost", "evaluations", "--tolerance", "0.1"],
-        "stepwell.cli.advise.advise",
+        "stepwell.views.cli.advise.advise",
         "a.json",
         None,
     ),
-    "explore": (["explore", "--scene", "oscillator", "--only"], "stepwell.cli.explore.explore", "page.html", None),
-    "criteria": (["criteria", "rk4"], "stepwell.cli.criteria.criteria", "c.md", None),
-    "criteria json": (["criteria", "rk4"], "stepwell.cli.criteria.criteria", "c.json", None),
-    "chart": (["chart", "oscillator", "--methods", "false_euler"], "stepwell.cli.chart.work_precision", "", "oscillator.csv"),
+    "explore": (["explore", "--scene", "oscillator", "--only"], "stepwell.views.cli.explore.explore", "page.html", None),
+    "criteria": (["criteria", "rk4"], "stepwell.views.cli.criteria.criteria", "c.md", None),
+    "criteria json": (["criteria", "rk4"], "stepwell.views.cli.criteria.criteria", "c.json", None),
+    "chart": (
+        ["chart", "oscillator", "--methods", "false_euler"],
+        "stepwell.views.cli.chart.work_precision",
+        "",
+        "oscillator.csv",
+    ),
     "chart panel": (
         ["chart", "oscillator", "--methods", "false_euler", "--panel"],
-        "stepwell.cli.chart.work_precision",
+        "stepwell.views.cli.chart.work_precision",
         "",
         "panel.json",
     ),
-    "figures": (["figures", "rk4"], "stepwell.cli.figures.figures", "", None),
-    "stability": (["stability", "rk4", "--charts", "loci"], "stepwell.cli.stability.stability", "", "stability.csv"),
+    "figures": (["figures", "rk4"], "stepwell.views.cli.figures.figures", "", None),
+    "stability": (["stability", "rk4", "--charts", "loci"], "stepwell.views.cli.stability.stability", "", "stability.csv"),
 }
 
 EACH = pytest.mark.parametrize("command", COMMANDS)
@@ -152,7 +158,7 @@ def test_charts_try_their_place_before_they_draw(tmp_path: Path, monkeypatch: py
         "panel_picture",
         "runs_animation",
     ):
-        module = __import__(f"stepwell.charts.{name}", fromlist=["x"])
+        module = __import__(f"stepwell.views.charts.{name}", fromlist=["x"])
         for drawer in ("draw", "loci", "overview", "one", "write"):
             if hasattr(module, drawer):
                 monkeypatch.setattr(module, drawer, lambda *_: pytest.fail("it drew before it looked at the path"))
@@ -177,14 +183,14 @@ def test_a_path_is_left_as_it_was(tmp_path: Path) -> None:
     old = tmp_path / "old"
     old.write_bytes(b"kept")
     os.utime(old, (1e9, 1e9))
-    assert _checks.file("path", str(old)) == old
+    assert checks.file("path", str(old)) == old
     assert (old.read_bytes(), old.stat().st_mtime) == (b"kept", 1e9)
-    _checks.file("path", tmp_path / "new")
+    checks.file("path", tmp_path / "new")
     (tmp_path / "link").symlink_to(tmp_path / "not yet")
-    _checks.file("path", tmp_path / "link")
+    checks.file("path", tmp_path / "link")
     (tmp_path / "link").unlink()
-    _checks.folder("path", tmp_path / "new" / "and" / "deep")
-    _checks.folder("path", str(tmp_path), ["old", "new"])
+    checks.folder("path", tmp_path / "new" / "and" / "deep")
+    checks.folder("path", str(tmp_path), ["old", "new"])
     assert list(tmp_path.iterdir()) == [old]
     assert (old.read_bytes(), old.stat().st_mtime) == (b"kept", 1e9)
 
@@ -194,8 +200,8 @@ def test_what_is_no_file_is_not_opened_twice(tmp_path: Path) -> None:
     """A pipe would wait for its reader."""
     os.mkfifo(tmp_path / "pipe")
     begin = time.perf_counter()
-    _checks.file("path", tmp_path / "pipe")
-    _checks.file("path", os.devnull)
+    checks.file("path", tmp_path / "pipe")
+    checks.file("path", os.devnull)
     assert time.perf_counter() - begin < 1.0
 
 
@@ -205,6 +211,6 @@ def test_what_may_not_be_written(tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir(0o500)
     for path in (tmp_path / "file", tmp_path / "folder" / "x"):
         with pytest.raises(ArgumentError, match="Permission denied"):
-            _checks.file("path", path)
+            checks.file("path", path)
     with pytest.raises(ArgumentError, match="Permission denied"):
-        _checks.folder("path", tmp_path / "folder" / "deep")
+        checks.folder("path", tmp_path / "folder" / "deep")

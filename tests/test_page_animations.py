@@ -11,8 +11,8 @@ import pytest
 import stepwell as sw
 from abroad import executed
 from explored import needs_node
-from stepwell.charts import page_animation, run_picture
-from stepwell.charts.runs import own_picture
+from stepwell.views.charts import page_animation, run_picture
+from stepwell.views.charts.runs import own_picture
 
 DECODING = """
 const { readFileSync } = require("node:fs");

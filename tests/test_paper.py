@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 import stepwell as sw
-from stepwell import paper
-from stepwell.cli import main
+from stepwell.views import paper
+from stepwell.views.cli import main
 
 ENTRIES = paper.entries()
 SECTIONS = [*(f"§{n}" for n in range(1, 13)), *(f"App. {letter}" for letter in "ABCDE")]

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell.analysis.stability.counted import operations
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference import trig
-from stepwell.stability.counted import operations
 
 METHODS = [m.name for m in sw.methods()]
 ADAPTIVE = [m.name for m in sw.methods() if m.error_order is not None and not m.has_series]  # it refuses samples

@@ -196,7 +196,7 @@ def test_a_power_that_overflows_is_a_member_that_diverged() -> None:
 
 
 def test_progress() -> None:
-    from stepwell import engine
+    from stepwell.runs import engine
 
     told: list[float] = []
     plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=100, every=25, form="power", progress=told.append)

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.charts import powers
-from stepwell.charts.powers import FORMS
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
+from stepwell.views.charts import powers
+from stepwell.views.charts.powers import FORMS
 from truths import CLOSED_FORMS
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _progress
+from stepwell.base import progress
 
 OPTIONS: dict[str, Any] = {"v": 0.0, "y": np.ones(200), "dt": 0.1, "steps": 3000, "progress": True, "backend": "numpy"}
 
@@ -29,7 +29,7 @@ def without_rich(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_without_rich_a_terminal_shows_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     without_rich(monkeypatch)
-    monkeypatch.setattr(_progress, "MIN_SECONDS_BETWEEN", 0.0)
+    monkeypatch.setattr(progress, "MIN_SECONDS_BETWEEN", 0.0)
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
     run = sw.integrate(sw.Oscillator(), "rk4", **OPTIONS)
     lines = terminal.getvalue().split("\r")
@@ -74,7 +74,7 @@ def in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> Handle:
 
 def test_a_notebook_shows_an_element_of_its_page(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     handle = in_a_notebook(monkeypatch)
-    monkeypatch.setattr(_progress, "MIN_SECONDS_BETWEEN", 0.0)
+    monkeypatch.setattr(progress, "MIN_SECONDS_BETWEEN", 0.0)
     sw.integrate(sw.Oscillator(), "rk4", **OPTIONS)
     assert capsys.readouterr() == ("", "")
     assert handle.shown[0] == 'Runge-Kutta 4, 3000 steps <progress value="0.000" max="1"></progress> 0 %'
@@ -86,15 +86,15 @@ def test_a_notebook_shows_an_element_of_its_page(monkeypatch: pytest.MonkeyPatch
 
 def test_a_notebook_is_not_written_anew_for_every_share(monkeypatch: pytest.MonkeyPatch) -> None:
     handle = in_a_notebook(monkeypatch)
-    with _progress.bar("much") as told:
+    with progress.bar("much") as told:
         for i in range(10_000):
             told(i / 10_000)
     assert len(handle.shown) < 100
 
 
 def test_ipython_in_a_terminal_is_no_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not _progress.in_notebook()
+    assert not progress.in_notebook()
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: SimpleNamespace()))
-    assert not _progress.in_notebook()
+    assert not progress.in_notebook()
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))
-    assert not _progress.in_notebook()
+    assert not progress.in_notebook()

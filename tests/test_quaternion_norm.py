@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 import tops
-from stepwell.stability.expansion import polynomials
+from stepwell.analysis.stability.expansion import polynomials
 from truths import CLOSED_FORMS
 
 #: A series has no stages: what is said of them is not of it, and a test of its own has its growth.

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.equations import recognised
 from stepwell.errors import ArgumentError
-from stepwell.sweeps.portable import packed
-from stepwell.systems import own
+from stepwell.model.equations import recognised
+from stepwell.model.systems import own
+from stepwell.studies.sweeps.portable import packed
 
 SCALE = 2.0
 TABLE = np.array([1.0, 2.0])

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import SYSTEMS
-from stepwell import _brief, charts
+from stepwell.base import reprs
+from stepwell.views import charts
 
 #: The longest line.
 MOST = 200
@@ -126,11 +127,11 @@ def assert_a_table(html: str, *told: str) -> None:
 
 
 def test_what_a_user_wrote_is_no_html() -> None:
-    html = _brief.table("<script>", ["a>", "b"], [["<b>", "&"]], ["1 < 2"])
+    html = reprs.table("<script>", ["a>", "b"], [["<b>", "&"]], ["1 < 2"])
     assert "<script>" not in html
     assert "&lt;b&gt;" in html
     assert 'style="text-align:right">a<' in html
-    long = _brief.table("t", ["a"], [[str(i)] for i in range(100)])
+    long = reprs.table("t", ["a"], [[str(i)] for i in range(100)])
     assert "and 70 more" in long
 
 

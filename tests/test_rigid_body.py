@@ -12,8 +12,9 @@ import pytest
 import stepwell as sw
 import tops
 from cases import assert_same
-from stepwell import _core, quaternion
+from stepwell import _core
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
+from stepwell.model import quaternion
 from stepwell.reference.systems import rigid_body as reference
 from stepwell.reference.traced import Tracer
 from stepwell.scenes.free_top import FreeTop

@@ -12,7 +12,7 @@ import stepwell as sw
 from cases import assert_same
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference.systems import rods
-from stepwell.scenes.builtin.pendulum import quarter
+from stepwell.scenes.elliptic import quarter
 
 STEPPED = [m.name for m in sw.methods() if not m.needs_acceleration]
 CONTROL, RESETTING = sw.LengthControl(0.5), sw.Projection("length")

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.charts.runs import RunPicture, own_picture, run_picture
-from stepwell.charts.runs_finding import finding, percent, tenfold
+from stepwell.views.charts.runs import RunPicture, own_picture, run_picture
+from stepwell.views.charts.runs_finding import finding, percent, tenfold
 
 START: dict[str, Any] = {"v": 0.0, "y": 1.0, "every": 1}
 

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 import stepwell as sw
 from PIL import Image
-from stepwell.charts import attitude_picture, body_picture, orbits_picture, runs_animation, runs_picture, style
-from stepwell.charts.runs import own_picture
+from stepwell.base.pictures import png
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
+from stepwell.views.charts import attitude_picture, body_picture, orbits_picture, runs_animation, runs_picture, style
+from stepwell.views.charts.runs import own_picture
 
 
 def looked_at(scene, method="false_euler", dt=None, **options):
@@ -582,7 +583,7 @@ def test_a_notebook_shows_a_figure_without_pyplot():
     """IPython asks an object for ``_repr_png_``; what it knows of matplotlib's figures it learns from pyplot."""
     run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=2.0, dt=0.1, steps=30, every=1)
     figure = run.plot()
-    assert figure._repr_png_() == style.png(figure)
+    assert figure._repr_png_() == png(figure)
     assert figure._repr_png_().startswith(b"\x89PNG")
     assert pickle.loads(pickle.dumps(figure))._repr_png_().startswith(b"\x89PNG")
 

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _core, _memory
+from stepwell import _core
+from stepwell.base import buffer_pool
 
 #: More steps than are made at once (64), by one run and after it, and some beside.
 STEPS = 200
@@ -20,9 +21,9 @@ STEPS = 200
 
 @pytest.fixture(autouse=True)
 def _nothing_kept() -> Iterator[None]:
-    _memory._kept.clear()
+    buffer_pool._kept.clear()
     yield
-    _memory._kept.clear()
+    buffer_pool._kept.clear()
 
 
 def systems() -> dict[str, tuple[sw.System, tuple[int, ...]]]:
@@ -123,7 +124,7 @@ def test_the_times_are_those_of_the_clock(every: int) -> None:
 
 
 def many(**options: Any) -> sw.Run:
-    steps = _memory.LEAST_LENT // 8
+    steps = buffer_pool.LEAST_LENT // 8
     return sw.integrate(sw.Oscillator(), "false_euler", v=0.0, y=1.0, steps=steps, every=1, **({"dt": 0.01} | options))
 
 
@@ -168,28 +169,28 @@ def test_threads_are_lent_memory_of_their_own() -> None:
 
 
 def test_no_more_memory_is_kept_than_promised() -> None:
-    runs = [many() for _ in range(_memory.MOST_KEPT // (2 * _memory.LEAST_LENT))]
-    assert sum(run.y.nbytes for run in runs) > _memory.MOST_KEPT / 3
+    runs = [many() for _ in range(buffer_pool.MOST_KEPT // (2 * buffer_pool.LEAST_LENT))]
+    assert sum(run.y.nbytes for run in runs) > buffer_pool.MOST_KEPT / 3
     del runs
     gc.collect()
-    assert 0 < sum(each.nbytes for each in _memory._kept.values()) <= _memory.MOST_KEPT
+    assert 0 < sum(each.nbytes for each in buffer_pool._kept.values()) <= buffer_pool.MOST_KEPT
     # Memory that is larger than that is given back to the system.
-    gone = _memory.empty((_memory.MOST_KEPT // 8 + 1,))
-    before = list(_memory._kept)
+    gone = buffer_pool.empty((buffer_pool.MOST_KEPT // 8 + 1,))
+    before = list(buffer_pool._kept)
     ends = weakref.ref(gone)
     del gone
     assert ends() is None
-    assert list(_memory._kept) == before
+    assert list(buffer_pool._kept) == before
 
 
 def test_memory_is_not_lent_for_much_less() -> None:
     """What a run takes is counted before; so it is not to hold much more than that."""
-    size = 4 * _memory.LEAST_LENT // 8
-    first = _memory.empty((size,))
+    size = 4 * buffer_pool.LEAST_LENT // 8
+    first = buffer_pool.empty((size,))
     at = place(first)
     del first
-    assert place(_memory.empty((size // 2,))) != at
-    assert place(_memory.empty((size - size // 10,))) == at
+    assert place(buffer_pool.empty((size // 2,))) != at
+    assert place(buffer_pool.empty((size - size // 10,))) == at
 
 
 @pytest.mark.skipif(_core.isa() == "interpret", reason="times are those of machine code")

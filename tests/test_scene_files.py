@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 import stepwell as sw
-from stepwell.cli import main
 from stepwell.errors import ArgumentError, UnknownNameError
+from stepwell.views.cli import main
 
 FILE = """
 import numpy as np

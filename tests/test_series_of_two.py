@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _core, engine
+from stepwell import _core
 from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
 from test_graphs import assert_one_graph
 
 TAYLOR = sw.method("taylor")

@@ -21,7 +21,9 @@ from urllib.parse import unquote, urlsplit
 import pytest
 import stepwell as sw
 from PIL import Image
-from stepwell import charts, quaternion, stability
+from stepwell.analysis import stability
+from stepwell.model import quaternion
+from stepwell.views import charts
 
 pytest.importorskip("sphinx_gallery", reason="the extra docs is not installed")
 pytest.importorskip("myst_nb", reason="the extra docs is not installed")

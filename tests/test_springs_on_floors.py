@@ -20,10 +20,10 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import assert_same
-from stepwell.engine import direct
 from stepwell.errors import DTypeError, ShapeError, UnsupportedError
+from stepwell.model.systems import base
 from stepwell.reference import contact
-from stepwell.systems import base
+from stepwell.runs.engine import direct
 from test_contact_mutants import changed
 
 G = 9.81

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stability_cases import EPS, METHODS, known
-from stepwell.stability import KINDS, operations
+from stepwell.analysis.stability import KINDS, operations
 from truths import CLOSED_FORMS
 
 #: FACTS of the undamped oscillator: q = r₁², p, limit.

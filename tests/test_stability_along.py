@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.stability import along
+from stepwell.analysis.stability import along
 
 EPS = np.finfo(float).eps
 

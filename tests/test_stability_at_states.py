@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stability_cases import EPS
+from stepwell.analysis.stability import eigen, limit_search
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnsupportedError
-from stepwell.stability import eigen, limit_search
 
 
 def test_small_growth_is_seen_beside_what_is_on_the_circle() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.stability import maps, operations, series
+from stepwell.analysis.stability import maps, operations, series
 from truths import DOP853_TAIL
 
 SECOND_ORDER = [m.name for m in sw.methods() if m.needs_acceleration]

@@ -12,10 +12,10 @@ import other_methods as other
 import pytest
 import stepwell as sw
 from stability_cases import EPS, METHODS
+from stepwell.analysis.stability import eigen, maps, operations, series
+from stepwell.analysis.stability.numbers import Polynomial
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.reference.systems.oscillator import Oscillator as Reference
-from stepwell.stability import eigen, maps, operations, series
-from stepwell.stability.numbers import Polynomial
 from truths import CLOSED_FORMS
 
 # ---- series and counts

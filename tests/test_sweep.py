@@ -16,9 +16,9 @@ import scipy.stats
 import stepwell as sw
 import xarray
 from stepwell.errors import ArgumentError, UnsupportedError
-from stepwell.sweeps import axes as of_axes
-from stepwell.sweeps import crossings, observed, outcomes
-from stepwell.sweeps.task import Stopped
+from stepwell.studies.sweeps import axes as of_axes
+from stepwell.studies.sweeps import crossings, observed, outcomes
+from stepwell.studies.sweeps.task import Stopped
 from sweeping import AXES, OUTCOMES, duffing, power, small, unlike
 
 Oscillator = sw.Oscillator
@@ -485,7 +485,7 @@ def test_attributes_tell_how_it_was_made() -> None:
 def test_progress_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     import contextlib
 
-    from stepwell import _progress
+    from stepwell.base import progress
 
     shares: list[float] = []
 
@@ -494,7 +494,7 @@ def test_progress_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
         assert title == "sweep, 45 members"
         yield shares.append
 
-    monkeypatch.setattr(_progress, "bar", bar)
+    monkeypatch.setattr(progress, "bar", bar)
     small(progress=True, chunk=10, outcomes="last")
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -581,7 +581,7 @@ def test_importing_stepwell_imports_nothing_of_this() -> None:
     code = (
         "import sys, stepwell as sw; print(*[m for m in sys.modules if m.split('.')[0] in ('xarray', 'zarr', 'dask', 'pandas')], "
     )
-    code += "*[m for m in sys.modules if m.startswith('stepwell.sweeps')])"
+    code += "*[m for m in sys.modules if m.startswith('stepwell.studies.sweeps')])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []
 
 
@@ -610,7 +610,7 @@ def test_everything_public_has_an_example_that_runs(name: str) -> None:
 
 def test_a_function_alone_makes_the_run_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside reductions, which go piece by piece, its run is one more."""
-    from stepwell.sweeps import task
+    from stepwell.studies.sweeps import task
 
     made: list[int] = []
     original = task.integrate

@@ -24,10 +24,10 @@ import pytest
 import stepwell as sw
 import xarray
 from stepwell.errors import ArgumentError
-from stepwell.sweeps import portable
-from stepwell.sweeps.axes import Chunk
-from stepwell.sweeps.ensemble import _outcomes
-from stepwell.sweeps.task import Task
+from stepwell.studies.sweeps import portable
+from stepwell.studies.sweeps.axes import Chunk
+from stepwell.studies.sweeps.ensemble import _outcomes
+from stepwell.studies.sweeps.task import Task
 from sweeping import AXES, OUTCOMES, duffing, ends, small, unlike
 
 #: Of Dask and its loops, at their own end.
@@ -89,7 +89,7 @@ def test_samples_on_a_cluster(client: Any) -> None:
 
 def test_progress_on_a_cluster(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Dask's own, which its dashboard draws, has every chunk by name; the bar here goes on with them."""
-    from stepwell import _progress
+    from stepwell.base import progress
 
     shares: list[float] = []
 
@@ -97,7 +97,7 @@ def test_progress_on_a_cluster(client: Any, monkeypatch: pytest.MonkeyPatch) -> 
     def bar(title: str) -> Any:
         yield shares.append
 
-    monkeypatch.setattr(_progress, "bar", bar)
+    monkeypatch.setattr(progress, "bar", bar)
     with distributed.get_task_stream(client=client) as stream:
         found = small(engine=client, chunk=5, outcomes="last", progress=True)
     chunks = len(stream.data)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
-from stepwell.sweeps import outcomes
+from stepwell.studies.sweeps import outcomes
 
 STEPS = [0.1, 0.05, 0.025]
 
@@ -81,7 +81,7 @@ def test_a_dimension_that_two_arguments_have_in_common_has_a_name_of_its_own() -
     ],
 )
 def test_names_that_clash_are_refused_before_any_chunk(given: Any, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from stepwell.sweeps import engines
+    from stepwell.studies.sweeps import engines
 
     def never(*_: Any) -> Any:
         raise AssertionError("a chunk was computed")

@@ -19,7 +19,7 @@ import pytest
 import stepwell as sw
 import xarray
 from stepwell.errors import ArgumentError
-from stepwell.sweeps import engines, stores
+from stepwell.studies.sweeps import engines, stores
 from sweeping import small, unlike
 
 KINDS = pytest.mark.parametrize("ending", ["zarr", "nc"])

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
-from stepwell.sweeps import task
+from stepwell.studies.sweeps import task
 from sweeping import AXES, duffing, ends, power, unlike
 
 METHODS = ("merson", "fehlberg", "fehlberg_5", "dop853", "taylor")

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.equations import switching
 from stepwell.errors import ToleranceWarning
+from stepwell.model.equations import switching
 
 PAIRS = ["merson", "fehlberg", "fehlberg_5", "dop853"]
 

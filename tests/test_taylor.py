@@ -14,10 +14,11 @@ import mpmath
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _core, engine
+from stepwell import _core
 from stepwell.errors import ToleranceWarning, UnsupportedError
 from stepwell.reference import series, series_pace
 from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
 from test_graphs import assert_one_graph
 from truths import DRIVE, END, FORCE, OMEGA, forced_exact
 
@@ -151,7 +152,7 @@ def test_a_wrong_recurrence_is_noticed(mistake: str, monkeypatch: pytest.MonkeyP
 
 
 def test_a_wrong_derivative_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from stepwell.derivatives import rules
+    from stepwell.reference.tape import rules
 
     monkeypatch.setitem(rules.PARTIALS, "sin", (lambda f, y, x: -f("cos")(x),))
     with pytest.raises(AssertionError):

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, fits, has_branches
-from stepwell import engine
-from stepwell._value import changed
+from stepwell.base.immutable import changed
+from stepwell.model.systems.base import flat
 from stepwell.reference import adaptive, contact
 from stepwell.reference.traced import Tracer
-from stepwell.systems.base import flat
+from stepwell.runs import engine
 from symbols import Symbol, Tape, evaluate
 
 METHODS = sw.methods()

@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from stepwell import _words, contact, control, exports, integrate
-from stepwell.advice import COSTS
-from stepwell.systems import aircraft, nbody, oscillator
+from stepwell import integrate
+from stepwell.base import literals
+from stepwell.model import controls, surfaces
+from stepwell.model.systems import aircraft, nbody, oscillator
+from stepwell.source import exports
+from stepwell.studies.advice import COSTS
 
 pytest.importorskip("mypy")
 
@@ -54,7 +57,7 @@ def test_mypy_finds_what_is_written_wrongly(tmp_path: Path) -> None:
     text = f"{HEAD}{RIGHT}\n\ndef wrong() -> None:\n{lines}"
     path = tmp_path / "calls.py"
     path.write_text(text, encoding="utf-8")
-    package = Path(_words.__file__).parents[1]
+    package = Path(literals.__file__).parents[1]
     # A package that is not installed is found there; mypy finds an installed one by itself, and refuses to be told.
     env = {"PATH": ""} if package.name == "site-packages" else {"PATH": "", "MYPYPATH": str(package)}
     words = ["-m", "mypy", "--strict", "--no-error-summary", "--cache-dir", str(tmp_path / "cache"), str(path)]
@@ -73,15 +76,15 @@ def test_mypy_finds_what_is_written_wrongly(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "known"),
     [
-        (_words.RunForm, integrate.__globals__["FORMS"]),
-        (_words.Backend, integrate.__globals__["BACKENDS"]),
-        (_words.OscillatorForm, oscillator.FORMS),
-        (_words.AttitudeForm, aircraft.FORMS),
-        (_words.BodyForce, nbody.FORCES),
-        (_words.ContactWay, contact.WAYS),
-        (_words.ControlForm, control.FORMS),
-        (_words.Cost, COSTS),
-        (_words.LanguageName, tuple(exports.LANGUAGES)),
+        (literals.RunForm, integrate.__globals__["FORMS"]),
+        (literals.Backend, integrate.__globals__["BACKENDS"]),
+        (literals.OscillatorForm, oscillator.FORMS),
+        (literals.AttitudeForm, aircraft.FORMS),
+        (literals.BodyForce, nbody.FORCES),
+        (literals.ContactWay, surfaces.WAYS),
+        (literals.ControlForm, controls.FORMS),
+        (literals.Cost, COSTS),
+        (literals.LanguageName, tuple(exports.LANGUAGES)),
     ],
 )
 def test_the_types_have_the_words_that_are_checked(words: object, known: tuple[str, ...]) -> None:

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import SYSTEMS
-from stepwell import charts
-from stepwell._value import Value, same
+from stepwell.base.immutable import Value, same
+from stepwell.views import charts
 
 FREE = sw.Oscillator(omega=2.0)
 QUATERNION: dict[str, Any] = {"v": np.ones(3), "y": np.array([1.0, 0.0, 0.0, 0.0]), "dt": 0.1, "steps": 1}

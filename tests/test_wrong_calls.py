@@ -24,7 +24,8 @@ import numpy as np
 import own_systems as own
 import pytest
 import stepwell as sw
-from stepwell import charts, stability
+from stepwell.analysis import stability
+from stepwell.views import charts
 
 #: What a call may take: ten times what the slowest right one does on a busy machine. What takes longer was accepted and works.
 SECONDS = 1.0

@@ -11,9 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.charts import style, zplane_picture
-from stepwell.charts.zplane import ladder, largest
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
+from stepwell.views.charts import style, zplane_picture
+from stepwell.views.charts.zplane import ladder, largest
 from truths import CLOSED_FORMS
 
 METHODS = sw.methods()

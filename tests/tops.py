@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import stepwell as sw
-from stepwell import quaternion
+from stepwell.model import quaternion
 
 #: Dop853 with these steps errs by less than their roundings, which are together below 1e-13 of the largest number.
 STEPS, ROUNDING = 160, 1e-13

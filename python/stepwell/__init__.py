@@ -12,42 +12,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
+from .base import registry
 from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, EventWarning, StepwellError, ToleranceWarning
 
 if TYPE_CHECKING:
-    from . import (
-        advice,
-        charts,
-        derivatives,
-        dynamics,
-        equations,
-        explanation,
-        explorer,
-        exports,
-        paper,
-        quaternion,
-        scenes,
-        stability,
-        sweeps,
-    )
-    from .advice import advise
-    from .contact import Floor, Sphere
-    from .control import Control, EnergyControl, LengthControl, NormControl, Projection
-    from .dynamics import equilibria, jacobian, lyapunov
-    from .equations import system
-    from .events import Event
-    from .explanation import Explanation, explain
-    from .explorer import Explorer, explore
-    from .exports import ExportedStep, export
-    from .integration import integrate
+    from . import scenes
+    from .analysis import derivatives, dynamics, stability
+    from .analysis.dynamics import equilibria, jacobian, lyapunov
+    from .analysis.stability import analyse, criteria, stability_along, stability_limit
     from .interop.saving import load
     from .interop.solve_ivp import solve_ivp
-    from .method_records import Method, method, methods
-    from .result import Run, Status
-    from .scenes import Scene
-    from .stability import analyse, criteria, stability_along, stability_limit
-    from .sweeps import sweep
-    from .systems import (
+    from .model import equations, quaternion
+    from .model.controls import Control, EnergyControl, LengthControl, NormControl, Projection
+    from .model.equations import system
+    from .model.methods import Method, method, methods
+    from .model.surfaces import Floor, Sphere
+    from .model.systems import (
         Aircraft,
         Chain,
         LinearSystem,
@@ -64,7 +44,51 @@ if TYPE_CHECKING:
         Springs,
         System,
     )
-    from .world import World
+    from .runs.events import Event
+    from .runs.integration import integrate
+    from .runs.result import Run, Status
+    from .runs.world import World
+    from .scenes import Scene
+    from .source import explanation, exports
+    from .source.explanation import Explanation, explain
+    from .source.exports import ExportedStep, export
+    from .studies import advice, sweeps
+    from .studies.advice import advise
+    from .studies.sweeps import sweep
+    from .views import charts, explorer, paper
+    from .views.explorer import Explorer, explore
+
+registry.register(
+    animate_run="stepwell.views.charts.animation:animate",
+    draw_advice="stepwell.views.charts.advice_picture:draw",
+    draw_attitude="stepwell.views.charts.attitude_picture:draw_panels",
+    draw_body="stepwell.views.charts.body_picture:draw_panels",
+    draw_control="stepwell.views.charts.control_picture:draw",
+    draw_curves="stepwell.views.charts.zplane_picture:curves",
+    draw_eigenvalues="stepwell.views.charts.roots_picture:draw",
+    draw_figure="stepwell.views.charts.figures_picture:one",
+    draw_figures="stepwell.views.charts.figures_picture:overview",
+    draw_harmonic_figures="stepwell.views.charts.figures_picture:harmonic",
+    draw_lengths="stepwell.views.charts.length_picture:draw",
+    draw_loci="stepwell.views.charts.zplane_picture:loci",
+    draw_map="stepwell.views.charts.map_picture:draw",
+    draw_norm="stepwell.views.charts.norm_picture:draw",
+    draw_panel="stepwell.views.charts.panel_picture:draw",
+    draw_powers="stepwell.views.charts.powers_picture:draw",
+    draw_run="stepwell.views.charts.runs_picture:draw",
+    draw_verlet_friction="stepwell.views.charts.verlet_friction_picture:draw",
+    draw_work_precision="stepwell.views.charts.picture:draw",
+    explore="stepwell.views.explorer.page:explore",
+    held_by_stability="stepwell.analysis.stiffness:held_by_stability",
+    own_system="stepwell.model.systems.own:OwnSystem",
+    picture_of_run="stepwell.views.charts.runs:own_picture",
+    run_to_dataframe="stepwell.interop.tables:to_dataframe",
+    run_to_xarray="stepwell.interop.tables:to_xarray",
+    safe_step="stepwell.analysis.stability.nets:safe_step",
+    save_run="stepwell.interop.saving:save",
+    warn_of_growth="stepwell.analysis.growth:warn_of",
+    watched_for_growth="stepwell.analysis.growth:watched",
+)
 
 __version__: str = _core.__version__
 
@@ -169,42 +193,42 @@ def isa_levels() -> list[str]:
 #: Modules that are attributes, and are imported on first use, so that importing stepwell stays fast. ``gym`` needs gymnasium, so
 #: it is not among the names that are listed.
 _MODULES = {
-    "advice",
-    "charts",
-    "derivatives",
-    "dynamics",
-    "equations",
-    "explanation",
-    "explorer",
-    "exports",
-    "gym",
-    "paper",
-    "quaternion",
-    "scenes",
-    "stability",
-    "sweeps",
+    "advice": "studies.advice",
+    "charts": "views.charts",
+    "derivatives": "analysis.derivatives",
+    "dynamics": "analysis.dynamics",
+    "equations": "model.equations",
+    "explanation": "source.explanation",
+    "explorer": "views.explorer",
+    "exports": "source.exports",
+    "gym": "interop.gym",
+    "paper": "views.paper",
+    "quaternion": "model.quaternion",
+    "scenes": "scenes",
+    "stability": "analysis.stability",
+    "sweeps": "studies.sweeps",
 }
 
 #: The other names that are imported on first use, by the modules that define them; those that are not here are of ``systems``.
 _NAMES = {
-    "advice": "advise",
-    "contact": "Floor Sphere",
-    "control": "Control EnergyControl LengthControl NormControl Projection",
-    "dynamics": "equilibria jacobian lyapunov",
-    "equations": "system",
-    "events": "Event",
-    "explanation": "Explanation explain",
-    "explorer": "Explorer explore",
-    "exports": "ExportedStep export",
-    "integration": "integrate",
+    "studies.advice": "advise",
+    "model.surfaces": "Floor Sphere",
+    "model.controls": "Control EnergyControl LengthControl NormControl Projection",
+    "analysis.dynamics": "equilibria jacobian lyapunov",
+    "model.equations": "system",
+    "runs.events": "Event",
+    "source.explanation": "Explanation explain",
+    "views.explorer": "Explorer explore",
+    "source.exports": "ExportedStep export",
+    "runs.integration": "integrate",
     "interop.saving": "load",
     "interop.solve_ivp": "solve_ivp",
-    "method_records": "Method method methods",
-    "result": "Run Status",
+    "model.methods": "Method method methods",
+    "runs.result": "Run Status",
     "scenes": "Scene",
-    "stability": "analyse criteria stability_along stability_limit",
-    "sweeps": "sweep",
-    "world": "World",
+    "analysis.stability": "analyse criteria stability_along stability_limit",
+    "studies.sweeps": "sweep",
+    "runs.world": "World",
 }
 _MODULE_OF = {name: module for module, names in _NAMES.items() for name in names.split()}
 
@@ -219,10 +243,10 @@ if not TYPE_CHECKING:  # to which any name would else be one of the package
         import importlib
 
         if name in _MODULES:
-            return importlib.import_module(f"stepwell.{name}")
+            return importlib.import_module(f"stepwell.{_MODULES[name]}")
         if name not in __all__:
             raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
-        module = importlib.import_module(f"stepwell.{_MODULE_OF.get(name, 'systems')}")
+        module = importlib.import_module(f"stepwell.{_MODULE_OF.get(name, 'model.systems')}")
         # Kept, so that the next use is as quick as that of any attribute.
         found = globals()[name] = getattr(module, name)
         return found

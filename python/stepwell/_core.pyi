@@ -10,7 +10,7 @@ from typing import Any, NoReturn, final
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import AdaptiveArrays, Arrays, CorePacing, Plan
+from .runs.engine import AdaptiveArrays, Arrays, CorePacing, Plan
 
 __all__ = [
     "Equations",

@@ -17,7 +17,7 @@ import numpy as np
 import own_systems as own
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, fits
-from stepwell.cli import main
+from stepwell.views.cli import main
 from test_wrong_calls import CALLS, OF_METHODS, passage
 
 #: Where files are written, in the process that makes the calls.

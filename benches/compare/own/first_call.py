@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import stepwell as sw
-from stepwell import _core, engine
+from stepwell import _core
+from stepwell.runs import engine
 
 from ..peers import MissingPeerError, heyoka_peer, numba_own, numba_peer
 from ..report import Table, number

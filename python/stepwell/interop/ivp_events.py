@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks
-from .._checks import Array
+from ..base import checks
+from ..base.arrays import Array
 from ..errors import DTypeError
 from ..reference.events import REACH, Parts, parted
 from .ivp_function import takes
@@ -39,14 +39,14 @@ class Event:
 
     def __init__(self, function: Any, args: tuple[Any, ...]) -> None:
         if not callable(function) or isinstance(function, type):
-            raise DTypeError(f"events: expected functions event(t, y), got {_checks.short(function)} ({type(function).__name__})")
+            raise DTypeError(f"events: expected functions event(t, y), got {checks.short(function)} ({type(function).__name__})")
         takes("events", function, args)
         terminal = getattr(function, "terminal", None)
         if terminal is None or terminal is False:
             self.terminal = np.inf
         else:
-            self.terminal = 1 if terminal is True else _checks.count("terminal", terminal, 0) or np.inf
-        self.direction = _checks.number("direction", getattr(function, "direction", 0.0))
+            self.terminal = 1 if terminal is True else checks.count("terminal", terminal, 0) or np.inf
+        self.direction = checks.number("direction", getattr(function, "direction", 0.0))
         self._function, self._args = function, args
         self.count = 0
         self.times: list[float] = []
@@ -54,9 +54,9 @@ class Event:
 
     def value(self, t: float, y: Array) -> float:
         """The value of the function."""
-        made = _checks.as_array("events", self._function(t, y, *self._args))
+        made = checks.as_array("events", self._function(t, y, *self._args))
         if made.size != 1 or made.dtype.kind not in "biuf":
-            raise DTypeError(f"events: expected a function that returns one real number, got {_checks.short(made)}")
+            raise DTypeError(f"events: expected a function that returns one real number, got {checks.short(made)}")
         return float(made.reshape(-1)[0])
 
     def occurs(self, before: float, after: float) -> bool:

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks
-from ..equations.definition import Definition
-from ..equations.namespace import rebound
+from ..base import checks
 from ..errors import ArgumentError, DTypeError, TraceError
+from ..model.equations.definition import Definition
+from ..model.equations.namespace import rebound
 
 
 class RightHandSide:
@@ -87,7 +87,7 @@ def traceable(fun: Any) -> Callable[..., Any]:
     function = plain_function(fun)
     if not isinstance(function, FunctionType):
         raise DTypeError(
-            f"fun: expected a function written in Python, for its operations are recorded, got {_checks.short(fun)} "
+            f"fun: expected a function written in Python, for its operations are recorded, got {checks.short(fun)} "
             f"({type(fun).__name__})"
         )
     return partial(rebound(function), fun.__self__ if isinstance(fun, MethodType) else fun)
@@ -102,8 +102,8 @@ def arguments(args: Any) -> tuple[Any, ...]:
     if args is None:
         return ()
     if isinstance(args, (tuple, list)) or (isinstance(args, np.ndarray) and args.ndim):
-        return tuple(_checks.several("args", args, "arguments"))
-    raise ArgumentError(f"args: expected a tuple such as args=(a,), got {_checks.short(args)}")
+        return tuple(checks.several("args", args, "arguments"))
+    raise ArgumentError(f"args: expected a tuple such as args=(a,), got {checks.short(args)}")
 
 
 def takes(argument: str, function: Any, args: tuple[Any, ...]) -> None:
@@ -112,7 +112,7 @@ def takes(argument: str, function: Any, args: tuple[Any, ...]) -> None:
     Raises:
         ArgumentError: what it takes, and how many are given.
     """
-    name = _checks.short(getattr(function, "__name__", type(function).__name__))[1:-1]
+    name = checks.short(getattr(function, "__name__", type(function).__name__))[1:-1]
     try:
         expected = inspect.signature(function)
     except (TypeError, ValueError):  # what is not written in Python may not tell
@@ -124,4 +124,4 @@ def takes(argument: str, function: Any, args: tuple[Any, ...]) -> None:
             f"{argument}, args: {name}({', '.join(expected.parameters)}) is called with t, y and {len(args)} args, which it does "
             f"not take: {error}"
         ) from None
-    _checks.argument_order(f"{argument}: {name}", function, ("t", "y"))
+    checks.argument_order(f"{argument}: {name}", function, ("t", "y"))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import _checks
+from ..base import checks
 from ..errors import DTypeError, UnknownNameError, UnsupportedError
-from ..method_records import Method
-from ..method_records import method as find_method
-from ..method_records import methods as every_method
+from ..model.methods import Method
+from ..model.methods import method as find_method
+from ..model.methods import methods as every_method
 
 #: What is taken if no method is named. SciPy then takes RK45, which is not here.
 DEFAULT = "dop853"
@@ -37,7 +37,7 @@ def chosen(method: Any) -> Method:
         return find_method(DEFAULT)
     name = method.__name__ if isinstance(method, type) else method
     if not isinstance(name, (str, Method)):
-        raise DTypeError(f"method: expected a name, got {_checks.short(method)} ({type(method).__name__})")
+        raise DTypeError(f"method: expected a name, got {checks.short(method)} ({type(method).__name__})")
     try:
         found = find_method(name)
     except UnknownNameError:

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks, _core, engine
-from .._checks import Array
+from .. import _core
+from ..base import checks
+from ..base.arrays import Array
 from ..errors import ArgumentError, ShapeError
-from ..method_records import Method
+from ..model.methods import Method
 from ..reference import adaptive
 from ..reference.acceptance import Acceptance
+from ..runs import engine
 
 #: How many attempts at steps a run may make in one go: as many as are exact in the controller's numbers.
 MAX_ATTEMPTS = 2**53 - 1
@@ -152,7 +154,7 @@ class Solution:
 
     def __call__(self, t: Any) -> Array:
         """The states at these times."""
-        times = _checks.numbers("t", t, unit="units of time")
+        times = checks.numbers("t", t, unit="units of time")
         if times.ndim > 1:
             raise ShapeError(f"t: expected a time, or times along one axis, got shape {times.shape}")
         if times.size and not (self.t_min <= times.min() and times.max() <= self.t_max):

@@ -6,7 +6,6 @@ a digest of its operations, and the function must be there when the file is read
 
 from __future__ import annotations
 
-import hashlib
 import json
 import sys
 from collections.abc import Callable
@@ -15,27 +14,27 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks, _core, _encounters, engine
-from .._value import Fixed, FixedDict
-from ..control import Projection
-from ..equations.definition import Definition
-from ..equations.trace import Equations
+from ..base import checks
+from ..base.immutable import Fixed, FixedDict
 from ..errors import ArgumentError
-from ..events.result import Occurrences
-from ..method_records import Method
-from ..method_records import method as find_method
-from ..reference.traced import Tracer
-from ..result import Run
-from ..systems import System
-from ..systems.own import OwnSystem
+from ..model.equations.definition import Definition
+from ..model.equations.trace import Equations
+from ..model.methods import Method
+from ..model.methods import method as find_method
+from ..model.systems import System
+from ..model.systems.digest import digest
+from ..model.systems.own import OwnSystem
+from ..runs import encounters, engine
+from ..runs.events.result import Occurrences
+from ..runs.result import Run
 
 Arrays = dict[str, Any]
 
 #: What goes through the steps of a run again, under the names of its attributes; see ``Run``.
 RERUNS: dict[str, Callable[..., Any]] = {
-    "collision": _encounters.collision,
-    "encounter": _encounters.of_member,
-    "overshoots": _encounters.overshoots,
+    "collision": encounters.collision,
+    "encounter": encounters.of_member,
+    "overshoots": encounters.overshoots,
 }
 
 #: The first key of an object of JSON tells what it stands for.
@@ -44,8 +43,6 @@ KIND = "is"
 
 def kinds(base: type[Any] = Fixed) -> dict[str, type[Any]]:
     """Classes of stepwell below one, by name: below ``Fixed`` there are systems, controls, surfaces and inputs."""
-    from ..systems import aircraft as aircraft  # imported only when used, but a file may name it
-
     found, todo = {}, [base]
     while todo:
         for each in todo.pop().__subclasses__():
@@ -133,7 +130,7 @@ class Writer:
         key = (array.__array_interface__["data"][0], array.shape, array.strides, array.dtype.str)
         if key not in self._known:
             self._known[key] = name, array  # which keeps its memory, so that no other array can have its address
-            self.arrays[name] = _checks.once_of(array)
+            self.arrays[name] = checks.once_of(array)
         made: dict[str, Any] = {KIND: "array", "of": self._known[key][0]}
         if self.arrays[made["of"]].shape != array.shape:
             made["over"] = list(array.shape)
@@ -234,23 +231,6 @@ class Reader:
                 f"system, or another version of stepwell; the numbers of the file are found by their names, with numpy.load "
                 f"or zarr.open"
             )
-
-
-def digest(system: OwnSystem) -> str:
-    """What the operations of an own system are known by: of its rates, its invariants, and the gradient of one that is kept."""
-    known: Any = system if system.equations is not None else system.sized()
-    from .._value import changed
-
-    tape = _core.Tape()
-    tracer = Tracer(changed(known, control=None), tape)
-    v, y, _ = tracer.state()
-    s = tracer.scaled(tape.step())
-    values = tracer.flat(*s.rates(tape.time(), v, y))
-    for name in known.quantities:
-        values += tracer.flat(s.record(name, v, y))
-    if isinstance(known.keeper, Projection):
-        values += tracer.flat(*s.gradient(v, y))
-    return hashlib.sha256(repr(tape.operations(values)).encode()).hexdigest()
 
 
 def is_whole(run: Run) -> None:

@@ -10,13 +10,14 @@ from uuid import uuid4
 
 import numpy as np
 
-from .. import _checks, _core
+from .. import _core
+from ..base import checks
+from ..base.optional import imported
 from ..errors import ArgumentError, DTypeError, StepwellError
-from .missing import imported
 from .parts import Arrays, Reader, Writer, is_whole
 
 if TYPE_CHECKING:
-    from ..result import Run
+    from ..runs.result import Run
 
 #: Endings of files that hold a run.
 ENDINGS = (".npz", ".zarr")
@@ -36,7 +37,7 @@ def save(run: Run, path: str | Path) -> None:
     # Written beside the file and then put in its place, so that a stop in between loses nothing.
     beside = place.with_name(f"{place.stem}.{uuid4().hex}{place.suffix}")
     if place.suffix == ".npz":
-        _checks.file("path", place)
+        checks.file("path", place)
         try:
             with beside.open("xb") as file:
                 about = {ABOUT: np.array(text), FORM: np.array([VERSION]), "stepwell_version": np.array(_core.__version__)}
@@ -47,9 +48,9 @@ def save(run: Run, path: str | Path) -> None:
             raise
         return
     zarr = imported("zarr", "save")
-    _checks.folder("path", place.parent)
+    checks.folder("path", place.parent)
     if (replaced := place.exists()) and not _is_ours(zarr, place):
-        raise ArgumentError(f"path: expected a new folder, or one with a saved run, got {_checks.short(str(path))}")
+        raise ArgumentError(f"path: expected a new folder, or one with a saved run, got {checks.short(str(path))}")
     try:
         group = zarr.open_group(str(beside), mode="w")
         for name, array in writer.arrays.items():
@@ -105,7 +106,7 @@ def load(path: str | Path, *, system: Any = None) -> Run:
         raise
     except Exception as error:
         raise ArgumentError(
-            f"path: expected a run that stepwell {_core.__version__} can read, got {_checks.short(str(path))}, which another "
+            f"path: expected a run that stepwell {_core.__version__} can read, got {checks.short(str(path))}, which another "
             f"version wrote or which is damaged ({type(error).__name__}: {error})"
         ) from None
     return run
@@ -113,15 +114,15 @@ def load(path: str | Path, *, system: Any = None) -> Run:
 
 def _place(path: Any) -> Path:
     if not isinstance(path, (str, os.PathLike)):
-        raise DTypeError(f"path: expected the path of a file, got {_checks.short(path)} ({type(path).__name__})")
+        raise DTypeError(f"path: expected the path of a file, got {checks.short(path)} ({type(path).__name__})")
     place = Path(os.fsdecode(path))
     if place.suffix not in ENDINGS:
-        raise ArgumentError(f"path: expected a file ending in {' or '.join(ENDINGS)}, got {_checks.short(str(path))}")
+        raise ArgumentError(f"path: expected a file ending in {' or '.join(ENDINGS)}, got {checks.short(str(path))}")
     return place
 
 
 def _no_run(place: Path, why: object) -> ArgumentError:
-    return ArgumentError(f"path: expected a run that was saved, got {_checks.short(str(place))}: {why}")
+    return ArgumentError(f"path: expected a run that was saved, got {checks.short(str(place))}: {why}")
 
 
 def _from_npz(place: Path) -> tuple[Arrays, str]:

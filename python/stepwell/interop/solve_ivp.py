@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks
-from .._checks import Array
-from ..equations.definition import Definition
+from ..base import checks
+from ..base.arrays import Array
 from ..errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning
+from ..model.equations.definition import Definition
 from ..reference import adaptive
 from .ivp_events import Event, found
 from .ivp_function import RightHandSide, arguments, takes
@@ -148,19 +148,19 @@ def solve_ivp(
     state = _start(y0)
     sign = -1.0 if end < begin else 1.0
     times = None if t_eval is None else _times(t_eval, begin, end, sign)
-    dense_output = _checks.flag("dense_output", dense_output)
+    dense_output = checks.flag("dense_output", dense_output)
     args = arguments(args)
     noted = None if events is None else [Event(each, args) for each in (events if _is_several(events) else [events])]
     _warn_of_useless(jac=jac, jac_sparsity=jac_sparsity, lband=lband, uband=uband, min_step=min_step or None)
     if not callable(fun):
-        raise DTypeError(f"fun: expected a function fun(t, y), got {_checks.short(fun)} ({type(fun).__name__})")
+        raise DTypeError(f"fun: expected a function fun(t, y), got {checks.short(fun)} ({type(fun).__name__})")
     if isinstance(fun, Definition):
         if fun.has_v:
             raise DTypeError(f"fun: expected a function fun(t, y), got the system {fun.name} of second order; use integrate")
         fun = fun.function
     if not isinstance(fun, type):
         takes("fun", fun, args)
-    right = RightHandSide(fun, args, len(state), vectorized=_checks.flag("vectorized", vectorized), backward=sign < 0.0)
+    right = RightHandSide(fun, args, len(state), vectorized=checks.flag("vectorized", vectorized), backward=sign < 0.0)
     trajectory = Trajectory(right.system(), how, (sign * begin, sign * end), state, _tolerances(rtol, atol, len(state)))
     trajectory.limited(
         None if first_step is None else _first(first_step, abs(end - begin)),
@@ -228,38 +228,38 @@ def _result(
 
 
 def _span(t_span: Any) -> tuple[float, float]:
-    times = _checks.numbers("t_span", t_span, unit="units of time")
+    times = checks.numbers("t_span", t_span, unit="units of time")
     if times.shape != (2,):
         raise ShapeError(f"t_span: expected the times (t0, tf), got shape {times.shape}")
     return float(times[0]), float(times[1])
 
 
 def _start(y0: Any) -> Array:
-    if _checks.as_array("y0", y0).dtype.kind == "c":
+    if checks.as_array("y0", y0).dtype.kind == "c":
         raise DTypeError(
             "y0: expected real numbers, got complex ones; write the equations of real and imaginary parts: y = [Re, Im]"
         )
-    state = _checks.numbers("y0", y0)
+    state = checks.numbers("y0", y0)
     if state.ndim != 1 or not state.size:
         raise ShapeError(f"y0: expected a state of shape (n,), got shape {state.shape}")
     return np.array(state)
 
 
 def _times(t_eval: Any, begin: float, end: float, sign: float) -> Array:
-    times = _checks.numbers("t_eval", t_eval, unit="units of time")
+    times = checks.numbers("t_eval", t_eval, unit="units of time")
     if times.ndim != 1:
         raise ShapeError(f"t_eval: expected times along one axis, got shape {times.shape}")
     if times.size and not (min(begin, end) <= times.min() and times.max() <= max(begin, end)):
         raise ArgumentError(f"t_eval: expected times within t_span, {begin:g} to {end:g}, got {times.min():g} to {times.max():g}")
     if (sign * np.diff(times) <= 0.0).any():
         raise ArgumentError(
-            f"t_eval: expected times that go from {begin:g} to {end:g}, each different, got {_checks.short(times)}"
+            f"t_eval: expected times that go from {begin:g} to {end:g}, each different, got {checks.short(times)}"
         )
     return times
 
 
 def _first(first_step: Any, whole: float) -> float:
-    first = _checks.number("first_step", first_step, positive=True, unit="units of time")
+    first = checks.number("first_step", first_step, positive=True, unit="units of time")
     if first > whole:
         raise ArgumentError(f"first_step: expected at most the whole time, {whole:g}, got {first:g}")
     return first
@@ -268,13 +268,13 @@ def _first(first_step: Any, whole: float) -> float:
 def _longest(max_step: Any) -> float:
     if isinstance(max_step, float) and max_step == np.inf:
         return np.inf
-    return _checks.number("max_step", max_step, positive=True, unit="units of time")
+    return checks.number("max_step", max_step, positive=True, unit="units of time")
 
 
 def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
     """The relative and the absolute tolerance, of each component where they are several numbers."""
-    relative = _checks.numbers("rtol", rtol, positive=True)
-    absolute = _checks.not_negative("atol", atol)
+    relative = checks.numbers("rtol", rtol, positive=True)
+    absolute = checks.not_negative("atol", atol)
     for name, given in (("rtol", relative), ("atol", absolute)):
         if given.shape not in ((), (n,)):
             raise ShapeError(f"{name}: expected a number, or one for each of the {n} of the state, got shape {given.shape}")
@@ -287,7 +287,7 @@ def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
 
 
 def _is_several(events: Any) -> bool:
-    return not callable(events) and bool(_checks.several("events", events, "functions") or True)
+    return not callable(events) and bool(checks.several("events", events, "functions") or True)
 
 
 def _warn_of_useless(**given: Any) -> None:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _checks, _core
-from .._checks import Array, Shape
+from .. import _core
+from ..base import checks
+from ..base.arrays import Array, Shape
+from ..base.optional import imported
 from ..errors import ArgumentError, DTypeError, ShapeError
-from .missing import imported
 
 if TYPE_CHECKING:
-    from ..result import Run
+    from ..runs.result import Run
 
 #: The axis of saved states.
 TIME = "t"
@@ -43,7 +44,7 @@ def to_xarray(run: Run, dims: Sequence[str] | None = None, coords: Mapping[str, 
     if run.paces is not None:
         variables |= {name: (members, getattr(run.paces, name)) for name in ("accepted", "rejected", "evaluations")}
     if coords is not None and not isinstance(coords, Mapping):
-        raise DTypeError(f"coords: expected coordinates by name, got {_checks.short(coords)} ({type(coords).__name__})")
+        raise DTypeError(f"coords: expected coordinates by name, got {checks.short(coords)} ({type(coords).__name__})")
     given = dict(coords or {})
     if clash := [name for name in given if name in variables or name == TIME]:
         raise ArgumentError(f"coords: expected names of their own, got {', '.join(clash)}, which the run has")
@@ -87,11 +88,11 @@ def _members(run: Run, dims: Sequence[str] | None) -> tuple[str, ...]:
     axes = len(run.status.shape)
     if dims is None:
         return ("member",) if axes == 1 else tuple(f"member_{i}" for i in range(axes))
-    names = [dims] if isinstance(dims, str) else _checks.several("dims", dims, "names")
+    names = [dims] if isinstance(dims, str) else checks.several("dims", dims, "names")
     if len(names) != axes or not all(isinstance(each, str) for each in names):
-        raise ShapeError(f"dims: expected a name for each of the {axes} batch axes, got {_checks.short(dims)}")
+        raise ShapeError(f"dims: expected a name for each of the {axes} batch axes, got {checks.short(dims)}")
     if len({TIME, *names}) != axes + 1:
-        raise ArgumentError(f"dims: expected different names, none of them {TIME!r}, got {_checks.short(dims)}")
+        raise ArgumentError(f"dims: expected different names, none of them {TIME!r}, got {checks.short(dims)}")
     return tuple(names)
 
 

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
+from ..base.arrays import Array, Scaled, Whole
 from . import tableau
 from .acceptance import Acceptance
 from .bits import and_bits, at_most, less, where
 from .tableau import Increments, Weights
-from .types import Array, Scaled, Whole
 
 #: A new step is the old one times SAFETY·r^(−5/32)·p^(1/16), r being the error over the tolerance and p that of the step before
 #: (PI control, Gustafsson 1988), held between MIN_FACTOR and MAX_FACTOR; after a rejected step there is no p and no growth. Where

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import Array, Blocks, Scaled
 from . import bits
-from .types import Array, Blocks, Scaled
 
 
 class Around:

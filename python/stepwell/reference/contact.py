@@ -317,11 +317,8 @@ class Touching:
         #: Along one plane the energy is right by itself.
         self.is_limited = len(safe) > 1 or any(each.is_curved or each.friction is not None for each in safe)
         self.on_rods: Any = None
-        if hasattr(s, "as_rods"):
-            from .rod_contact import RodContacts  # which builds on this
-
-            rods, axes = s.as_rods()
-            self.on_rods = RodContacts(h, rods, axes, self.met)
+        if hasattr(s, "contacts"):
+            self.on_rods = s.contacts(h, self.met)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.s, name)

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..base.arrays import Array, Blocks, Scaled
 from . import bits
-from .types import Array, Blocks, Scaled
 
 #: The square of what velocities are multiplied by is held between these, the factor between ½ and 2.
 MIN_SQUARE, MAX_SQUARE = 0.25, 4.0

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .types import Array, Whole
+from ..base.arrays import Array, Whole
 
 #: A change of sign is located to this share of the time since the start of its step: to the roundings of a trial's length.
 SPACING = 2.0**-52

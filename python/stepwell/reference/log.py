@@ -5,9 +5,9 @@ Stability analysis has logarithms of numbers that the core never sees, as it has
 
 import numpy as np
 
+from ..base.arrays import Array
 from . import bits
 from .marks import differentiable
-from .types import Array
 
 LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
 L = (

@@ -22,6 +22,10 @@ import numpy as np
 
 from .._core import Symbol
 
+#: Values that these functions take besides numbers and symbols, as series: whether some of them are such, and how a function of
+#: them is computed, from its name, the function of all kinds, the function itself and its arguments. Their modules add to it.
+KINDS: list[tuple[Callable[[Any], bool], Callable[..., Any]]] = []
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 #: The decorated functions by name, with which derivatives of others are written.
@@ -101,10 +105,9 @@ def differentiable(name: str, *, general: bool = True) -> Callable[[Function], F
     def decorate(function: Function) -> Function:
         @wraps(function)
         def marked(*arguments: Any) -> Any:
-            from . import series  # which differentiates by marks
-
-            if series.among(arguments):
-                return series.function(name, marked, function, arguments)
+            for among, function_of in KINDS:
+                if among(arguments):
+                    return function_of(name, marked, function, arguments)
             value = function(*arguments)
             return value if _active.get() is None else mark(name, value, *arguments, function=function)
 

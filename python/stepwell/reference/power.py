@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.arrays import Array, Whole
 from . import trig
 from .product import product, times
 from .signal import Constant, Sine
-from .types import Array, Whole
 
 Chosen = np.ndarray[Any, np.dtype[np.bool_]]
 

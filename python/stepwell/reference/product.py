@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .types import Array
+from ..base.arrays import Array
 
 
 def times(matrix: Array, columns: "Sequence[Array] | Array") -> Array:

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..base.arrays import Array, Blocks, Signal, Whole
 from .product import times
 from .signal import of_step, over
-from .types import Array, Blocks, Signal, Whole
 
 Step = Callable[[float, Array, Array], Blocks]
 Velocity = Callable[[float, Array, Array], Array]

@@ -13,7 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .marks import Mark
+from .marks import KINDS, Mark
+from .tape import rules
+from .tape.fused import MEANING
+from .tape.replayed import OF_SYMBOLS
 
 #: A coefficient; None if it is known to be zero.
 Term = Any
@@ -319,6 +322,9 @@ def function(name: str, of_numbers: Callable[..., Any], plain: Callable[..., Any
     return book.functions[key]
 
 
+KINDS.append((among, function))
+
+
 def _identity(x: Any) -> Any:
     """What tells an argument of a function from others: symbols cannot be hashed, and 0 and −0 are equal but not the same."""
     if hasattr(x, "xor_bits"):
@@ -328,8 +334,6 @@ def _identity(x: Any) -> Any:
 
 def has_rule(mark: Mark) -> bool:
     """Whether a marked value is treated as a function. Roots and squares are operations like others."""
-    from ..derivatives import rules  # which differentiate with the functions of this package
-
     return mark.name in rules.PARTIALS and mark.name not in ("sqrt", "square")
 
 
@@ -338,8 +342,6 @@ def factors(mark: Mark, value: Any, wanted: list[bool]) -> tuple[Any, ...]:
 
     That of xᵖ by x is p·xᵖ/x here, which needs no further power.
     """
-    from ..derivatives import rules
-
     if mark.name != "power":
         return rules.of_function(mark, value, wanted)
     x, p = mark.arguments
@@ -349,9 +351,6 @@ def factors(mark: Mark, value: Any, wanted: list[bool]) -> tuple[Any, ...]:
 
 def operation(book: Book, name: str, of: list[Any], given: int) -> Any:
     """An operation of a tape, on series and numbers."""
-    from .fused import MEANING
-    from .replayed import OF_SYMBOLS
-
     if not any(isinstance(each, (Series, Truth)) for each in of):
         if any(hasattr(each, "xor_bits") for each in of):
             return OF_SYMBOLS[name](*of)

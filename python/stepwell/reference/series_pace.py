@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import Array
 from .acceptance import Acceptance
 from .adaptive import MAX_FACTOR, ONSET, ROUNDING, Attempted, Pace, largest, longer, numbers_in, over, sizes, stacked, total
 from .bits import add_bits, and_bits, at_most, held, less, shift_up, where
 from .log import split
 from .series import Branch, expanded
-from .types import Array
 
 #: The most by which a step may be longer than the one before: where the last terms vanish, nothing else bounds it.
 MAX_GROWTH = 1024.0

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import Array
 from . import bits, trig
-from .types import Array
 
 #: By this factor the number of intervals since the first sample is taken longer: rounding may put it just before a whole number.
 HOLD_SLACK = 1.0 + 2.0**-44

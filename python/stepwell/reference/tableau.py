@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from .types import Array, Blocks, Scaled
+from ..base.arrays import Array, Blocks, Scaled
 
 Weights = Sequence[float]
 Increments = list[tuple[Array, Array]]

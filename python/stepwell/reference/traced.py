@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .._value import changed
+from ..base.immutable import changed
 from . import adaptive, contact, series_pace
 from .acceptance import Acceptance
 from .around import surrounded

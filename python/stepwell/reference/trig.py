@@ -6,9 +6,9 @@ imaginary part is infinitesimal, and ones that count what is done to them.
 
 import numpy as np
 
+from ..base.arrays import Array
 from . import bits
 from .marks import differentiable
-from .types import Array
 
 PER_HALF_TURN = 0.3183098861837907  # 1/π
 MAGIC = 6755399441055744.0  # 1.5·2⁵²: adding it rounds to an integer, which is then in the low bits

@@ -18,9 +18,9 @@ from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
-from .. import _checks
-from .._checks import Array
-from .._value import same
+from ..base import checks
+from ..base.arrays import Array
+from ..base.immutable import same
 from ..errors import ArgumentError, DTypeError, StepwellError
 from . import builtin, table
 from .base import Scene
@@ -62,7 +62,7 @@ def scene(name: str | Scene) -> Scene:
     if (found := FILE.fullmatch(name)) is not None:
         return _from_file(*found.groups())
     name, _, arguments = name.partition(":")
-    make = _makers()[_checks.known("scene", name, _makers())]
+    make = _makers()[checks.known("scene", name, _makers())]
     return make(**_arguments(name, make, arguments)) if arguments else make()
 
 
@@ -78,7 +78,7 @@ def _arguments(name: str, make: Callable[..., Scene], written: str) -> dict[str,
         key, equals, value = (part.strip() for part in each.partition("="))
         if not equals:
             raise ArgumentError(f"scene: expected arguments as {name}:NAME=VALUE,NAME=VALUE, got {each!r}")
-        key = _checks.known(f"scene {name}", key, inspect.signature(make).parameters)
+        key = checks.known(f"scene {name}", key, inspect.signature(make).parameters)
         for kind in (int, float, str):
             try:
                 found[key] = kind(value)
@@ -109,14 +109,14 @@ def _from_file(path: str, variable: str | None) -> Scene:
     try:
         spec.loader.exec_module(module)
     except FileNotFoundError:
-        raise ArgumentError(f"scene: there is no file {_checks.short(path)}") from None
+        raise ArgumentError(f"scene: there is no file {checks.short(path)}") from None
     except StepwellError:
         raise
     except Exception as error:
         raise ArgumentError(f"scene: the file {path} cannot be run: {type(error).__name__}: {error}") from error
     made = {key: value for key, value in vars(module).items() if isinstance(value, Scene)}
     if variable is not None:
-        found = made[_checks.known("scene", variable, made)]
+        found = made[checks.known("scene", variable, made)]
         return replace(found, name=variable, title="") if found.name == "unnamed" else found
     if len(made) != 1:
         if not made:

@@ -6,25 +6,23 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .. import _checks
-from .._brief import facts
-from .._checks import Array, Shape
-from .._value import Value, frozen
-from ..compatible import velocities
-from ..control import AnyControl, a_control
+from ..base import checks, registry
+from ..base.arrays import Array, Shape
+from ..base.immutable import Value, frozen
+from ..base.progress import in_notebook
+from ..base.reprs import facts
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
-from ..integration import integrate
-from ..method_records import Method
-from ..result import Run
-from ..systems import System
-from ..systems.base import a_system
-
-if TYPE_CHECKING:
-    from ..explorer import Explorer
+from ..model.compatibility import velocities
+from ..model.controls import AnyControl, a_control
+from ..model.methods import Method
+from ..model.systems import System
+from ..model.systems.base import a_system
+from ..runs.integration import integrate
+from ..runs.result import Run
 
 #: So many times of the horizon give the exact solution's scale. Where a block differs by more than STEEP of its largest length
 #: from one to the next, a peak may hide between: so many more are taken there, and again between those, down to SHORTEST of the
@@ -96,34 +94,34 @@ class Scene(Value):
         """Check the arguments and fill in the defaults."""
         if self.y is None:
             raise ArgumentError("y: expected the coordinates at t = 0, got None")
-        y = _checks.numbers("y", self.y)
-        system = a_system(self.system).sized(None if self.v is None else _checks.numbers("v", self.v), y)
-        given = [_checks.numbers("v", velocities(system, self.v)), y]
+        y = checks.numbers("y", self.y)
+        system = a_system(self.system).sized(None if self.v is None else checks.numbers("v", self.v), y)
+        given = [checks.numbers("v", velocities(system, self.v)), y]
         if system.batch:
             raise ArgumentError(f"system: expected a system of one member, got parameters of shape {system.batch}")
         found: dict[str, Any] = {"system": system}
         for name, block, shape in zip("vy", given, (system.v_shape, system.y_shape), strict=True):
-            block = _checks.block(name, block, shape, system.axes)
+            block = checks.block(name, block, shape, system.axes)
             if block.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape} of a scene's one member, got {block.shape}")
             found[name] = frozen(name, block)
         until = math.inf if self.until is None else self.until
         forever = isinstance(until, float) and until == math.inf
-        if not forever and (until := _checks.number("until", until, unit="units of time")) < 0.0:
+        if not forever and (until := checks.number("until", until, unit="units of time")) < 0.0:
             raise ArgumentError(f"until: expected a time of zero or more in units of time, got {until:g}")
         horizon = until if self.horizon is None else self.horizon
         if self.horizon is None and until == math.inf:
             raise ArgumentError("horizon: expected the time over which errors are measured, in units of time, got None")
-        found["horizon"] = horizon = _checks.number("horizon", horizon, positive=True, unit="units of time")
+        found["horizon"] = horizon = checks.number("horizon", horizon, positive=True, unit="units of time")
         dt = 1e-3 * horizon if self.dt is None else self.dt
-        found |= {"dt": _checks.number("dt", dt, positive=True, unit="units of time"), "until": until}
+        found |= {"dt": checks.number("dt", dt, positive=True, unit="units of time"), "until": until}
         if self.exact is not None and not callable(self.exact):
             raise DTypeError(f"exact: expected a function of times, or None, got {type(self.exact).__name__}")
         a_control(self.control)
         if self.jumps is not None:
-            found["jumps"] = tuple(np.atleast_1d(_checks.numbers("jumps", self.jumps, unit="units of time")).ravel().tolist())
+            found["jumps"] = tuple(np.atleast_1d(checks.numbers("jumps", self.jumps, unit="units of time")).ravel().tolist())
         if self.max_step is not None:
-            found["max_step"] = _checks.number("max_step", self.max_step, positive=True, unit="units of time")
+            found["max_step"] = checks.number("max_step", self.max_step, positive=True, unit="units of time")
         for name, value in (found | {"title": self.title or self.name}).items():
             object.__setattr__(self, name, value)
 
@@ -165,7 +163,7 @@ class Scene(Value):
         options = {"jumps": self.jumps, "max_step": self.max_step, "positive": self.positive}
         return {name: value for name, value in options.items() if value is not None}
 
-    def explore(self, *, methods: Any = None, show: bool = True) -> Explorer:
+    def explore(self, *, methods: Any = None, show: bool = True) -> Any:
         """Show the scene in the browser: two methods side by side, with sliders for the step and the parameters.
 
         In a notebook the page is shown in the cell, if this is its last expression; no browser is opened then.
@@ -181,10 +179,8 @@ class Scene(Value):
             ArgumentError: what was given and what was expected.
             UnsupportedError: if no method steps the scene, or its steps are too long for a page.
         """
-        from ..explorer.page import explore, in_notebook
-
-        show = _checks.flag("show", show)
-        page = explore(self, methods=methods)
+        show = checks.flag("show", show)
+        page = registry.task("explore")(self, methods=methods)
         if show and not in_notebook():
             page.open()
         return page
@@ -195,10 +191,10 @@ class Scene(Value):
         Raises:
             ArgumentError: if ``dt`` is not a valid step, or needs more steps than can be counted.
         """
-        dt = _checks.number("dt", dt, positive=True, unit="units of time")
+        dt = checks.number("dt", dt, positive=True, unit="units of time")
         quotient = self.horizon / dt
-        if quotient > _checks.LAST_STEP:
-            raise ArgumentError(f"dt: {dt:g} needs more than {_checks.LAST_STEP} steps to reach {self.horizon:g}")
+        if quotient > checks.LAST_STEP:
+            raise ArgumentError(f"dt: {dt:g} needs more than {checks.LAST_STEP} steps to reach {self.horizon:g}")
         # A quotient that exceeds a whole number by rounding alone needs no further step.
         return max(1, math.ceil(quotient - 1e-9))
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import quaternion
-from .._checks import Array
-from .._value import Value
-from .builtin.pendulum import elliptic, quarter
+from ..base.arrays import Array
+from ..base.immutable import Value
+from ..model import quaternion
+from .elliptic import elliptic, quarter
 
 #: The series of the turn about the angular momentum ends where its terms are this small beside the first.
 NEGLIGIBLE = 1e-18

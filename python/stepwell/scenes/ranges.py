@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .._checks import number
+from ..base.checks import number
 from ..errors import ArgumentError
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .._checks import Array, Shape
-from .._value import Value
+from ..base.arrays import Array, Shape
+from ..base.immutable import Value
 
 Exact = Callable[[Array], tuple[Array, Array]]
 

@@ -13,7 +13,7 @@ from operator import mul
 
 import numpy as np
 
-from .._checks import Array
+from ..base.arrays import Array
 from ..errors import ArgumentError
 
 #: Digits of every number, the error of a step that is aimed at, relative to the state, and the terms of the series.

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from .._checks import Array
+from ..base.arrays import Array
 from ..errors import AccuracyWarning, ArgumentError, ToleranceWarning
-from ..integration import integrate
-from ..result import Run
+from ..runs.integration import integrate
+from ..runs.result import Run
 from .base import Scene
 
 #: The method of the reference solution, its tolerance, and that of the run which checks it. A part of it that stops early is made

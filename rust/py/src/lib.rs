@@ -95,7 +95,7 @@ fn isa_levels() -> Vec<&'static str> {
     Level::available().into_iter().map(Level::name).collect()
 }
 
-/// What is read of a plan: see `Plan` in `engine/plan.py`.
+/// What is read of a plan: see `Plan` in `runs/engine/plan.py`.
 #[derive(FromPyObject)]
 struct PlanOf {
     t0: f64,
@@ -108,7 +108,7 @@ struct PlanOf {
     progress: Option<Py<PyAny>>,
 }
 
-/// What a run begins with and what it fills: see `Arrays` in `engine/plan.py`.
+/// What a run begins with and what it fills: see `Arrays` in `runs/engine/plan.py`.
 #[derive(FromPyObject)]
 struct ArraysOf<'py, T: Element + 'py> {
     v: Bound<'py, PyArray2<f64>>,
@@ -187,7 +187,7 @@ fn times(plan: PlanOf, mut t: PyReadwriteArray1<'_, f64>) -> PyResult<()> {
     Ok(())
 }
 
-/// When the state is asked for, and how long to try: see `Pacing` in `engine/adaptive.py`.
+/// When the state is asked for, and how long to try: see `Pacing` in `runs/engine/adaptive.py`.
 #[derive(FromPyObject)]
 struct PacingOf<'py> {
     at: PyReadonlyArray2<'py, f64>,
@@ -196,7 +196,7 @@ struct PacingOf<'py> {
     begins: bool,
 }
 
-/// What a run with a tolerance begins with and what it fills: see `AdaptiveArrays` in `engine/adaptive.py`.
+/// What a run with a tolerance begins with and what it fills: see `AdaptiveArrays` in `runs/engine/adaptive.py`.
 #[derive(FromPyObject)]
 struct AdaptiveArraysOf<'py> {
     v: Bound<'py, PyArray2<f64>>,

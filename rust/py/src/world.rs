@@ -172,7 +172,7 @@ impl<T: Of> Loop<T> {
     }
 }
 
-/// What is read of a plan: see `Plan` in `engine/plan.py`.
+/// What is read of a plan: see `Plan` in `runs/engine/plan.py`.
 #[derive(FromPyObject)]
 struct WorldPlan {
     t0: f64,
@@ -229,7 +229,7 @@ impl World {
             // What is no such number: Python says what is wrong with it, or what whole number it is.
             other => {
                 let n = other.map_or_else(|| 1.into_pyobject(py).map(Bound::into_any), |n| Ok(n.clone()))?;
-                py.import("stepwell._checks")?.getattr("count")?.call1(("n", n, 0, most))?.extract()?
+                py.import("stepwell.base.checks")?.getattr("count")?.call1(("n", n, 0, most))?.extract()?
             }
         };
         self.alone(|of| match of {

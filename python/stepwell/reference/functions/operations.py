@@ -13,15 +13,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..._checks import numbers
+from ...base.checks import numbers
 from ...errors import ShapeError
-from .. import series
-from ..marks import mark
+from ..marks import KINDS, mark
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 #: Functions without a mark: those with another name for users, and those of products alone, which are differentiated as such.
 NAMES, UNMARKED = {"any_power": "power"}, {"of", "deg2rad", "rad2deg"}
+#: The function of float32 by its name and that of float64; its module, which is made of the operations below, puts it here.
+SINGLE: list[Callable[[str, Callable[..., Any]], Callable[..., Any]]] = []
 #: Of a number's bits: its sign, and all others.
 SIGN, NOT_SIGN = 1 << 63, (1 << 63) - 1
 
@@ -79,8 +80,9 @@ def elementary(f: F) -> F:
     def of_anything(*given: Any, **named: Any) -> Any:
         if named or len(given) != len(names):
             given = signature.bind(*given, **named).args
-        if series.among(given):
-            return series.function(NAMES.get(f.__name__, f.__name__), of_anything, of_anything, given)
+        for among, function_of in KINDS:
+            if among(given):
+                return function_of(NAMES.get(f.__name__, f.__name__), of_anything, of_anything, given)
         given = tuple(map(as_array, names, given))
         shape = shape_of(names, given)
         if one_by_one(given):
@@ -101,9 +103,7 @@ def _of_symbols(symbol: Any, f: Callable[..., Any]) -> Callable[..., Any]:
     """The function for symbols of the precision of this one."""
     if not getattr(symbol, "single", False):
         return f
-    from .single import version  # it is made of the operations below
-
-    return version(f.__name__, f)
+    return SINGLE[0](f.__name__, f)
 
 
 def _bits(x: Any) -> Any:

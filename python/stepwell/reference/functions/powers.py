@@ -11,20 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import numbers
+from ...base.checks import numbers
 from .exponential import HIGHEST_POWER_OF_TWO, LOWEST_POWER_OF_TWO, exp2_of_sum
 from .logarithms import exponent_and_rest
-from .operations import (
-    and_bits,
-    either_bits,
-    elementary,
-    equal,
-    floor,
-    magnitude,
-    sign_of,
-    turn_bits,
-    where,
-)
+from .operations import and_bits, either_bits, elementary, equal, floor, magnitude, sign_of, turn_bits, where
 from .operations import sqrt as root
 from .pieces import UPPER, by_parity, halves
 

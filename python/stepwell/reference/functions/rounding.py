@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import numbers, short
+from ...base.checks import numbers, short
 from ...errors import DTypeError
 from . import operations
 from .operations import (

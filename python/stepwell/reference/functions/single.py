@@ -10,6 +10,7 @@ from typing import Any
 
 from ...errors import UnsupportedError
 from .operations import (
+    SINGLE,
     add_bits,
     and_bits,
     either_bits,
@@ -147,3 +148,6 @@ def version(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         f"dtype: {NAMES.get(name, name)} has no version of float32; there are {known}, and powers by products; write it with "
         f"these, or use dtype='float64'"
     )
+
+
+SINGLE.append(version)

@@ -1,8 +1,8 @@
 """Dormand-Prince 8(5, 3), the program DOP853: eighth order, with two estimates of its error (Hairer, Nørsett, Wanner, §II.10)."""
 
+from ...base.arrays import Array, Blocks, Scaled
 from .. import tableau
 from ..tableau import Increments
-from ..types import Array, Blocks, Scaled
 
 NODES = (
     0.0,

@@ -1,6 +1,6 @@
 """False Euler (§7)."""
 
-from ..types import Array, Blocks, Scaled
+from ...base.arrays import Array, Blocks, Scaled
 
 
 def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:

@@ -3,9 +3,9 @@
 It estimates its error by the fifth-order one, for which alone it needs the last stage.
 """
 
+from ...base.arrays import Array, Blocks, Scaled
 from .. import tableau
 from ..tableau import Increments
-from ..types import Array, Blocks, Scaled
 
 NODES = (0.0, 0.25, 0.375, 12 / 13, 1.0, 0.5)
 ROWS = (

@@ -1,7 +1,7 @@
 """Runge-Kutta-Fehlberg with local extrapolation (§12): goes on with the fifth-order result."""
 
+from ...base.arrays import Array, Blocks, Scaled
 from .. import tableau
-from ..types import Array, Blocks, Scaled
 from .fehlberg import COARSE as COARSE
 from .fehlberg import ERROR as ERROR
 from .fehlberg import stages as stages

@@ -1,6 +1,6 @@
 """Leapfrog (velocity Verlet). Between steps the place of ``v`` holds the velocity of half a step ago."""
 
-from ..types import Array, Blocks, Scaled
+from ...base.arrays import Array, Blocks, Scaled
 
 
 def step(s: Scaled, t: float, h: float, v_half: Array, y: Array) -> Blocks:

@@ -1,8 +1,8 @@
 """Runge-Kutta-Merson (§12): fourth order, with an estimate of its error."""
 
+from ...base.arrays import Array, Blocks, Scaled
 from .. import tableau
 from ..tableau import Increments
-from ..types import Array, Blocks, Scaled
 
 NODES = (0.0, 1 / 3, 1 / 3, 0.5, 1.0)
 ROWS = (

@@ -1,6 +1,6 @@
 """PEFRL (Omelyan, Mryglod, Folk 2002): drifts of y with kicks of v between them."""
 
-from ..types import Array, Blocks, Scaled
+from ...base.arrays import Array, Blocks, Scaled
 
 XI = 0.1786178958448091
 LAMBDA = -0.2123418310626054

@@ -1,6 +1,6 @@
 """The classical Runge-Kutta method (§12 names its professional kin)."""
 
-from ..types import Array, Blocks, Scaled
+from ...base.arrays import Array, Blocks, Scaled
 
 SIXTH = 1.0 / 6.0
 

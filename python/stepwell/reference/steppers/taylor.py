@@ -2,8 +2,8 @@
 
 from functools import reduce
 
+from ...base.arrays import Array, Blocks, Scaled
 from ..series import coefficients
-from ..types import Array, Blocks, Scaled
 
 #: The order of a step of fixed length.
 ORDER = 8

@@ -1,6 +1,6 @@
 """Verlet (§8). Between steps the place of ``v`` holds ``y_prev``."""
 
-from ..types import Array, Blocks, Scaled
+from ...base.arrays import Array, Blocks, Scaled
 
 
 def step(s: Scaled, t: float, h: float, y_prev: Array, y: Array) -> Blocks:

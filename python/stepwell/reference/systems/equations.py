@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from ...base.arrays import Array
 from ..functions.operations import where
-from ..types import Array
 
 
 class Equations:

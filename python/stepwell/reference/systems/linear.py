@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from ...base.arrays import Array, Signal
 from ..product import times
-from ..types import Array, Signal
 
 
 class Linear:

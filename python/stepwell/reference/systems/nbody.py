@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.arrays import Array
 from .. import bits
 from ..log import log
-from ..types import Array
 
 #: Sums over bodies are kept in this many parts, body i in part i mod LANES; distances that are taken together are so far apart.
 LANES = 8

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..types import Array, Signal
+from ...base.arrays import Array, Signal
 
 
 class Oscillator:

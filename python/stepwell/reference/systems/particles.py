@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..types import Array
+from ...base.arrays import Array
 
 
 class Particles:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ...base.arrays import Array, Signal
 from .. import trig
-from ..types import Array, Signal
 
 
 class Pendulum:

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from ..types import Array, Blocks
+from ...base.arrays import Array, Blocks
+from .. import rod_contact
 from .rods import Rods, dot, largest, spin
 
 
@@ -50,10 +51,11 @@ class Pendulum3D:
         y = y * (self.length / np.sqrt(dot(y, y)))
         return v - (dot(y, v) / self.square) * y, y
 
-    def as_rods(self) -> tuple[Rods, int]:
-        """One rod from an anchor to a point of mass 1, for the surfaces that it meets, and how many axes a block has."""
+    def contacts(self, h: Any, surfaces: list[Any]) -> Any:
+        """How it meets surfaces in a step h: as a point of mass 1 at a rod from an anchor."""
         anchor, one = np.zeros((1, 3)), np.ones(1)
-        return Rods(self.h, 3, [[1, 0]], one, np.asarray(self.length)[np.newaxis], anchor, self.gravity, None, None), 1
+        rod = Rods(self.h, 3, [[1, 0]], one, np.asarray(self.length)[np.newaxis], anchor, self.gravity, None, None)
+        return rod_contact.RodContacts(h, rod, 1, surfaces)
 
     def record(self, name: str, v: Array, y: Array) -> Array:
         """A quantity of a state: ``length_error``, |length/l − 1|, or ``angular_momentum``, y × v per mass."""

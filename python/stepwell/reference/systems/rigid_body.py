@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..types import Array, Blocks, Signal
+from ...base.arrays import Array, Blocks, Signal
 
 Vector = tuple[Array, Array, Array]
 

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import bits
+from ...base.arrays import Array, Blocks
+from .. import bits, rod_contact
 from ..elimination import factored, solved
-from ..types import Array, Blocks
 
 #: Newton's corrections of the points in a projection. Each squares the relative error of the lengths, over 2: 2 % becomes
 #: 2·10⁻⁴, 2·10⁻⁸ and 2·10⁻¹⁶, which is rounding.
@@ -151,9 +151,9 @@ class Rods:
         pushed = self.pushed(d, solved(factored(self.matrix(d)), off))
         return np.stack([each + push for each, push in zip(block, pushed, strict=True)])
 
-    def as_rods(self) -> tuple["Rods", int]:
-        """Itself, for the surfaces that its points meet, and how many axes a block has."""
-        return self, 2
+    def contacts(self, h: Any, surfaces: list[Any]) -> Any:
+        """How its points meet surfaces in a step h."""
+        return rod_contact.RodContacts(h, self, 2, surfaces)
 
     def record(self, name: str, v: Array, y: Array) -> Array:
         """A quantity of a state."""

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...base.arrays import Array
 from .. import bits
-from ..types import Array
 from .nbody import square, total
 
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import number
-from ..._words import AttitudeForm
-from ...systems import Aircraft, Sinusoid
+from ...base.checks import number
+from ...base.literals import AttitudeForm
+from ...model.systems import Aircraft, Sinusoid
 from ..base import Scene
 
 #: How long a turn to both sides lasts, and how many of them there are.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...systems import RestrictedThreeBody
+from ...model.systems import RestrictedThreeBody
 from ..base import Scene
 from ..taylor import TurningOrbit
 

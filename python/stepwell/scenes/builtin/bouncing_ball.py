@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, number
-from ...contact import Floor
+from ...base.arrays import Array
+from ...base.checks import number
 from ...errors import ArgumentError
-from ...systems import Particles
+from ...model.surfaces import Floor
+from ...model.systems import Particles
 from ..base import Scene
 from ..ranges import moderate
 

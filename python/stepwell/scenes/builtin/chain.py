@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, count, number, short
+from ...base.arrays import Array
+from ...base.checks import count, number, short
 from ...errors import ArgumentError, DTypeError
-from ...systems import Chain
+from ...model.systems import Chain
 from ..base import Scene
 
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import count, fits
+from ...base.checks import count, fits
 from ...errors import ArgumentError
-from ...systems import Springs
+from ...model.systems import Springs
 from ..base import Scene
 from ..ranges import LARGEST, within
 

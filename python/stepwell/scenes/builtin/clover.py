@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ..._checks import Array
-from ...systems import NBody
+from ...base.arrays import Array
+from ...model.systems import NBody
 from ..base import Scene
 
 #: Where the three bodies stand on the unit circle at t = 0, in radians.

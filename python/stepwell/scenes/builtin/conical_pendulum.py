@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, number
+from ...base.arrays import Array
+from ...base.checks import number
 from ...errors import ArgumentError
-from ...systems import Pendulum3D
+from ...model.systems import Pendulum3D
 from ..base import Scene
 
 

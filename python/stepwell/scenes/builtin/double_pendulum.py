@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import numbers
+from ...base.checks import numbers
 from ...errors import ShapeError
-from ...systems import Rods
+from ...model.systems import Rods
 from ..base import Scene
 
 

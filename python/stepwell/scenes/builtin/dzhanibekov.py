@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import numbers
+from ...base.checks import numbers
 from ...errors import ArgumentError
-from ...systems import RigidBody
+from ...model.systems import RigidBody
 from ..base import Scene
 from ..free_top import FreeTop
 from ..ranges import within

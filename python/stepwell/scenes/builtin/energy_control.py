@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import known, number
-from ..._words import BodyForce, ControlForm
-from ...control import EnergyControl
-from ...systems import NBody
+from ...base.checks import known, number
+from ...base.literals import BodyForce, ControlForm
+from ...model.controls import EnergyControl
+from ...model.systems import NBody
 from ..base import Scene
 
 #: Force and potential for each pair of them, as ``NBody`` names it.

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, number
+from ...base.arrays import Array
+from ...base.checks import number
 from ...errors import ArgumentError
-from ...systems import Oscillator, Sinusoid
+from ...model.systems import Oscillator, Sinusoid
 from ..base import Scene
 from ..ranges import LARGEST, frequency, within
 

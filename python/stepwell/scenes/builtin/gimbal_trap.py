@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import number
-from ..._words import AttitudeForm
-from ...systems import Aircraft
+from ...base.checks import number
+from ...base.literals import AttitudeForm
+from ...model.systems import Aircraft
 from ..base import Scene
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import number
+from ...base.checks import number
 from ...errors import ArgumentError
-from ...systems import RigidBody
+from ...model.systems import RigidBody
 from ..base import Scene
 from ..ranges import within
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import count, fits
-from ...systems import Springs
+from ...base.checks import count, fits
+from ...model.systems import Springs
 from ..base import Scene
 from ..ranges import LARGEST, within
 

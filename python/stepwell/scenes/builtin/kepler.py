@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, number
+from ...base.arrays import Array
+from ...base.checks import number
 from ...errors import ArgumentError
-from ...systems import NBody
+from ...model.systems import NBody
 from ..base import Scene
 
 #: Newton's method from the far end needs this many steps at most, for any eccentricity that a float can distinguish from 1.

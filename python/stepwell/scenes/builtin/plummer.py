@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, count, fits, number
+from ...base.arrays import Array
+from ...base.checks import count, fits, number
 from ...errors import ArgumentError
-from ...systems import NBody
+from ...model.systems import NBody
 from ..base import Scene
 
 #: Share of the mass that is sampled: the outermost thousandth would be far away.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...systems import NBody
+from ...model.systems import NBody
 from ..base import Scene
 from ..taylor import Orbit
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array
-from ...systems import Oscillator
+from ...base.arrays import Array
+from ...model.systems import Oscillator
 from ..base import Scene
 from ..ranges import moderate
 

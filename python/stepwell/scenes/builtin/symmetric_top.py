@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ... import quaternion
-from ..._checks import Array, number
-from ..._value import Value
+from ...base.arrays import Array
+from ...base.checks import number
+from ...base.immutable import Value
 from ...errors import ArgumentError
-from ...systems import RigidBody
+from ...model import quaternion
+from ...model.systems import RigidBody
 from ..base import Scene
 from ..ranges import within
 

@@ -10,7 +10,7 @@
 //! - everything else takes the product, (c·f)·x, whose first half is computed before the steps.
 //!
 //! So v + ½(h·a₁ + h·a₂) becomes v + (½h)·(a₁ + a₂), and no product stands between a rate and the sum it belongs to.
-//! `reference/increments.py` says the same in Python.
+//! `reference/tape/increments.py` says the same in Python.
 
 use super::{Id, Op, Tape, uses::UseCounts};
 

@@ -1,0 +1,398 @@
+"""``equilibria``: the states at which a system rests, and their stability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array
+from ...base.immutable import Value
+from ...base.reprs import MAX_LINE, brief, shortened, table
+from ...errors import ArgumentError, ShapeError
+from ...model.compatibility import fits_together
+from ...model.methods import Method
+from ...model.methods import method as find_method
+from ...model.systems import System
+from ...model.systems.base import a_system
+from ..stability import eigen, exact, maps, parts
+from ..stability.analysis import Analysis, analyse, state
+from ..stability.eigen import EPS, Complex
+from .at_state import by_growth, linearised
+
+#: The most Newton steps from one start, and the most halvings of one of them.
+MAX_ITERATIONS, MAX_HALVINGS = 100, 30
+
+#: A start has converged when a whole Newton step changes the state by less than this fraction of its size.
+ARRIVED = 1e-12
+
+#: A start whose Newton step is between this and ``ARRIVED`` has converged too if no fraction of the step makes the rates smaller:
+#: only rounding is left.
+NEARLY_ARRIVED = 1e-7
+
+#: Rates are zero, but for the rounding of their terms, below this fraction of these.
+RATES_ARE_ZERO = 64.0 * EPS
+
+#: Two equilibria nearer than this fraction of their size are one: far more than rounding, far less than users distinguish.
+SAME = 1e-8
+
+#: A singular value of the Jacobian below this fraction of the largest counts as zero: the equilibrium is part of a line or
+#: surface of equilibria, or a double root.
+SINGULAR = 1e-10
+
+#: The place of a root is known to so many times the Newton step that is left: at a p-fold root that step is the p-th part of the
+#: distance. The rates there are uncertain by their rounding: by how much they are not straight over such shares of the place.
+#: No place is taken for less certain than a share of the size: roundings ε leave ε^(1/p) of a p-fold root, 7·10⁻⁴ for five.
+MULTIPLE, BESIDE, LEAST_CERTAIN = 16.0, 2.0**-33 * np.array([-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0]), 2.0**-10
+#: A singular value below this fraction of the largest is rounding: along it nothing is known, as on a line of equilibria.
+ROUNDING = 16.0 * EPS
+
+#: A real part counts as zero below this fraction of the fastest rate, plus the rounding error; and if an eigenvalue changes by
+#: half of it within ``SAME`` of the place, or on so many steps of Newton's method. A multiple root is found to the root of a
+#: rounding only, or a part of the distance is left by each step, and the eigenvalue is as large as that distance, of either sign.
+#: Two more steps at a p-fold root make the eigenvalue (1 − 2/p)^(p − 1) ≤ 0.14 times as large.
+ZERO_RATE, LEFT = 1e-9, 2.0
+
+
+#: The kind where eigenvalues do not tell the motion nearby.
+UNDECIDED = "undecided to first order"
+
+
+class Equilibrium(Value):
+    """A state at which both rates are zero.
+
+    Attributes:
+        v: its velocities, shape (*block).
+        y: its coordinates, likewise.
+        residual: the largest rate there, which rounding leaves.
+        eigenvalues: λ of the Jacobian there, shape (n,), the largest real part first: small disturbances grow as e^(λt).
+        kind: the motion nearby, by the eigenvalues: "sink" (all disturbances decay), "source" (all grow), "saddle" (some grow,
+            some do not), "centre" (all rotate, and to first order neither grow nor decay), or "undecided to first order" (an
+            eigenvalue is zero, as far as the place is known, or some rotate while others decay: higher orders decide).
+        isolated: whether some neighbourhood has no other equilibrium; False where the Jacobian is singular, so that first order
+            does not tell.
+        analysis: the result of ``analyse`` for a step of the method there; None if no method was given.
+        starts: numbers of the starts from which it was reached.
+    """
+
+    def __init__(
+        self,
+        v: Array,
+        y: Array,
+        residual: float,
+        eigenvalues: Complex,
+        kind: str,
+        isolated: bool,
+        analysis: Analysis | None,
+        starts: tuple[int, ...],
+    ) -> None:
+        self.v, self.y = v, y
+        self.residual = residual
+        self.eigenvalues = eigenvalues
+        self.kind = kind
+        self.isolated = isolated
+        self.analysis = analysis
+        self.starts = starts
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether small disturbances decay; None where first order does not decide it."""
+        return {"sink": True, "source": False, "saddle": False}.get(self.kind)
+
+    def __repr__(self) -> str:
+        step = "" if self.analysis is None else f", step: {self.analysis.kind}"
+        return f"<equilibrium at v = {brief(self.v)}, y = {brief(self.y)}: {self.kind}{step}>"
+
+
+class Equilibria(Value):
+    """Equilibria that were found, in the order of the starts; a sequence of ``Equilibrium``.
+
+    Attributes:
+        system: the system.
+        found: each equilibrium once.
+        lost: numbers of the starts from which none was reached.
+    """
+
+    def __init__(self, system: System, found: tuple[Equilibrium, ...], lost: tuple[int, ...]) -> None:
+        self.system = system
+        self.found = found
+        self.lost = lost
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def __getitem__(self, k: int) -> Equilibrium:
+        return self.found[k]
+
+    def __iter__(self) -> Iterator[Equilibrium]:
+        return iter(self.found)
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(each.kind for each in self.found)
+        lost = f"; {len(self.lost)} start{'s' * (len(self.lost) != 1)} led nowhere" if self.lost else ""
+        what = "equilibrium" if len(self.found) == 1 else "equilibria"
+        return shortened(f"<{len(self.found)} {what} of {self.system!r}{': ' * bool(kinds)}{kinds}{lost}>", MAX_LINE)
+
+    def __str__(self) -> str:
+        return "\n  ".join([repr(self), *map(repr, self.found)])
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        rows = [
+            (brief(each.v), brief(each.y), each.kind, "" if each.analysis is None else each.analysis.kind) for each in self.found
+        ]
+        return table(repr(self)[1:-1], ("v", "y", "kind", "step"), rows)
+
+
+def equilibria(
+    system: System, *, near: Any, t: float = 0.0, method: str | Method | None = None, dt: float | None = None
+) -> Equilibria:
+    """Find the equilibria that Newton's method reaches from given states, each once, with their stability.
+
+    The Jacobian is exact, and a step that would make the rates larger is halved until it does not. Where it is singular, the
+    shortest step is taken. Rates that vanish only at infinity (bodies that separate for ever) are no equilibrium.
+
+    Args:
+        system: of one member.
+        near: states (v, y) to start from, shapes (*block, *starts); v is None for a system without velocities.
+        t: the time; inputs keep their values at that time.
+        method: a method to analyse at each equilibrium, or None.
+        dt: its step, in units of time.
+
+    Returns:
+        ``Equilibria``: a sequence. Equilibria that are reached from no start are not found; how many there are is unknown.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: if the rates depend on the state by an operation that has no derivative, or the method cannot do the
+            system.
+
+    Example:
+        >>> [each.kind for each in sw.equilibria(sw.Pendulum(), near=(0.0, [0.3, 3.0]))]
+        ['centre', 'saddle']
+    """
+    system = a_system(system).sized(*(near if isinstance(near, (tuple, list)) else ()))
+    if system.batch:
+        raise ShapeError(f"system: expected one member to find the equilibria of, got a batch of shape {system.batch}")
+    v, y = state("near", system, near)
+    t = checks.number("t", t, unit="units of time")
+    if (method is None) != (dt is None):
+        raise ArgumentError("method, dt: expected both or neither, got " + ("dt" if method is None else "method") + " alone")
+    how = None if method is None else find_method(method)
+    step = None if dt is None else checks.number("dt", dt, positive=True, unit="units of time")
+    if how is not None:
+        fits_together(system, how)
+    starts = _starts(system, v, y)
+    n = sum(maps.size(system))
+    checks.fits("the Jacobians", 8 * n * n, starts.shape[1:], "give fewer starts")
+    states, arrived = _newton(system, starts, t)
+    found = _one_by_one(system, states, starts, np.flatnonzero(arrived), t)
+    each = tuple(_equilibrium(system, at, uncertain, t, how, step, own) for at, uncertain, own in found)
+    return Equilibria(system, each, tuple(np.flatnonzero(~arrived).tolist()))
+
+
+def _one_by_one(
+    system: System, states: Array, starts: Array, arrived: Any, t: float
+) -> list[tuple[Array, Array, tuple[int, ...]]]:
+    """Each equilibrium once: where it is, how uncertain that is, and the starts that reached it."""
+    sizes, begun = _size(system, states), _size(system, starts)
+    alike: list[list[int]] = []
+    for k in arrived.tolist():
+        for own in alike:
+            # The size of a coordinate that is 0 up to rounding is that of the coordinates at the start.
+            size = np.maximum(np.maximum(sizes[:, k], sizes[:, own[0]]), np.minimum(begun[:, k], begun[:, own[0]]))
+            if (np.abs(states[:, k] - states[:, own[0]]) <= SAME * size).all():
+                own.append(k)
+                break
+        else:
+            alike.append([k])
+    firsts = [own[0] for own in alike]
+    uncertain, residuals = _uncertain(system, states[:, firsts], np.maximum(sizes, begun)[:, firsts], t)
+    found: list[tuple[int, list[int]]] = []
+    for i, own in enumerate(alike):
+        for place, (j, others) in enumerate(found):
+            apart = np.abs(states[:, firsts[i]] - states[:, firsts[j]])
+            if (apart <= uncertain[:, i] + uncertain[:, j]).all():
+                found[place] = i if residuals[i] < residuals[j] else j, sorted(others + own)
+                break
+        else:
+            found.append((i, own))
+    return [(states[:, firsts[i]], uncertain[:, i], tuple(own)) for i, own in found]
+
+
+def _uncertain(system: System, states: Array, sizes: Array, t: float) -> tuple[Array, Array]:
+    """How uncertain the places of equilibria are, each number by itself, and the largest rate at each."""
+    if not states.size:
+        return np.zeros(states.shape), np.zeros(states.shape[1])
+    matrix, rates = linearised(system, *_blocks(system, states), t)
+    left = np.abs(_solved(matrix, rates, ROUNDING))
+    for share in BESIDE:
+        change = share * states
+        near = linearised(system, *_blocks(system, states + change), t)[1]
+        bent = near - np.einsum("ijk,jk->ik", matrix, change)
+        left = np.maximum(left, np.abs(_solved(matrix, np.where(np.isfinite(bent), bent, rates), ROUNDING)))
+    return np.minimum(MULTIPLE * left, LEAST_CERTAIN * sizes), np.abs(rates).max(axis=0)
+
+
+def _starts(system: System, v: Array, y: Array) -> Array:
+    """The starts as columns, shape (n, starts)."""
+    batch = checks.batch_shape({"near, v": v.shape[len(system.v_shape) :], "near, y": y.shape[len(system.y_shape) :]})
+
+    def wide(block: Array, shape: tuple[int, ...]) -> Array:
+        own = block.shape[len(shape) :]
+        aligned = block.reshape((*shape, *(1,) * (len(batch) - len(own)), *own))
+        return np.broadcast_to(aligned, (*shape, *batch)).reshape(prod(shape), prod(batch))
+
+    return np.concatenate([wide(v, system.v_shape), wide(y, system.y_shape)])
+
+
+def _blocks(system: System, states: Array) -> tuple[Array, Array]:
+    n_v = maps.size(system)[0]
+    return tuple(  # type: ignore[return-value]
+        part.reshape((*shape, *states.shape[1:]))
+        for part, shape in ((states[:n_v], system.v_shape), (states[n_v:], system.y_shape))
+    )
+
+
+def _size(system: System, states: Array) -> Array:
+    """For each number of the states the largest magnitude in its block, shape (n, starts): each block has its own units."""
+    n_v = maps.size(system)[0]
+    size = np.abs(states)
+    for rows in (slice(0, n_v), slice(n_v, None)):
+        if size[rows].size:
+            size[rows] = size[rows].max(axis=0)
+    return size
+
+
+def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
+    """The states that Newton's method reaches from each column, and whether it converged."""
+    states = states.copy()
+    arrived = np.zeros(states.shape[1], dtype=np.bool_)
+    alive = np.ones(states.shape[1], dtype=np.bool_)
+    least = _size(system, states)
+    least = np.where(least > 0.0, least, 1.0)
+    # The largest that each rate has been by its derivatives: their terms, of which it is a sum, are at least that large.
+    terms = np.zeros_like(states)
+    for _ in range(MAX_ITERATIONS):
+        which = np.flatnonzero(alive)
+        if not which.size:
+            break
+        at = states[:, which]
+        matrix, rates = linearised(system, *_blocks(system, at), t)
+        usable = np.isfinite(matrix).all(axis=(0, 1)) & np.isfinite(rates).all(axis=0)
+        alive[which[~usable]] = False
+        which, at, matrix, rates = which[usable], at[:, usable], matrix[:, :, usable], rates[:, usable]
+        if not which.size:
+            break
+        change = -_solved(matrix, rates)
+        terms[:, which] = np.maximum(
+            terms[:, which], np.einsum("ijk,jk->ik", np.abs(matrix), np.maximum(_size(system, at), least[:, which]))
+        )
+        # Where the Jacobian is singular, a step of zero may leave the rates as they are: an extreme of a rate is no zero.
+        remainder = np.abs(np.einsum("ijk,jk->ik", matrix, change) + rates)
+        vanishes = (remainder <= RATES_ARE_ZERO * terms[:, which]).all(axis=0)
+        relative = (np.abs(change) / np.maximum(_size(system, at), least[:, which])).max(axis=0)
+        there = vanishes & (relative <= ARRIVED)
+        best, better = _damped(system, at, change, rates, t)
+        stuck = vanishes & ~better & (relative <= NEARLY_ARRIVED)
+        states[:, which] = np.where(better, best, at)
+        arrived[which] = there | stuck
+        alive[which] = better & ~there
+    return states, arrived
+
+
+def _solved(matrix: Array, rates: Array, zero: float = SINGULAR) -> Array:
+    """The least-squares solution x of matrix·x = rates, the shortest of several, for each column.
+
+    A singular value below the fraction ``zero`` of the largest counts as zero.
+    """
+    of_rows, of_columns = _units(matrix)
+    stacked, right = np.moveaxis(matrix / of_rows[:, np.newaxis] / of_columns, 2, 0), (rates / of_rows).T[:, :, np.newaxis]
+    singular = np.linalg.svd(stacked, compute_uv=False)
+    regular = singular[:, -1] > zero * singular[:, 0]
+    found = np.empty(right.shape)
+    found[regular] = np.linalg.solve(stacked[regular], right[regular])
+    found[~regular] = np.linalg.pinv(stacked[~regular], rcond=zero) @ right[~regular]
+    return np.asarray(found[:, :, 0].T / of_columns)
+
+
+def _units(matrix: Array) -> tuple[Array, Array]:
+    """Divisors of the rows, and then of the columns, that make the largest element of each 1, so that units do not matter.
+
+    Weak forces at a large distance are small numbers beside the 1 of ẏ = v, but they are not zero.
+    """
+    of_rows = np.abs(matrix).max(axis=1)
+    of_rows = np.where(of_rows > 0.0, of_rows, 1.0)
+    of_columns = np.abs(matrix / of_rows[:, np.newaxis]).max(axis=0)
+    return of_rows, np.where(of_columns > 0.0, of_columns, 1.0)
+
+
+def _damped(system: System, at: Array, change: Array, rates: Array, t: float) -> tuple[Array, Any]:
+    """The states after the longest of the step, its half, its quarter, … that makes the rates smaller; and whether any does."""
+    before = np.abs(rates).max(axis=0)
+    best, better, share = at.copy(), np.zeros(at.shape[1], dtype=np.bool_), 1.0
+    for _ in range(MAX_HALVINGS):
+        left = np.flatnonzero(~better)
+        if not left.size:
+            break
+        tried = at[:, left] + share * change[:, left]
+        after = np.abs(linearised(system, *_blocks(system, tried), t)[1]).max(axis=0)
+        good = after < before[left] * (1.0 - 1e-4 * share)
+        best[:, left[good]], better[left[good]] = tried[:, good], True
+        share *= 0.5
+    return best, better
+
+
+def _equilibrium(
+    system: System, at: Array, uncertain: Array, t: float, method: Method | None, dt: float | None, starts: tuple[int, ...]
+) -> Equilibrium:
+    v, y = _blocks(system, at)
+    matrix, rates = linearised(system, v, y, t)
+    values = by_growth(matrix)
+    analysis = None
+    if method is not None:
+        linear = system.linear  # of such a system the step is the same at every state
+        with np.errstate(all="ignore"):  # a step of any length may be asked for
+            analysis = analyse(system, method, dt=dt, at=None if linear else (v, y), t=t)
+    of_rows, of_columns = _units(matrix)
+    _, singular, across = np.linalg.svd(matrix / of_rows[:, np.newaxis] / of_columns)
+    exactly, least = _known(system, at, uncertain, matrix, rates, across[-1] / of_columns, t)
+    isolated = bool(singular[-1] > SINGULAR * singular[0]) and bool((np.abs(exactly) > least).all())
+    return Equilibrium(v, y, float(np.abs(rates).max()), values, _kind(exactly, least), isolated, analysis, starts)
+
+
+def _known(
+    system: System, at: Array, uncertain: Array, matrix: Array, rates: Array, weakest: Array, t: float
+) -> tuple[Complex, Array]:
+    """Eigenvalues, and up to which size each is zero as far as the place of an equilibrium is known.
+
+    ``weakest`` is the direction that changes the rates least.
+    """
+    size = np.maximum(SAME * _size(system, at[:, np.newaxis])[:, 0], uncertain)
+    along = weakest / np.abs(weakest).max() * np.min(size, where=size > 0.0, initial=np.inf) if size.any() else size
+    left = -LEFT * _solved(matrix[:, :, np.newaxis], rates[:, np.newaxis])[:, 0]
+    places = np.stack([at + size, at - size, at + along, at - along, at + left], axis=1)
+    beside = linearised(system, *_blocks(system, places), t)[0]
+    beside = np.where(np.isfinite(beside), beside, matrix[:, :, np.newaxis])
+    own, others = eigen.eigenvalues(matrix), eigen.eigenvalues(beside)
+    moved = np.abs(own[:, np.newaxis, np.newaxis] - others[np.newaxis]).min(axis=1).max(axis=1)
+    # Where all are zero, as of a mass that nothing holds, what is left of them is rounding of the elements, in many digits.
+    least = np.maximum(2.0 * moved, np.maximum(ZERO_RATE * np.abs(own).max(), EPS * EPS * np.abs(matrix).max()))
+    if len(matrix) > exact.MAX_ROWS:
+        rounding = eigen.eigen(matrix).tolerance(0.0).max()
+        return own, np.maximum(least, np.minimum(rounding, eigen.REFINE_ABOVE * np.abs(own).max()))
+    exactly = parts.rates(matrix).values  # where they meet, in as many digits as it takes
+    return exactly, least[np.abs(exactly[:, np.newaxis] - own).argmin(axis=1)]
+
+
+def _kind(values: Complex, least: Array) -> str:
+    """The kind of the motion nearby."""
+    if (np.abs(values) <= least).any():
+        return UNDECIDED
+    grows, dies = values.real > least, values.real < -least
+    if grows.any():
+        return "source" if grows.all() else "saddle"
+    return "sink" if dies.all() else UNDECIDED if dies.any() else "centre"

@@ -1,0 +1,101 @@
+"""A system together with its variational equations: a motion, and disturbances of it that are infinitesimal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...base.arrays import Array, Shape
+from ...errors import UnsupportedError
+from ...model.equations.series import derivatives_of_functions
+from ...model.inputs import Input
+from ...model.systems import System
+from ...model.systems.base import Given, flat
+from ...model.systems.own import RATES
+from ...reference.tape.evaluate import Evaluation
+from ...reference.traced import Tracer
+from ..derivatives.traced import Traced
+from ..stability import maps
+
+#: The most operations of the rates with those of all disturbances.
+MAX_OPERATIONS = 100_000
+
+
+class _Rates:
+    """The rates by NumPy, scaled to a step."""
+
+    def __init__(self, h: float, evaluation: Evaluation, n_v: int) -> None:
+        self.h, self.evaluation, self.n_v = h, evaluation, n_v
+
+    def dv(self, t: Any, v: Array, y: Array) -> Array:
+        return self._rates(t, v, y)[: self.n_v]
+
+    def dy(self, t: Any, v: Array, y: Array) -> Array:
+        return self._rates(t, v, y)[self.n_v :]
+
+    def _rates(self, t: Any, v: Array, y: Array) -> Array:
+        rows = [*v, *y]
+        rates = np.empty((len(rows), *np.broadcast_shapes(*map(np.shape, rows))))
+        for i, rate in enumerate(self.evaluation(rows, t)):
+            rates[i] = self.h * rate
+        return rates
+
+
+class Variational(System):
+    """A system and disturbances of it: its velocities are v, its coordinates are y and behind them the disturbances.
+
+    Those are numbers of (v, y), the first of all disturbances, then the second, and so on. Their rates are the derivative of the
+    system's rates in their direction, so it is for methods that treat both blocks alike.
+    """
+
+    kernel = "equations"
+    reference = _Rates
+    second_order = False
+
+    def __init__(self, system: System, disturbances: int) -> None:
+        if system.keeper is not None or system.contacts or system.rubbing is not None:
+            raise UnsupportedError(
+                f"tolerance: Lyapunov exponents have none where there is a control, a surface or friction, got {system!r}; give "
+                f"dt= and steps="
+            )
+        self.of, self.disturbances = system, disturbances
+        n_v, n_y = maps.size(system)
+        self.v_shape, self.y_shape = (n_v,), (n_y + (n_v + n_y) * disturbances,)
+        self.batch = system.batch
+        traced = Traced(system, "rates")
+        operations = (1 + 3 * disturbances) * len(traced.tape)
+        if operations > MAX_OPERATIONS:
+            raise UnsupportedError(
+                f"exponents: with a tolerance expected rates of {MAX_OPERATIONS:,} operations at most, with those of the "
+                f"disturbances, got about {operations:,}, of {disturbances} disturbances of {system!r}; ask for fewer"
+            )
+        self._tape, self._rates = traced.tape, traced.along(disturbances)
+        functions = derivatives_of_functions(traced.tape, traced.marks)
+        self._core = traced.tape.equations(self._rates[:n_v], self._rates[n_v:], [], None, functions)
+
+    def said(self) -> list[str]:
+        """The system, and how many disturbances."""
+        return [repr(self.of), str(self.disturbances)]
+
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """The parameters of the system."""
+        return self.of.given(batch)
+
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> Given:
+        """The operations of all rates, and the parameters of the system."""
+        given = {name: value for name, value in self.given(batch).items() if name != RATES and not callable(value)}
+        return [(RATES, self._core), *flat(given, batch)]
+
+    def alone(self, h: float, batch: Shape) -> Any:
+        """The rates by NumPy."""
+        tracer = Tracer(self.of, _core.Tape())
+        for value in self.given(batch).values():
+            tracer.symbols(value, batch)  # which collects their numbers
+        evaluation = Evaluation(self._tape, self._rates, dict(enumerate(tracer.numbers)), tracer.tables)
+        return _Rates(h, evaluation, maps.size(self.of)[0])
+
+    def given_inputs(self) -> dict[str, Input]:
+        """Those of the system."""
+        return self.of.given_inputs()

@@ -1,0 +1,252 @@
+"""Growth by fixed steps that are beyond their stability limit: it is finite, often for long, and means nothing."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Array, Shape, Whole
+from ..base.checks import once_of
+from ..base.reprs import first_of, share
+from ..errors import AccuracyWarning, UnsupportedError
+from ..model.methods import Method
+from ..model.systems import NBody, System
+from ..runs.diagnostics import is_heard
+
+#: A state that is so many times as long as at the start is looked at; from rest, so many units long.
+GROWN = 1e6
+
+#: Lengths between this and its reciprocal have squares with all of their digits.
+SQUARABLE = 1e-140
+
+#: The step explains growth if its eigenvalues make at least this share of its logarithm, and those of the rates at most that.
+BY_STEPS, BY_MOTION = 0.5, 0.25
+
+#: Matrices of more numbers, for all members that grew, are not computed: what the others are is not asked.
+MOST_NUMBERS = 1_000_000
+
+#: Of systems of up to so many numbers a state the limit is told, too.
+SMALL_SYSTEM = 8
+
+#: A world checks its state after so many steps, then after twice as many more, and so on up to the last number: what grows by a
+#: thousandth a step has grown a million times by then. Calls of ``step`` may be shorter or longer than that.
+FIRST_CHECK, LAST_CHECK, ENDLESS = 8, 16_384, 1 << 62
+
+
+def lengths(system: System, v: Array, y: Array) -> Array:
+    """The length of each member's state, both blocks together, shape (*batch)."""
+    axes = tuple(range(len(system.v_shape))), tuple(range(len(system.y_shape)))
+    v, y = (np.asarray(block, dtype=np.float64) for block in (v, y))
+    with np.errstate(all="ignore"):
+        if v.ndim == len(system.v_shape) and y.ndim == len(system.y_shape):
+            length = np.asarray(np.sqrt(_square(v) + _square(y)))  # of one member, ten times as fast
+        else:
+            length = np.asarray(np.sqrt((v * v).sum(axis=axes[0]) + (y * y).sum(axis=axes[1])))
+        if (length > SQUARABLE).all() and (length < 1.0 / SQUARABLE).all():
+            return length
+        # Squares beyond what a float has.
+        unit = np.maximum(*(np.abs(block).max(axis=own, initial=0.0) for block, own in zip((v, y), axes, strict=True)))
+        unit = np.where((unit > 0.0) & (unit < np.inf), unit, 1.0)
+        squares = (((block / unit) ** 2).sum(axis=own) for block, own in zip((v, y), axes, strict=True))
+        return np.asarray(unit * np.sqrt(sum(squares)))
+
+
+class Growth(NamedTuple):
+    """Members that grew by their steps alone.
+
+    Attributes:
+        number: how many they are.
+        first: the place of the first of them in the batch.
+        size: by what it grew, as words.
+        why: what made it grow, and what to do.
+    """
+
+    number: int
+    first: tuple[int, ...]
+    size: str
+    why: str
+
+    def in_words(self, shape: Shape) -> str:
+        """It in words, of members of a batch of this shape."""
+        size = math.prod(shape)
+        return f"{share(self.number, shape, size)} {self.size}{first_of(self.number, self.first, size)}: {self.why}"
+
+
+def growth(
+    system: System, method: Method, dt: float, steps: int, t: Any, start: tuple[Array, Array], end: tuple[Array, Array]
+) -> Growth | None:
+    """The members that grew by their steps alone, or None.
+
+    Args:
+        system: what was stepped, with its control.
+        method: by which.
+        dt: the step.
+        steps: how many were made.
+        t: the time of the start, of all members or of each.
+        start: v and y there, spread over the batch.
+        end: and at the end.
+    """
+    with np.errstate(all="ignore"):
+        before, after = lengths(system, *start), lengths(system, *end)
+        before = np.where(before > 0.0, before, 1.0)
+        many = np.isfinite(after) & (after / before > GROWN)
+    n = math.prod(system.v_shape) + math.prod(system.y_shape)
+    if not many.any() or n * n > MOST_NUMBERS or system.contacts or system.rubbing is not None or isinstance(system, NBody):
+        return None
+    suspects = np.flatnonzero(many)[: MOST_NUMBERS // (n * n)]
+    try:
+        factors = _Factors(system, method, dt, t, start, many.shape)
+        radius, rate = factors.of(suspects)
+    except UnsupportedError:
+        return None
+    # The quotient may be no float, but its logarithm is.
+    grown = np.log(after.reshape(-1)[suspects]) - np.log(before.reshape(-1)[suspects])
+    made = steps * np.log(np.maximum(radius, 1.0))
+    by_steps = np.flatnonzero((made >= BY_STEPS * grown) & (rate * steps <= BY_MOTION * grown))
+    if not by_steps.size:
+        return None
+    k = by_steps[0]
+    why = (
+        f"each step of {dt:g} by {method.name} multiplies a disturbance of the start by {radius[k]:.4g}, and the motion itself "
+        f"does not grow; {factors.limit(suspects[k])}"
+    )
+    first = tuple(int(i) for i in np.unravel_index(suspects[k], many.shape))
+    return Growth(len(by_steps), first, f"grew {_power_of_ten(float(grown[k]))}-fold in {steps} steps", why)
+
+
+def _power_of_ten(logarithm: float) -> str:
+    """A number, as 3e+52, of its natural logarithm; it may be beyond the floats."""
+    exponent, rest = divmod(logarithm / math.log(10.0), 1.0)
+    digit = round(10.0**rest)
+    return f"{digit}e+{int(exponent):02d}" if digit < 10 else f"1e+{int(exponent) + 1:02d}"
+
+
+class _Factors:
+    """What a step, and the motion itself, make of disturbances of the start: of some members of a batch."""
+
+    def __init__(self, system: System, method: Method, dt: float, t: Any, start: tuple[Array, Array], batch: Shape) -> None:
+        from .stability.some_members import Batch
+
+        self._system, self._method, self._dt = system, method, dt
+        v, y = (None, None) if system.linear else start
+        self._batch = Batch(system.without_inputs() if system.linear else system, method, v, y, batch)
+        self._t = np.broadcast_to(t, batch).reshape(-1) if np.ndim(t) else t
+
+    def _own(self, members: Whole) -> tuple[System, Any, Array | None, Array | None]:
+        """The system of some members, their time, and where they begin, if that matters."""
+        own, v, y = self._batch.of(members)
+        return own, self._t if np.ndim(self._t) == 0 else self._t[members], v, y
+
+    def of(self, members: Whole) -> tuple[Array, Array]:
+        """The largest magnitude of an eigenvalue of each member's step, and the largest growth of its rates in a step."""
+        from .stability import eigen, maps
+
+        (own, t, v, y), dt = self._own(members), np.asarray(self._dt)
+        rates = maps.rates(own, t, v, y)
+        how = self._method
+        step = maps.transition(own, how, dt) if v is None or y is None else maps.jacobian(own, how, dt, t, v, y)
+        radius, rate = np.abs(eigen.eigenvalues(step)).max(axis=0), (self._dt * eigen.eigenvalues(rates).real).max(axis=0)
+        return np.broadcast_to(radius, members.shape), np.broadcast_to(rate, members.shape)
+
+    def limit(self, member: int) -> str:
+        """What to do, with the limit of a member where it is known in a moment."""
+        from .stability import maps
+        from .stability.limit import limit_of
+
+        if sum(maps.size(self._system)) > SMALL_SYSTEM:
+            return "use a shorter step; stability_limit says how short"
+        if self._dt < 0.0:
+            return "use a shorter step"
+        own, t, v, y = self._own(np.array([member]))
+        limit = float(np.max(limit_of(own, self._method, v, y, t).stable))
+        if limit == 0.0:
+            return f"{self._method.name} is stable with no step here, use another method"
+        return f"its stability limit is {limit:.6g}" if limit < self._dt else "use a shorter step"
+
+
+def _square(block: Array) -> float:
+    """The sum of the squares of all numbers; of one in a tenth of the time."""
+    if block.size == 1:
+        number = float(block.item())
+        return number * number
+    numbers = block.reshape(-1)
+    return float(np.einsum("i,i->", numbers, numbers))  # not by BLAS, whose threads wait where cores are busy
+
+
+def warn_of(run: Any, start: tuple[Array, Array] | None) -> None:
+    """Warn of members of a run with fixed steps that grew by its steps alone; ``start`` is None if it went on."""
+    if start is None or not is_heard(AccuracyWarning) or _is_tame(run, start):
+        return
+    if (grown := _of_run(run, start, run.steps)) is not None:
+        warnings.warn(grown.in_words(run.status.shape), AccuracyWarning, stacklevel=3)
+
+
+def of_last_piece(run: Any, start: tuple[Array, Array], steps: int) -> Growth | None:
+    """The members that grew by so many fixed steps alone, of which the last are those of the run."""
+    return None if _is_tame(run, start) else _of_run(run, start, steps)
+
+
+def _of_run(run: Any, start: tuple[Array, Array], steps: int) -> Growth | None:
+    v, y = (np.broadcast_to(block, end.shape) for block, end in zip(start, (run.v[-1], run.y[-1]), strict=True))
+    t = run.t0 + (run.start_step + run.steps - steps) * run.dt
+    return growth(run.system, run.method, run.dt, steps, t, (v, y), (run.v[-1], run.y[-1]))
+
+
+def _is_tame(run: Any, start: tuple[Array, Array]) -> bool:
+    """Whether no member has grown, which of nearly all runs is seen without a length of each.
+
+    All numbers at the end together are then not so much longer than the shortest member at the start.
+    """
+    least = _shortest(run, start)
+    return least > SQUARABLE and math.sqrt(_square(run.v[-1]) + _square(run.y[-1])) <= GROWN * least
+
+
+def _shortest(run: Any, start: tuple[Array, Array]) -> float:
+    """A length that each member has at least at the start; from rest the unit."""
+    if run.status.size == 1:
+        squares = _square(start[0]) + _square(start[1])
+        return math.sqrt(squares) if squares > 0.0 or any(block.any() for block in start) else 1.0
+    least = 0.0
+    for block, shape in zip(start, (run.system.v_shape, run.system.y_shape), strict=True):
+        sizes = np.abs(once_of(block))
+        sizes = sizes.max(axis=tuple(range(len(shape)))) if shape and block.size else sizes
+        least = max(least, float(sizes.min(initial=np.inf)) if block.size else 0.0)
+    if least == 0.0:
+        before = lengths(run.system, *start)
+        least = float(np.where(before > 0.0, before, 1.0).min(initial=np.inf))
+    return least
+
+
+def watched(
+    make: Callable[..., None], loop: Any, system: System, method: Method, dt: float, v: Array, y: Array
+) -> Callable[..., None]:
+    """``make``, the ``step`` of a world, which checks the state from time to time and warns once of growth by steps alone."""
+    if v.size + y.size > MOST_NUMBERS:
+        return make
+    start = np.array(v, dtype=np.float64), np.array(y, dtype=np.float64)
+    first, t0 = loop.step_number, loop.t
+    left = every = FIRST_CHECK
+
+    def check() -> int:
+        """How many steps there are until the next check; endless if there is none."""
+        nonlocal every
+        grown = growth(system, method, dt, loop.step_number - first, t0, start, (v, y))
+        if grown is not None:
+            warnings.warn(grown.in_words(v.shape[len(system.v_shape) :]), AccuracyWarning, stacklevel=3)
+            return ENDLESS
+        every *= 2
+        return every if every <= LAST_CHECK else ENDLESS
+
+    def step(n: int = 1) -> None:
+        """Make n steps in place."""
+        nonlocal left
+        make(n)
+        left -= n or 1  # None is one step, too
+        if left <= 0:
+            left = check()
+
+    return step

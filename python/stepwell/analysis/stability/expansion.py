@@ -1,0 +1,154 @@
+"""A method on the undamped oscillator as exact polynomials in Φ, and the series of its errors (Appendix A).
+
+The reference step is run with h = Φ, an unknown, and ω₀ = 1. P then has polynomials for elements, from which p, q = r₁² and the
+series of Ψ/Φ follow by the rules of power series; no number is rounded.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...model.methods import Method
+from ...model.methods import method as find_method
+from ...model.systems import Oscillator, System
+from . import maps
+from .numbers import Polynomial
+
+#: Terms that series in Φ² are computed with; the last is lost where one is divided by Φ².
+TERMS = 8
+
+#: A coefficient this small is the rounding of a method's own coefficients, and none of the series.
+NEGLIGIBLE = Fraction(1, 10**12)
+
+
+class Series(NamedTuple):
+    """A method on the undamped oscillator, as functions of Φ.
+
+    Attributes:
+        p: half the trace of P, a polynomial.
+        q: its determinant, a polynomial: r₁² of a conjugate pair.
+        ratio: Ψ/Φ, the first terms of its series.
+    """
+
+    p: Polynomial
+    q: Polynomial
+    ratio: Polynomial
+
+    def __repr__(self) -> str:
+        return f"<series in Φ: r₁² − 1 = {text(self.radius_terms())}, Ψ/Φ − 1 = {text(self.ratio_terms())}>"
+
+    def radius_terms(self, most: int = 2) -> list[tuple[int, Fraction]]:
+        """The first powers of Φ in r₁² − 1 of a conjugate pair, with their coefficients; none if it is 0."""
+        return _terms(self.q - 1, most)
+
+    def ratio_terms(self, most: int = 2) -> list[tuple[int, Fraction]]:
+        """The first powers of Φ in Ψ/Φ − 1 with their coefficients."""
+        return _terms(self.ratio - 1, most)
+
+
+def series(method: str | Method) -> Series:
+    """The exact polynomials and the series of a method on the undamped oscillator.
+
+    Args:
+        method: its name, or what ``stepwell.method`` returns.
+
+    Example:
+        >>> sw.stability.series("rk4")
+        <series in Φ: r₁² − 1 = −Φ⁶/72 + Φ⁸/576, Ψ/Φ − 1 = −Φ⁴/120 + Φ⁶/336>
+    """
+    return _series(find_method(method))
+
+
+def polynomials(system: System, method: Method) -> Any:
+    """P of a linear system as exact polynomials in the step, shape (n, n, *members) of ``Polynomial``."""
+    system = system.without_inputs()
+    dt: Any = Polynomial(0, 1)
+    v, y = maps.unit(system, system.batch)
+    exactly: Any = np.frompyfunc(Polynomial, 1, 1)
+    n = sum(maps.size(system))
+    s: Any = system.scaled(dt, (n, *system.batch))
+    blocks = method.steps.step(s, 0.0, 0.0, exactly(v), exactly(y))
+    return maps.rows(system, *(np.asarray(block, dtype=object) for block in blocks))
+
+
+@cache
+def _series(method: Method) -> Series:
+    (a, b), (c, d) = polynomials(Oscillator(), method)
+    p, q = (a + d) / 2, a * d - b * c
+    return Series(p, q, _ratio(p, q))
+
+
+def _ratio(p: Polynomial, q: Polynomial) -> Polynomial:
+    """The series of Ψ/Φ = arctan(√(q − p²)/p)/Φ.
+
+    With P(−Φ) = S·P(Φ)·S, S = diag(1, −1), both p and q are even in Φ; in u = Φ² the root is Φ·√w(u), w(0) = 1, and with
+    x = Φ·g(u) the arctangent is Φ·Σ (−1)ᵏ g²ᵏ⁺¹ uᵏ/(2k + 1).
+    """
+    p_u, q_u = _even(p), _even(q)
+    under = _minus(q_u, _times(p_u, p_u))
+    w = [*under[1:], Fraction(0)]
+    g = _times(_root(w), _inverse(p_u))
+    square = _times(g, g)
+    power, total = g, [Fraction(0)] * TERMS
+    for k in range(TERMS):
+        for i in range(TERMS - k):
+            total[i + k] += (-1) ** k * power[i] / (2 * k + 1)
+        power = _times(power, square)
+    ratio = [Fraction(0)] * (2 * TERMS - 3)
+    ratio[::2] = total[:-1]
+    return Polynomial(*ratio)
+
+
+def _even(p: Polynomial) -> list[Fraction]:
+    """A polynomial in Φ² by its powers of u."""
+    return [p[2 * k] for k in range(TERMS)]
+
+
+def _minus(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def _times(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
+    return [sum((a[i] * b[k - i] for i in range(k + 1)), Fraction(0)) for k in range(TERMS)]
+
+
+def _inverse(a: list[Fraction]) -> list[Fraction]:
+    found = [1 / a[0]]
+    for k in range(1, TERMS):
+        found.append(-sum((a[i] * found[k - i] for i in range(1, k + 1)), Fraction(0)) / a[0])
+    return found
+
+
+def _root(a: list[Fraction]) -> list[Fraction]:
+    """The square root of a series that begins with 1."""
+    found = [Fraction(1)]
+    for k in range(1, TERMS):
+        found.append((a[k] - sum((found[i] * found[k - i] for i in range(1, k)), Fraction(0))) / 2)
+    return found
+
+
+def _terms(p: Polynomial, most: int) -> list[tuple[int, Fraction]]:
+    terms = [(k, c) for k, c in enumerate(p.coefficients) if abs(c) > NEGLIGIBLE]
+    return terms[:most]
+
+
+SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def text(terms: list[tuple[int, Fraction]]) -> str:
+    """Terms as one writes them: −Φ⁶/72 + Φ⁸/576."""
+    written = ""
+    for power, c in terms:
+        sign = "−" if c < 0 else "+"
+        symbol = "Φ" + (str(power).translate(SUPERSCRIPTS) if power > 1 else "")
+        top, bottom = abs(c.numerator), c.denominator
+        if bottom > 100_000:
+            term = f"{float(abs(c)):.4g}·{symbol}"
+        else:
+            term = (f"{top}{symbol}" if top > 1 else symbol) + (f"/{bottom}" if bottom > 1 else "")
+        written += f" {sign} {term}" if written else f"{sign if c < 0 else ''}{term}"
+    return written or "0"

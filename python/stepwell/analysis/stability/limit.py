@@ -1,0 +1,273 @@
+"""``stability_limit``: the largest step below which no mode grows that should not, and the mode that grows beyond it.
+
+A linear system of more than two states is taken apart first (``parts``). Each part, or a system of two states, is then searched:
+the step is sought on a ladder of steps for all members at once; the first rung on which a mode grows and the one before it
+enclose the limit, of two states also a narrow window between rungs. Bisection finds it, and where an eigenvalue crosses the unit
+circle at an angle, the crossing itself is solved for. An eigenvalue that leaves the circle after a collision with another (False
+Euler at Φ = 2) does so with the square root of the excess, so there bisection alone is exact to rounding for two states; for
+more, the square of the growth is followed back to where it began. Where eigenvalues nearly meet, rounding would decide; they are
+computed in more digits (``exact``), on a ladder of wider rungs.
+"""
+
+from __future__ import annotations
+
+import warnings
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array, Shape
+from ...base.reprs import share
+from ...errors import AccuracyWarning, UnsupportedError
+from ...model.compatibility import fits_together
+from ...model.methods import Method
+from ...model.methods import method as find_method
+from ...model.systems import LinearSystem, Springs, System
+from ...model.systems.base import a_system
+from ...model.systems.own import OwnSystem
+from ..derivatives import traced
+from . import exact, maps
+from .analysis import given_state, state
+from .eigen import EPS
+from .limit_result import Mode, StabilityLimit, StabilityLimits, limits_of
+from .limit_search import NUMBERS_OF_AN_ELEMENT, Search, members_at_once
+from .parts import parts
+from .small_motions import free_numbers, lifted, linearised
+from .some_members import Batch
+
+#: A state is at rest if its rates are below so many roundings of the products that they are sums of.
+RESTS = 32.0 * EPS
+
+__all__ = ["Mode", "StabilityLimit", "StabilityLimits", "stability_limit"]
+
+
+def stability_limit(system: System, method: str | Method, *, at: Any = None, t: float = 0.0, v: Any = None, y: Any = None) -> Any:
+    """Find the largest step below which a method is stable for every mode of a system.
+
+    Stable means that every eigenvalue of the transition matrix stays in or on the unit circle for
+    all smaller steps. At the limit itself two eigenvalues may meet, as at Φ = 2 by False Euler, and the samples then grow
+    linearly. A method whose samples grow at the smallest steps is never stable, even if larger steps damp (Fehlberg's);
+    neither is a system whose exact solution grows.
+
+    Limits of systems of one or two states are exact to some 1e-15, whatever the units. So are those of systems that decompose
+    into such parts: filters in series, chains, and any linear system by a method that treats both blocks alike (Runge-Kutta). For
+    others the accuracy depends on the condition of the mode that becomes unstable, some 1e-9 of the step at worst. Multiple or
+    nearly multiple eigenvalues are computed in as many digits as needed. The result holds for the matrix as given: where n
+    eigenvalues meet, a change of its last digits moves them by the n-th root of that. With more than 32 states that cannot be
+    decomposed, or about a state that moves by equations which are not linear, the limit may stay undecided; see ``decided``.
+    Damping of less than a millionth of critical damping counts as none. Where a method grows in a window of steps and is stable
+    beyond it, the window is found for two states, however narrow; for others, a window narrower than 2 % of the step may be
+    missed, or 17 % where many digits are needed.
+
+    Args:
+        system: a linear system; parameters may be arrays. Its inputs do not matter: their contribution to the samples is bounded.
+        method: its name, or what ``stepwell.method`` returns.
+        at: a state (v, y) at which a nonlinear system is linearised. Of ``Springs`` it is the limit of small motions of what is
+            not fixed; ``safe_step`` is a bound of it for every state, and for any number of springs.
+        t: the time of that state.
+        v: in place of ``at``, the velocities of the state.
+        y: in place of ``at``, its coordinates.
+
+    Returns:
+        A ``StabilityLimit``, which is a float with a ``mode``; an array of them for a batch (``StabilityLimits``). It is NaN, and
+        its ``decided`` False, where rounding hides the limit between ``stable`` and ``grows``, in units of time.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: if the method cannot step the system, or the system is not linear and no state is given.
+
+    Warns:
+        AccuracyWarning: if a limit is not decided.
+
+    Example:
+        >>> sw.stability_limit(sw.LinearSystem([[-1, 0, 0], [1, -1, 0], [0, 1, -1]]), "rk4")
+        2.785293563405282
+    """
+    how = find_method(method)
+    at = given_state(at, v, y)
+    system = a_system(system).sized(*(at if isinstance(at, (tuple, list)) else ()))
+    fits_together(system, how)
+    t = checks.number("t", t)
+    if at is None and not system.linear:
+        bound = ", or ask its safe_step for a bound" if isinstance(system, Springs) else ""
+        raise UnsupportedError(f"at: {system!r} is not linear; give at=(v, y) for the limit of small disturbances there{bound}")
+    v, y = (None, None) if at is None else state("at", system, at)
+    found = limit_of(system, how, v, y, t)
+    if not np.all(found.decided):
+        _warn(system, how, found)
+    return found
+
+
+def limit_of(system: System, method: Method, v: Array | None = None, y: Array | None = None, t: float = 0.0) -> Any:
+    """``stability_limit`` of arguments that were checked, without a warning where it is not decided."""
+    members = system.batch if v is None or y is None else maps.together(system, np.asarray(1.0), v, y)
+    if v is None or y is None or system.linear:
+        _fit(sum(maps.size(system)), members)
+    elif isinstance(system, Springs) and system.control is None:
+        return _of_springs(system, method, v, y, members)
+    else:
+        _fit(sum(maps.size(system)), members)
+        if (motions := _linear_part(system, method, v, y, t, members)) is not None:
+            return _reshaped(system, limit_of(motions, method))
+    limits, grows, modes = _of_all(system, method, v, y, t, members)
+    spread: list[Any] = [np.array(np.broadcast_to(each, members)) for each in (limits, grows, modes)]
+    limits, grows, modes = spread
+    if not limits.shape:
+        return StabilityLimit(float(limits), modes[()], float(grows))
+    return limits_of(limits, modes, grows)
+
+
+#: Numbers that the limit of a member takes beside the shape of its mode.
+NUMBERS_OF_A_LIMIT = 250
+
+#: How often the matrix of small motions is there before the search begins: as it is made, cut or joined, and in the system.
+COPIES_OF_A_MATRIX = 4
+
+
+def _fit(n: int, members: Shape, of_matrix: int = 0) -> None:
+    """Raise if the limits of systems of n states do not fit in memory, with a matrix of so many numbers for each member."""
+    beside = 8.0 * NUMBERS_OF_AN_ELEMENT * n * n * min(prod(members), members_at_once(n))
+    numbers = NUMBERS_OF_A_LIMIT + 4 * n + COPIES_OF_A_MATRIX * of_matrix
+    checks.fits("the limits", numbers, members, "ask for fewer, or of fewer states", beside=beside)
+
+
+def _of_all(
+    system: System, method: Method, v: Array | None, y: Array | None, t: float, members: Shape
+) -> tuple[Array, Array, Any]:
+    """The limits of all members, the smallest steps known to grow, and the modes; so many members at once as memory allows."""
+    if system.linear or v is None or y is None:
+        system, v, y, t, members = system.without_inputs(), None, None, 0.0, system.batch
+    n, count = sum(maps.size(system)), prod(members)
+    at_once = members_at_once(n)
+    if count <= at_once:
+        return _of_some(Search(system, method, v, y, t))
+    limits, grows, modes = np.empty(count), np.empty(count), np.empty(count, dtype=object)
+    every = Batch(system, method, v, y, members)
+    for k in range(0, count, at_once):
+        some = np.arange(k, min(k + at_once, count))
+        own, own_v, own_y = every.of(some)
+        limits[some], grows[some], modes[some] = _of_some(Search(own, method, own_v, own_y, t))
+    return tuple(each.reshape(members) for each in (limits, grows, modes))  # type: ignore[return-value]
+
+
+def _of_some(search: Search) -> tuple[Array, Array, Any]:
+    """The same of the members of a search."""
+    if search.v is None and len(search.rates) > 2:
+        return _by_parts(search)
+    limits, grows = search.limits()
+    return limits, grows, search.modes(grows)[0]
+
+
+def _linear_part(system: System, method: Method, v: Array, y: Array, t: float, members: Shape) -> LinearSystem | None:
+    """A linear system whose steps are those of small disturbances of a state of own equations, or None.
+
+    There is one where the derivative of the rates is the same in all stages of a step: of equations that are linear but for what
+    drives them, and where nothing moves. Its eigenvalues are those of a step of a matrix, which are found however they meet.
+    """
+    if not isinstance(system, OwnSystem) or system.control is not None or system.rubbing is not None or system.contacts:
+        return None
+    of = traced.reading(system)
+    if not of.linear and of.time:
+        return None
+    n, count = sum(maps.size(system)), prod(members)
+    if count <= members_at_once(n):
+        matrix, rates = traced.matrix(system, "rates", None, members, v, y, t)
+        if not of.linear and not _is_at_rest(system, matrix, rates, v, y):
+            return None
+        return LinearSystem(matrix, velocities=maps.size(system)[0])
+    every = Batch(system, method, v, y, members)
+    found: list[Array] = []
+    for k in range(0, count, members_at_once(n)):
+        some = np.arange(k, min(k + members_at_once(n), count))
+        own, own_v, own_y = every.of(some)
+        assert own_v is not None
+        assert own_y is not None
+        matrix, rates = traced.matrix(own, "rates", None, some.shape, own_v, own_y, t)
+        if not of.linear and not _is_at_rest(own, matrix, rates, own_v, own_y):
+            return None
+        if not found:
+            _fit(n, members, n * n)
+        found.append(matrix)
+    return LinearSystem(np.concatenate(found, axis=-1).reshape(n, n, *members), velocities=maps.size(system)[0])
+
+
+def _is_at_rest(system: System, matrix: Array, rates: Array, v: Array, y: Array) -> bool:
+    """Whether the rates of all members are no more than the rounding of what they are sums of."""
+    members = rates.shape[1:]
+    blocks = (maps.spread(block, shape, members) for block, shape in ((v, system.v_shape), (y, system.y_shape)))
+    numbers = np.concatenate([block.reshape(-1, *members) for block in blocks])
+    rounding = RESTS * np.einsum("ij...,j...->i...", np.abs(matrix), np.abs(numbers))
+    return bool((np.abs(rates) <= rounding).all())
+
+
+def _reshaped(system: System, found: Any) -> Any:
+    """The limit of a linear system as that of one whose blocks have these shapes."""
+    if isinstance(found, StabilityLimit):
+        return StabilityLimit(found.stable, _shaped(system, found.mode), found.grows)
+    modes = np.empty(found.shape, dtype=object)
+    for index in np.ndindex(found.shape):
+        modes[index] = _shaped(system, found.modes[index])
+    return limits_of(found.stable, modes, found.grows)
+
+
+def _shaped(system: System, mode: Mode | None) -> Mode | None:
+    """A mode whose blocks have the shapes of the system's."""
+    return None if mode is None else mode._replace(v=mode.v.reshape(system.v_shape), y=mode.y.reshape(system.y_shape))
+
+
+def _warn(system: System, method: Method, found: Any) -> None:
+    """Warn of limits that are not decided, which are NaN."""
+    doubtful = np.atleast_1d(~np.asarray(found.decided))
+    stable, grows = (np.atleast_1d(each)[doubtful][0] for each in (found.stable, found.grows))
+    one = isinstance(found, StabilityLimit)
+    which = "" if one else f" of {share(int(doubtful.sum()), found.shape, found.size)}"
+    hint = (
+        f"systems of more than {exact.MAX_ROWS} states that cannot be decomposed are not computed in more digits"
+        if system.linear
+        else "if it is linear, or at rest there, give it as LinearSystem(sw.jacobian(…).matrix, velocities=…)"
+    )
+    warnings.warn(
+        f"the limit{which} of {system!r} by {method.name} is NaN: it is between dt = {stable:.6g} and {grows:.6g}, where "
+        f"rounding hides what grows, for eigenvalues nearly meet; {hint}",
+        AccuracyWarning,
+        stacklevel=3,
+    )
+
+
+def _of_springs(springs: Springs, method: Method, v: Array, y: Array, members: Shape) -> Any:
+    """The limit of small motions about a state."""
+    _fit(2 * len(free_numbers(springs)), members, sum(maps.size(springs)) ** 2)
+    found = limit_of(linearised(springs, v, y), method)
+    if isinstance(found, StabilityLimit):
+        return StabilityLimit(found.stable, lifted(springs, found.mode), found.grows)
+    modes = np.empty(found.shape, dtype=object)
+    for index in np.ndindex(found.shape):
+        modes[index] = lifted(springs, found.modes[index])
+    return limits_of(found.stable, modes, found.grows)
+
+
+def _by_parts(search: Search) -> tuple[Array, Array, Any]:
+    """The limits of a linear system, the smallest steps known to grow, and the modes, by the part that is the first to grow."""
+    n_v = maps.size(search.system)[0]
+    alike: dict[tuple[int, int], list[tuple[Shape, Array]]] = {}
+    for index in np.ndindex(search.members):
+        for matrix, velocities in parts(checks.member(search.rates, index), n_v, search.method):
+            alike.setdefault((len(matrix), velocities), []).append((index, matrix))
+    limits, grows = np.full(search.members, np.inf), np.full(search.members, np.inf)
+    modes, past = np.empty(search.members, dtype=object), np.ones(search.members, dtype=np.complex128)
+    best: dict[Shape, Any] = {}
+    for (_, velocities), each in alike.items():
+        stacked = np.stack([matrix for _, matrix in each], axis=-1)
+        part = Search(LinearSystem(stacked, velocities=velocities), search.method, None, None, 0.0)
+        found, above = part.limits()
+        own, leaving = part.modes(above)
+        for k, (index, _) in enumerate(each):
+            # Of those that are never stable what grows by itself is told, and else the fastest.
+            rank = (above[k], not part.grows_by_itself[k], -part.fastest[k])
+            if own[k] is not None and (index not in best or rank < best[index]):
+                best[index], modes[index], past[index] = rank, own[k], leaving[k]
+            limits[index], grows[index] = min(limits[index], found[k]), min(grows[index], above[k])
+    search.lift(modes, grows, past)
+    return limits, grows, modes

@@ -1,0 +1,82 @@
+"""Figures of matplotlib, and how they are written to files."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import ArgumentError, UnsupportedError
+from .checks import file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of that size in inches, on its own: pyplot's global state is not touched.
+
+    Raises:
+        UnsupportedError: if matplotlib is missing.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise UnsupportedError("plot: a picture needs matplotlib; pip install 'stepwell[chart]'") from None
+    figure = Figure(figsize=(width, height), dpi=100)
+    FigureCanvasAgg(figure)
+    # A notebook knows how to show matplotlib's figures only after pyplot was imported.
+    vars(figure)["_repr_png_"] = partial(png, figure)
+    return figure
+
+
+def png(figure: Figure, dpi: float | None = None) -> bytes:
+    """A figure as the bytes of a .png file in RGB: printers make what they like of a picture with transparency."""
+    from PIL import Image
+
+    drawn, written = BytesIO(), BytesIO()
+    figure.savefig(drawn, format="png", facecolor="white", dpi=dpi or "figure", pil_kwargs={"compress_level": 1})
+    with Image.open(drawn) as picture:
+        picture.convert("RGB").save(written, format="png", dpi=picture.info.get("dpi", (figure.dpi, figure.dpi)))
+    return written.getvalue()
+
+
+def drawn(path: str | Path | None, draw: Callable[[], Figure]) -> Figure:
+    """Draw a figure, and write it if there is a path; its ending says in which format.
+
+    Raises:
+        ArgumentError: before anything is drawn, if there is no such format or the file cannot be written.
+        UnsupportedError: if matplotlib is missing.
+    """
+    if path is None:
+        return draw()
+    known = sorted(new_figure(1.0, 1.0).canvas.get_supported_filetypes())
+    if (path := file("path", path)).suffix.lower().removeprefix(".") not in known:
+        raise ArgumentError(f"path: expected an ending of a picture, one of {', '.join(known)}, got {str(path)!r}")
+    figure = draw()
+    if path.suffix.lower() == ".png":
+        path.write_bytes(png(figure))
+    else:
+        figure.savefig(path, facecolor="white")
+    return figure
+
+
+class Drawn(ABC):
+    """A chart of which there is one picture."""
+
+    @abstractmethod
+    def draw(self) -> Figure:
+        """The picture, on a new figure."""
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw it, and write it to ``path`` if given; the ending says in which format.
+
+        Raises:
+            ArgumentError: if there is no such format.
+            UnsupportedError: if matplotlib is missing.
+        """
+        return drawn(path, self.draw)

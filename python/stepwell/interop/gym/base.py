@@ -1,0 +1,194 @@
+"""What all environments have in common: a world of many members, and one of them by itself."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from ...base import checks
+from ...base.arrays import Array
+from ...errors import ArgumentError, ShapeError, UnsupportedError
+from ...model.methods import Method
+from ...runs.world import World
+
+Observations = np.ndarray[Any, np.dtype[np.float32]]
+Truths = np.ndarray[Any, np.dtype[np.bool_]]
+
+
+class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are not needed to check this
+    """Environments that are stepped together, as the members of one ``World``.
+
+    An environment whose episode ended begins anew at the next call of ``step``, whose action for it is ignored
+    (``AutoresetMode.NEXT_STEP``). A kind of environment is a subclass with the spaces of one, which makes the world, draws
+    states, lets actions act, and says what is seen and rewarded; see docs/howto/interop.md.
+
+    Args:
+        num_envs: how many.
+        method: by which the world is stepped: its name, or what ``stepwell.method`` returns.
+        dt: the step of the method, in seconds.
+        substeps: how many of these steps there are for an action.
+        max_episode_steps: after how many actions an episode is truncated; None for never.
+        render_mode: None; there are no pictures.
+        dtype: ``"float64"`` or ``"float32"``, in which the world is stepped. What is seen and rewarded is computed in float64 of
+            the states; what is seen is float32 in any case.
+
+    Attributes:
+        world: the ``World``; its arrays are the states.
+        steps: how many actions each environment has had since it began.
+        dtype: NumPy's type of the world's arrays, for ``make_world``.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+        UnsupportedError: if ``make_world`` makes arrays of another type than was asked for.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+    #: The usual length of an episode.
+    episode_steps: ClassVar[int]
+    #: The spaces of one environment.
+    one_observation: ClassVar[Any]
+    one_action: ClassVar[Any]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        method: str | Method,
+        dt: float,
+        substeps: int,
+        max_episode_steps: int | None,
+        render_mode: None = None,
+        dtype: Any = "float64",
+    ) -> None:
+        if render_mode is not None:
+            raise ArgumentError(f"render_mode: expected None, for there are no pictures, got {checks.short(render_mode)}")
+        self.num_envs = checks.count("num_envs", num_envs, 1)
+        # Bounds of the observations, states, forces, draws, rewards, and the results of a step.
+        seen = int(np.prod(self.one_observation.shape or (1,)))
+        checks.fits("num_envs: states and observations", 8 * seen + 16, (self.num_envs,), "take fewer")
+        self.substeps = checks.count("substeps", substeps, 1)
+        self.max_episode_steps = None if max_episode_steps is None else checks.count("max_episode_steps", max_episode_steps, 1)
+        self.render_mode = render_mode
+        self.single_observation_space, self.single_action_space = self.one_observation, self.one_action
+        self.observation_space = batch_space(self.one_observation, self.num_envs)
+        self.action_space = batch_space(self.one_action, self.num_envs)
+        self.dtype: np.dtype[Any] = np.dtype(np.float32 if checks.is_single(dtype) else np.float64)
+        self.world = self.make_world(method, checks.number("dt", dt, positive=True, unit="seconds"))
+        if self.world.y.dtype != self.dtype:
+            raise UnsupportedError(
+                f"dtype: {type(self).__name__} makes a world of {self.world.y.dtype}, and {self.dtype} was asked for; let its "
+                f"make_world make arrays of self.dtype, and World(…, dtype=self.dtype)"
+            )
+        self.steps = np.zeros(self.num_envs, dtype=np.int64)
+        self._begun, self._over = False, np.zeros(self.num_envs, dtype=np.bool_)
+
+    @property
+    def states(self) -> tuple[Array, Array]:
+        """The blocks v and y in float64, to compute with; the world's own arrays, not copies, if it is stepped in float64."""
+        return np.asarray(self.world.v, np.float64), np.asarray(self.world.y, np.float64)
+
+    @abstractmethod
+    def make_world(self, method: str | Method, dt: float) -> World:
+        """The world, at any state, of arrays of ``self.dtype``."""
+
+    @abstractmethod
+    def draw(self, count: int) -> tuple[Array, Array]:
+        """Random states to begin with, v and y, of so many members."""
+
+    @abstractmethod
+    def act(self, actions: Any) -> None:
+        """Let actions act: called before each step of the method."""
+
+    @abstractmethod
+    def observe(self) -> Array:
+        """What is seen of the states, shape (num_envs, numbers)."""
+
+    def rewards_before(self, actions: Any) -> Array | None:
+        """The rewards, where they are of the states before a step; else None."""
+        return None
+
+    @abstractmethod
+    def judge(self, actions: Any) -> tuple[Array, Truths]:
+        """The rewards of the states after a step (not read if there are others), and which of them end an episode."""
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observations, dict[str, Any]]:
+        """Begin anew; see Gymnasium. ``options={"reset_mask": mask}`` does so for some of them only."""
+        super().reset(seed=seed)
+        mask = (options or {}).get("reset_mask")
+        which = np.ones(self.num_envs, dtype=np.bool_) if mask is None else checks.as_array("reset_mask", mask)
+        if which.shape != (self.num_envs,) or which.dtype != np.bool_:
+            raise ShapeError(f"reset_mask: expected {self.num_envs} booleans, got {which.dtype} of shape {which.shape}")
+        self._begin(which)
+        self._begun = True
+        return self._seen(), {}
+
+    def step(self, actions: Any) -> tuple[Observations, Array, Truths, Truths, dict[str, Any]]:
+        """Act, and make ``substeps`` steps; see Gymnasium."""
+        if not self._begun:
+            raise ArgumentError("step: expected after reset(), which draws the states to begin with")
+        actions = checks.as_array("actions", actions)
+        if actions.shape != self.action_space.shape or actions.dtype.kind not in "biuf":
+            raise ShapeError(f"actions: expected shape {self.action_space.shape}, got {actions.dtype} of shape {actions.shape}")
+        before = self.rewards_before(actions)
+        for _ in range(self.substeps):
+            self.act(actions)
+            self.world.step()
+        self.steps += 1
+        rewards, terminated = self.judge(actions)
+        rewards = rewards if before is None else before
+        late = 2**62 if self.max_episode_steps is None else self.max_episode_steps
+        truncated: Truths = self.steps >= late
+        if self._over.any():
+            self._begin(over := self._over.copy())
+            rewards[over] = 0.0
+            terminated[over] = truncated[over] = False
+        self._over = terminated | truncated
+        return self._seen(), rewards, terminated, truncated, {}
+
+    def _begin(self, which: Truths) -> None:
+        v, y = self.draw(int(which.sum()))
+        self.world.v[..., which] = v
+        self.world.y[..., which] = y
+        self.steps[which] = 0
+        self._over[which] = False
+
+    def _seen(self) -> Observations:
+        # Rounding to float32 may pass a bound by one unit of its last place.
+        space = self.one_observation
+        return np.clip(self.observe().astype(np.float32, copy=False), space.low, space.high)
+
+
+class WorldEnv(gymnasium.Env):  # type: ignore[misc]
+    """One environment by itself, with Gymnasium's interface for one: its states have the bits of those in a vector of one.
+
+    Args:
+        options: those of the vector environment, ``vector``, except ``num_envs``.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    #: Its kind for many.
+    vector: ClassVar[type[WorldVectorEnv]]
+
+    def __init__(self, **options: Any) -> None:
+        # How long an episode is, Gymnasium's wrapper tells.
+        self.many = self.vector(1, **{"max_episode_steps": None} | options)
+        self.observation_space, self.action_space = self.many.single_observation_space, self.many.single_action_space
+        self.render_mode = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observations, dict[str, Any]]:
+        """Begin anew; see Gymnasium."""
+        super().reset(seed=seed)
+        self.many.np_random = self.np_random  # which is drawn from, whichever of them is asked
+        observations, told = self.many.reset(options=options)
+        return observations[0], told
+
+    def step(self, action: Any) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
+        """Act; see Gymnasium. After the end of an episode it goes on until ``reset``."""
+        self.many._over[:] = False
+        observations, rewards, terminated, truncated, told = self.many.step(checks.as_array("action", action)[np.newaxis])
+        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), told

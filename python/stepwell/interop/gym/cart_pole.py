@@ -1,0 +1,109 @@
+"""A cart that balances a pole."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.spaces import Box, Discrete
+
+from ...base.arrays import Array
+from ...model.equations import system
+from ...model.methods import Method
+from ...runs.world import World
+from .base import Truths, WorldEnv, WorldVectorEnv
+
+#: The push of an action, in newtons.
+PUSH = 10.0
+#: Where an episode ends: the place of the cart in metres, and the angle of the pole in rad.
+END, TILT = 2.4, np.radians(12.0)
+#: The most that is seen of speeds, in metres and rad per second; an episode ends long before.
+MAX_SPEED = 100.0
+#: Episodes begin with all four numbers between this and its negative.
+NEAR_REST = 0.05
+
+
+@system(blocks=2, shape=((2,), (3,)))
+def cart_pole(
+    t: Any, v: Any, y: Any, *, gravity: Any = 9.8, cart: Any = 1.0, pole: Any = 0.1, half_length: Any = 0.5
+) -> tuple[Any, Any]:
+    """A cart on a rail with a pole on a hinge (Barto, Sutton, Anderson 1983; without friction, with the force of Florian 2005).
+
+    v is the velocity of the cart and the angular velocity of the pole, y the place of the cart, the angle of the pole from
+    upright, and the force on the cart. The force is in the state because it changes from step to step and not within one.
+    """
+    speed, turning = v
+    _, angle, force = y
+    whole, moment = cart + pole, pole * half_length
+    cosine, sine = np.cos(angle), np.sin(angle)
+    pull = (force + moment * turning**2 * sine) / whole
+    bending = (gravity * sine - cosine * pull) / (half_length * (4.0 / 3.0 - pole * cosine**2 / whole))
+    return [pull - moment * bending * cosine / whole, bending], [speed, turning, 0.0]
+
+
+class CartPoleVectorEnv(WorldVectorEnv):
+    """Carts that balance poles. Task, numbers and rewards are those of ``CartPole-v1``.
+
+    Observed are the place and velocity of the cart, and the angle and angular velocity of the pole; the actions are 0 for a push
+    to the left and 1 for one to the right. The reward is 1 for each step. An episode ends where the cart is more than 2.4 m off,
+    or the pole more than 12 degrees. ``method="standard_euler"`` makes the steps of Gymnasium's environment, up to rounding.
+
+    Example:
+        >>> import gymnasium, stepwell.interop.gym
+        >>> envs = gymnasium.make_vec("stepwell/CartPole-v0", num_envs=1000, method="rk4")
+        >>> seen, _ = envs.reset(seed=1)
+        >>> seen, rewards, terminated, truncated, _ = envs.step((seen[:, 2] > 0).astype(int))
+        >>> seen.shape, float(rewards.sum())
+        ((1000, 4), 1000.0)
+    """
+
+    episode_steps = 500
+    one_observation = Box(
+        -np.array([2 * END, MAX_SPEED, 2 * TILT, MAX_SPEED], np.float32),
+        np.array([2 * END, MAX_SPEED, 2 * TILT, MAX_SPEED], np.float32),
+    )
+    one_action = Discrete(2)
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        method: str | Method = "rk4",
+        dt: float = 0.02,
+        substeps: int = 1,
+        max_episode_steps: int | None = episode_steps,
+        render_mode: None = None,
+        dtype: Any = "float64",
+    ) -> None:
+        how: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
+        super().__init__(num_envs, **how, render_mode=render_mode, dtype=dtype)
+
+    def make_world(self, method: str | Method, dt: float) -> World:
+        """Carts with poles."""
+        v, y = np.zeros((2, self.num_envs), self.dtype), np.zeros((3, self.num_envs), self.dtype)
+        return World(cart_pole(), method, v=v, y=y, dt=dt, dtype=self.dtype)
+
+    def draw(self, count: int) -> tuple[Array, Array]:
+        """Near rest."""
+        drawn = self.np_random.uniform(-NEAR_REST, NEAR_REST, (4, count))
+        return drawn[[1, 3]], np.stack([drawn[0], drawn[2], np.zeros(count)])
+
+    def act(self, actions: Any) -> None:
+        """Push the carts."""
+        self.world.y[2] = np.where(actions > 0, PUSH, -PUSH)
+
+    def observe(self) -> Array:
+        """Place, velocity, angle, angular velocity."""
+        v, y = self.world.v, self.world.y
+        return np.stack([y[0], v[0], y[1], v[1]], axis=-1)
+
+    def judge(self, actions: Any) -> tuple[Array, Truths]:
+        """One for each step."""
+        place, angle = np.abs(self.states[1][:2])
+        return np.ones(self.num_envs), (place > END) | (angle > TILT)
+
+
+class CartPoleEnv(WorldEnv):
+    """One of ``CartPoleVectorEnv``, by itself."""
+
+    vector: ClassVar[type[WorldVectorEnv]] = CartPoleVectorEnv

@@ -1,0 +1,110 @@
+"""Two rods, one hanging from the other, and a motor between them."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.spaces import Box
+
+from ...base.arrays import Array
+from ...model.controls import Projection
+from ...model.methods import Method
+from ...model.systems import Rods
+from ...reference.functions import cos, sin
+from ...runs.world import World
+from .base import Truths, WorldEnv, WorldVectorEnv
+
+#: Gravity, in SI units; masses and lengths of the rods are 1.
+GRAVITY = 9.8
+#: The most that the motor can do, in newton metres, and the most that is seen of angular velocities, in rad per second.
+MAX_TORQUE, MAX_SPEED = 1.0, 50.0
+#: The tip is to be lifted above the anchor by this, in metres.
+GOAL = 1.0
+#: Episodes begin with angles, and angular velocities, between this and its negative.
+NEAR_REST = 0.1
+
+
+class DoubleRodVectorEnv(WorldVectorEnv):
+    """Double pendulums with a motor at the joint between the rods, which is to lift the tip. The task is that of ``Acrobot-v1``.
+
+    Each rod has its mass at its lower end. Observed are cosine and sine of the angles of both rods from straight down, and their
+    angular velocities (held to ±50 where they are shown, not where they act); the action is a torque of −1 to 1 on the second rod
+    and its opposite on the first. The reward is −1 for each step until the tip is 1 m above the anchor, which ends the episode.
+
+    Example:
+        >>> import gymnasium, stepwell.interop.gym
+        >>> envs = gymnasium.make_vec("stepwell/DoubleRod-v0", num_envs=100, substeps=4)
+        >>> seen, _ = envs.reset(seed=1)
+        >>> seen, rewards, terminated, truncated, _ = envs.step(envs.action_space.sample())
+        >>> seen.shape, float(rewards.sum())
+        ((100, 6), -100.0)
+    """
+
+    episode_steps = 500
+    one_observation = Box(-np.array([1.0] * 4 + [MAX_SPEED] * 2, np.float32), np.array([1.0] * 4 + [MAX_SPEED] * 2, np.float32))
+    one_action = Box(-MAX_TORQUE, MAX_TORQUE, (1,), np.float32)
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        method: str | Method = "rk4",
+        dt: float = 0.05,
+        substeps: int = 1,
+        max_episode_steps: int | None = episode_steps,
+        render_mode: None = None,
+        dtype: Any = "float64",
+    ) -> None:
+        how: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
+        super().__init__(num_envs, **how, render_mode=render_mode, dtype=dtype)
+
+    def make_world(self, method: str | Method, dt: float) -> World:
+        """Two rods that hang from an anchor."""
+        v, self._force = (np.zeros((2, 2, self.num_envs), self.dtype) for _ in range(2))
+        y = np.zeros_like(v)
+        y[:, 1] = [[-1.0], [-2.0]]
+        rods = Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0, gravity=GRAVITY)
+        acting: Any = {"force": self._force, "control": Projection("length")}
+        return World(rods, method, v=v, y=y, dt=dt, dtype=self.dtype, **acting)
+
+    def draw(self, count: int) -> tuple[Array, Array]:
+        """Near rest."""
+        angles, turning = self.np_random.uniform(-NEAR_REST, NEAR_REST, (2, 2, count))
+        # Rows of both are the rods, then x and height.
+        along = np.stack([sin(angles), -cos(angles)], axis=1)
+        across = np.stack([cos(angles), sin(angles)], axis=1) * turning[:, np.newaxis]
+        return np.stack([across[0], across[0] + across[1]]), np.stack([along[0], along[0] + along[1]])
+
+    def _rods(self) -> tuple[Array, Array]:
+        """Where the rods point, and how fast they turn."""
+        v, y = self.states
+        along, across = np.stack([y[0], y[1] - y[0]]), np.stack([v[0], v[1] - v[0]])
+        square = along[:, 0] * along[:, 0] + along[:, 1] * along[:, 1]
+        turning = (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]) / square
+        return along / np.sqrt(square)[:, np.newaxis], turning
+
+    def act(self, actions: Any) -> None:
+        """Turn the rods against each other."""
+        along, _ = self._rods()
+        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        torque = np.clip(actions[:, 0].astype(np.float64), -MAX_TORQUE, MAX_TORQUE)
+        # A torque on a rod of length 1 is a pair of forces at its ends, across it. One end of the first rod is the anchor.
+        self._force[1] = torque * across[1]
+        self._force[0] = -torque * across[1] - torque * across[0]
+
+    def observe(self) -> Array:
+        """Cosines and sines of the angles, and angular velocities."""
+        along, turning = self._rods()
+        return np.stack([-along[0, 1], along[0, 0], -along[1, 1], along[1, 0], *turning], axis=-1)
+
+    def judge(self, actions: Any) -> tuple[Array, Truths]:
+        """Whether the tip is up."""
+        up = self.world.y[1, 1] > GOAL
+        return np.where(up, 0.0, -1.0), up
+
+
+class DoubleRodEnv(WorldEnv):
+    """One of ``DoubleRodVectorEnv``, by itself."""
+
+    vector: ClassVar[type[WorldVectorEnv]] = DoubleRodVectorEnv

@@ -1,0 +1,1 @@
+"""What a user describes: systems, own equations, inputs, controls, surfaces, methods."""

@@ -1,0 +1,145 @@
+"""What goes with what: systems, methods, controls, and runs that continue others."""
+
+from __future__ import annotations
+
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ..base import checks
+from ..errors import ArgumentError, DTypeError, UnsupportedError
+from .controls import Control, EnergyControl, NormControl
+from .methods import Method
+from .methods import methods as every_method
+from .systems import Sampled, System
+
+
+def fits_together(system: System, method: Method) -> None:
+    """Raise if the method cannot do the system."""
+    if method.has_series and getattr(system, "push", None) is not None:
+        raise UnsupportedError(
+            f"control: {method.name} goes with projections, not with {system.keeper!r}, which is a part of the rates; use dop853"
+        )
+    if not method.needs_acceleration:
+        return
+    if not system.second_order:
+        raise UnsupportedError(f"{method.name} needs a second-order system, ÿ = a(t, y); {system!r} is not one")
+    if (term := system.uncontrolled.velocity_term) is not None:
+        raise UnsupportedError(
+            f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {term}; "
+            f"use false_euler{'' if term == 'forces that do' else f', or leave {term} out'}"
+        )
+    if system.keeper is not None and method.carry is not None:
+        raise UnsupportedError(
+            f"control: {method.name} goes on with {method.carry} in place of v, so it cannot be combined with {system.keeper!r}, "
+            f"which changes v between steps; use pefrl or false_euler"
+        )
+
+
+def not_of_a_step(control: Any) -> None:
+    """Raise if a control cannot go with steps whose length changes."""
+    if getattr(control, "relative", None) is not None and control.gain is None:
+        raise UnsupportedError(
+            f"tolerance: {control!r} relates its gain to steps of fixed length; give gain in place of relative"
+        )
+    if getattr(control, "of_a_step", False):
+        raise UnsupportedError(
+            f"tolerance: {control!r} is relative to steps of fixed length; use a projection, which goes with any steps"
+        )
+
+
+def forced(system: System) -> None:
+    """Raise if a system has no v̇ that a force could be added to."""
+    if prod(system.v_shape) == 0:
+        raise UnsupportedError(f"force: it is added to the rates of v, and {system!r} has no v; give it an input or a parameter")
+
+
+def velocities(system: System, v: Any) -> Any:
+    """The velocities that were given; a system without velocities needs none."""
+    if v is None and system.v_shape == (0,):
+        return 0.0
+    if v is None:
+        raise ArgumentError(
+            f"v: expected the velocities at the start, got None; {system!r} has velocities, unlike a system of first order"
+        )
+    return v
+
+
+def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) -> None:
+    """Raise if what ``resume`` says of the run so far is of another method, whose carry means something else, or another step."""
+    anew = "to go on with another, start anew from its last state: v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
+    if dt_before is not None and dt != (so_far := checks.number("dt_before", dt_before, unit="units of time")):
+        raise ArgumentError(f"dt: expected the step of the run that goes on, dt_before = {so_far!r}, got {dt!r}; {anew}")
+    if carried_by is not None and checks.known("carried_by", carried_by, [each.name for each in every_method()]) != method.name:
+        raise ArgumentError(
+            f"method: expected {str(carried_by)!r}, by which the run goes on and whose carry was given, got {method.name!r}; "
+            f"{anew}"
+        )
+
+
+def changes_on(events: Any, changed_by: Any) -> None:
+    """Raise if a run goes on without the events that changed the state so far: another motion would follow, without a word."""
+    if changed_by is None:
+        return
+    names = checks.several("changed_by", changed_by, "names of events")
+    if wrong := [each for each in names if not isinstance(each, str)]:
+        raise DTypeError(f"changed_by: expected names of events, as run.resume has them, got {checks.short(wrong[0])}")
+    if events is None and names:
+        raise ArgumentError(
+            f"events: expected the events of the run that goes on, of which {', '.join(names)} changed the state so far, got "
+            f"None; give them again, or events=[] to go on without"
+        )
+
+
+def fits_own_times(system: System, single: bool) -> None:
+    """Raise if members of a system cannot have times of their own."""
+    if single and system.has_time:
+        raise UnsupportedError(
+            "t0: one for each member goes with float64, for in float32 t0 + k·dt of each would be rounded twice; make a run for "
+            "each t0"
+        )
+
+
+def goes_back(system: System, control: Any) -> None:
+    """Raise if a system has no past that steps back in time could find."""
+    if system.rubbing is not None:
+        raise UnsupportedError(
+            f"dt: below zero time runs back, and friction that sticks forgets how fast it was: {system!r} at rest has many "
+            f"pasts; use dt above zero"
+        )
+    if any(surface.way != "spring" for surface in system.contacts):
+        raise UnsupportedError(
+            f"dt: below zero time runs back, and a bounce is found where a step ends behind a surface, as late as time goes on; "
+            f'got {system!r}. Use way="spring"; or of a motion without friction and loss step −v with dt above zero'
+        )
+    control = system.keeper if control is None else control
+    if getattr(control, "pushes", False) or isinstance(control, (Control, NormControl)):
+        raise UnsupportedError(
+            f"dt: below zero time runs back, and {control!r} drives back to its target as time goes on, so away from it as time "
+            f"goes back; use a projection"
+        )
+
+
+def goes_on_by_a_rule(system: System) -> None:
+    """Raise if an input cannot be carried by a power of the transition matrix."""
+    for name, given in system.given_inputs().items():
+        if isinstance(given, Sampled) and not given.constant:
+            raise UnsupportedError(
+                f"form: many steps are one power only if the inputs go on by a rule, as constants and sinusoids do, but {name} "
+                f"changes from sample to sample; use form='matrix' or 'direct'"
+            )
+
+
+def goes_with_series(system: System, control: Any) -> None:
+    """Raise unless the rates are as smooth within a step as the last terms of a series say."""
+    instead = "use another method, such as dop853"
+    if system.samples[0] < np.inf:
+        raise UnsupportedError(f"tolerance: a series does not see that samples of an input change within a step; {instead}")
+    if isinstance(control or system.control, EnergyControl):
+        raise UnsupportedError(f"tolerance: EnergyControl pushes once a step, and a series has long steps; {instead}")
+    if system.chooses:
+        raise UnsupportedError(
+            f"tolerance: {system!r} chooses between values (np.where, abs, minimum, floor, …), and a series does not see that "
+            f"another one is chosen within a step; {instead}"
+        )

@@ -1,0 +1,294 @@
+"""``stepwell.system``: a user's function becomes a kind of system."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any, Literal, get_args, overload
+
+import numpy as np
+
+from ...base import checks, registry
+from ...base.arrays import Shape
+from ...base.immutable import frozen
+from ...errors import ArgumentError, DTypeError, UnknownNameError
+from ..inputs import Sampled, Sinusoid
+from .invariants import Invariant, invariant
+
+#: What the error of an adaptive step is relative to.
+Scale = Literal["component", "row", "block"]
+SCALES = get_args(Scale)
+
+
+class Definition:
+    """A kind of system, defined by a function; ``stepwell.system`` returns it. Called with parameters it gives a ``System``.
+
+    Attributes:
+        function: the function.
+        order: 1 for ẏ, 2 for v̇ with ẏ = v.
+        blocks: 2 if the function gives (v̇, ẏ).
+        shape: the declared shapes of the blocks v and y; None where the state tells.
+        quick_sines: whether sine and cosine are those of the built-in systems.
+        scale: what the error of an adaptive step is relative to: each "component", "row" or "block".
+        parameters: names and defaults.
+        own_axes: how many axes of its own each parameter has, as its default does.
+        invariants: the declared invariants, by name.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        order: int,
+        blocks: int,
+        shape: tuple[Any, Any],
+        quick_sines: bool = False,
+        scale: str = "component",
+    ) -> None:
+        self.function, self.order, self.blocks, self.shape = function, order, blocks, shape
+        self.quick_sines, self.scale = quick_sines, scale
+        self.__name__ = self.name = function.__name__
+        self.__doc__, self.__module__, self.__qualname__ = function.__doc__, function.__module__, function.__qualname__
+        self.__wrapped__ = function
+        self.parameters = _parameters(function, 3 if self.has_v else 2)
+        self.own_axes = {name: 0 if _changes(default) else np.ndim(default) for name, default in self.parameters.items()}
+        self.invariants: dict[str, Invariant] = {}
+
+    @property
+    def has_v(self) -> bool:
+        """Whether the function takes v."""
+        return self.order == 2 or self.blocks == 2
+
+    def __call__(self, /, **given: Any) -> Any:
+        """The system with these parameters; others have their defaults.
+
+        Args:
+            given: by name: a number, an array over the batch (whose axes come after the parameter's own, if the default has
+                some), a ``Sinusoid``, a ``Sampled``, or a function of the time in NumPy style.
+
+        Raises:
+            ArgumentError: if there is no such parameter, or a value is not a finite number.
+        """
+        for name in given:
+            if name not in self.parameters:
+                known = ", ".join(self.parameters) or "none"
+                raise UnknownNameError(f"{self.name}: there is no parameter {checks.short(name)}. Known: {known}.")
+        return registry.task("own_system")(self, {**self.parameters, **given})
+
+    def invariant(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Declare a quantity that is constant in the exact solution; a decorator.
+
+        By the name of the function it can then be recorded, charted, and kept constant by ``Control`` or ``Projection``. Its
+        gradient is derived.
+
+        Args:
+            function: ``f(v, y, *, parameters)``, or ``f(y, *, parameters)`` for a first-order system, that returns one number;
+                it may take the time before the state, as the rates do, but not depend on it. Parameters are those of the system,
+                by name. ``run.energy`` is the invariant called ``energy``.
+
+        Returns:
+            The function.
+
+        Raises:
+            ArgumentError: if the system has no such parameter.
+
+        Example:
+            >>> @sw.system
+            ... def pendulum(t, v, y, *, omega=1.0):
+            ...     return -omega**2 * np.sin(y)
+            >>> @pendulum.invariant
+            ... def energy(v, y, *, omega):
+            ...     return 0.5 * v**2 + omega**2 * (1 - np.cos(y))
+        """
+        made = invariant(self, function)
+        self.invariants[made.name] = made
+        return function
+
+    def __repr__(self) -> str:
+        return f"<system {self.name}({', '.join(f'{name}={value!r}' for name, value in self.parameters.items())})>"
+
+    def __deepcopy__(self, memo: Any) -> Definition:
+        return self  # it is immutable
+
+    def __copy__(self) -> Definition:
+        return self
+
+    def __reduce__(self) -> Any:
+        found: Any = sys.modules.get(self.__module__)
+        for part in self.__qualname__.split("."):
+            found = getattr(found, part, None)
+        if found is not self:
+            raise ArgumentError(
+                f"{self.name}: an own system is pickled by the name of its function, so expected one at the top of a module, "
+                f"got {self.__module__}.{self.__qualname__}"
+            )
+        return _found, (self.__module__, self.__qualname__)
+
+
+def _found(module: str, name: str) -> Any:
+    """A definition, by reference."""
+    import importlib
+
+    found: Any = importlib.import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def _changes(value: Any) -> bool:
+    """Whether a parameter changes in time."""
+    return isinstance(value, (Sinusoid, Sampled)) or callable(value)
+
+
+#: Names of the parameters of functions, by what they follow from; and of how many functions.
+_NAMES: dict[Any, tuple[str, ...]] = {}
+MOST_NAMES = 1024
+
+
+def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
+    """Names and defaults of the arguments after the time and the state."""
+    # The attributes of a function, such as the one that a decorator wraps, may say that its arguments are others.
+    if isinstance(function, FunctionType) and not vars(function):
+        parameters = _known(function, state)
+    else:
+        parameters = _checked(function, state)
+    for parameter, default in parameters.items():
+        if not _changes(default):
+            numbers = checks.numbers(f"{function.__name__}: default of {parameter}", default)
+            if numbers.ndim:
+                parameters[parameter] = frozen(parameter, numbers)
+    return parameters
+
+
+def _known(function: FunctionType, state: int) -> dict[str, Any]:
+    """The same of a function whose code alone tells its arguments, which are looked at once."""
+    code, positional, named = function.__code__, function.__defaults__ or (), function.__kwdefaults__ or {}
+    key = code, len(positional), tuple(named), state
+    if (names := _NAMES.get(key)) is None:
+        if len(_NAMES) >= MOST_NAMES:
+            _NAMES.clear()
+        names = _NAMES[key] = tuple(_checked(function, state))
+    last = dict(zip(code.co_varnames[code.co_argcount - len(positional) : code.co_argcount], positional, strict=True))
+    return {name: named[name] if name in named else last[name] for name in names}
+
+
+def _checked(function: Callable[..., Any], state: int) -> dict[str, Any]:
+    """The same as ``inspect`` tells them, which takes as long as all else; raise if these are no arguments of such a function."""
+    name = function.__name__
+    expected = "(t, v, y, *, …)" if state == 3 else "(t, y, *, …)"
+    signature = inspect.signature(function)
+    given = list(signature.parameters.values())
+    positional = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
+    if len(positional) < state or any(each.default is not each.empty for each in positional[:state]):
+        first_order = "; for ẏ = f(t, y) write sw.system(order=1)" if state == 3 and len(positional) == 2 else ""
+        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))}){first_order}")
+    checks.argument_order(name, function, ("t", "v", "y") if state == 3 else ("t", "y"), signature)
+    parameters = {}
+    for each in given:
+        if each in positional[:state]:
+            continue
+        if each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD, each.POSITIONAL_ONLY):
+            raise ArgumentError(f"{name}: expected parameters with names, {expected}, got {each}")
+        if each.default is each.empty:
+            raise ArgumentError(f"{name}: expected a default of the parameter {each.name}, such as {each.name}=1.0")
+        parameters[each.name] = each.default
+    return parameters
+
+
+@overload
+def system(function: Callable[..., Any], /) -> Definition: ...
+@overload
+def system(
+    *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False, scale: Scale = "component"
+) -> Callable[[Callable[..., Any]], Definition]: ...
+def system(
+    function: Any = None,
+    /,
+    *,
+    order: int = 2,
+    blocks: int = 1,
+    shape: Any = None,
+    quick_sines: bool = False,
+    scale: Scale = "component",
+) -> Any:
+    """Make a kind of system of a function: your own equations, in NumPy style, as fast as built-in ones.
+
+    The function is run once for a system, with symbols in place of numbers, and its operations are recorded; it is not called
+    during a step. Write it for one member: parameters and states may be batches all the same.
+
+    Args:
+        function: ``f(t, v, y, *, parameters)`` that returns v̇, while ẏ is v; with ``order=1``, ``f(t, y, *, parameters)`` that
+            returns ẏ, as SciPy's ``solve_ivp`` takes it; with ``blocks=2``, ``f(t, v, y, *, parameters)`` that returns the pair
+            (v̇, ẏ). v̇ and ẏ have the shapes of v and y. Each parameter has a default. If that is an array, its axes are the
+            parameter's own, and batch axes come after them.
+        order: 1 or 2.
+        blocks: 2 for a function that returns both rates.
+        shape: the shape of the state of a member, with None for a length that is open; with ``blocks=2`` a pair of shapes. If it
+            is not given, it is taken from the initial state of a run: its first axes, as few as the function accepts.
+
+        quick_sines: sine and cosine at half the operations, as the built-in systems have them: right to a unit in the last place
+            of 1 for angles up to 10⁶ rad, where the others are right to a unit in their own last place.
+        scale: to what the error of an adaptive step is relative: to the largest that each ``"component"`` has been, so that the
+            units of one do not matter to another; to the length of each ``"row"`` along the last axis, for a state of shape
+            (bodies, 3) whose directions are equivalent; or to the length of each whole ``"block"``, v and y.
+
+    Returns:
+        A ``Definition``: called with parameters by name, it gives a ``System``.
+
+    Raises:
+        ArgumentError: what is wrong with the function's arguments.
+        TraceError: at the first use with a state, if the function does what cannot be traced; the message names the line.
+
+    Example:
+        >>> import numpy as np, stepwell as sw
+        >>> @sw.system
+        ... def duffing(t, v, y, *, alpha=-1.0, beta=1.0, delta=0.3, gamma=0.5, omega=1.2):
+        ...     return gamma * np.cos(omega * t) - delta * v - alpha * y - beta * y**3
+        >>> run = sw.integrate(duffing(beta=[0.5, 1.0, 2.0]), "rk4", v=0.0, y=1.0, dt=0.01, steps=1000)
+        >>> run.y.shape
+        (1, 3)
+    """
+    order = checks.count("order", order, 1, 2)
+    blocks = checks.count("blocks", blocks, 1, 2)
+    if blocks == 2 and order == 1:
+        raise ArgumentError("blocks: expected 1 with order=1, whose state is one block; for (v̇, ẏ) leave order out")
+    shapes = _shapes(shape, order, blocks)
+    quick_sines = checks.flag("quick_sines", quick_sines)
+    scale = checks.known("scale", scale, SCALES)
+
+    def define(function: Any) -> Definition:
+        if isinstance(function, Definition):
+            raise DTypeError(f"function: {function.name} is a system already")
+        if not isinstance(function, FunctionType):
+            raise DTypeError(f"function: expected a Python function such as f(t, v, y), got {type(function).__name__}")
+        return Definition(function, order, blocks, shapes, quick_sines, scale)
+
+    return define if function is None else define(function)
+
+
+def _shapes(shape: Any, order: int, blocks: int) -> tuple[Any, Any]:
+    """The declared shapes of v and y, None where nothing was declared."""
+    if blocks == 2:
+        if shape is None:
+            return None, None
+        if not isinstance(shape, (tuple, list)) or len(shape) != 2 or any(not isinstance(each, (tuple, list)) for each in shape):
+            raise ArgumentError(f"shape: expected a pair of shapes, of v and of y, since blocks=2, got {checks.short(shape)}")
+        return _shape(shape[0]), _shape(shape[1])
+    one = None if shape is None else _shape(shape)
+    return (one if order == 2 else (0,)), one
+
+
+def _shape(shape: Any) -> tuple[int | None, ...]:
+    if isinstance(shape, (int, np.integer)):
+        shape = (shape,)
+    if not isinstance(shape, (tuple, list)):
+        raise ArgumentError(f"shape: expected lengths such as (3,) or (None, 2), got {checks.short(shape)}")
+    return tuple(None if each is None else checks.count("shape", each, 1) for each in shape)
+
+
+def fits(shape: Shape, declared: tuple[int | None, ...] | None) -> bool:
+    """Whether a shape is as declared."""
+    return declared is None or (
+        len(shape) == len(declared) and all(want in (None, got) for got, want in zip(shape, declared, strict=True))
+    )

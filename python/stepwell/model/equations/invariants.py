@@ -1,0 +1,139 @@
+"""Invariants of users' own systems: quantities that are constant in the exact solution; gradients come from their tapes."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import cached_property
+from itertools import count
+from math import prod
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ...base import checks
+from ...errors import ArgumentError
+from ...reference.marks import recording
+from ...reference.tape.replayed import Operations
+
+if TYPE_CHECKING:
+    from .definition import Definition
+    from .trace import Equations
+
+
+class Invariant(NamedTuple):
+    """A quantity that is constant in the exact solution.
+
+    Attributes:
+        name: of the function.
+        function: of v and y, or of y alone in a first-order system, and of parameters of the system by name.
+        parameters: their names.
+        takes_time: whether the function takes the time before the state, as rates do. It may not depend on it.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    parameters: tuple[str, ...]
+    takes_time: bool = False
+
+
+def invariant(definition: Definition, function: Any) -> Invariant:
+    """A function of a state as an invariant of a system; see ``Definition.invariant``."""
+    if not inspect.isfunction(function):
+        raise ArgumentError(f"{definition.name}: expected a function as an invariant, got {type(function).__name__}")
+    name = f"{definition.name}: {function.__name__}"
+    state = ("v", "y") if definition.has_v else ("y",)
+    given = list(inspect.signature(function).parameters.values())
+    in_place = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
+    # With the time there is one argument more before the parameters.
+    takes_time = len(in_place) > len(state) and in_place[len(state)].name not in definition.parameters
+    n = len(state) + takes_time
+    expected = f"({', '.join(state)}, *, …) or (t, {', '.join(state)}, *, …)"
+    if in_place[:n] != given[:n] or len(in_place) < n:
+        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))})")
+    checks.argument_order(name, function, ("t", *state) if takes_time else state)
+    for each in given[n:]:
+        if each.name not in definition.parameters:
+            known = ", ".join(definition.parameters) or "none"
+            raise ArgumentError(
+                f"{name}: expected a function {expected} whose further arguments are parameters of the system, got "
+                f"{each.name!r}. Known: {known}."
+            )
+    return Invariant(function.__name__, function, tuple(each.name for each in given[n:]), takes_time)
+
+
+class Traced:
+    """An invariant of a system of known shapes: its value, and its gradient, as operations.
+
+    Args:
+        invariant: what it is.
+        equations: the system.
+    """
+
+    def __init__(self, invariant: Invariant, equations: Equations) -> None:
+        self.invariant, self.equations = invariant, equations
+        shapes = equations.own_shapes
+        if changing := [each for each in invariant.parameters if shapes[each] is None]:
+            raise ArgumentError(
+                f"{equations.name}: {invariant.name}: {', '.join(changing)} changes with the time, so nothing made of it is "
+                f"constant"
+            )
+        self._tape = _core.Tape()
+        numbers = map(self._tape.param, count())
+        parameters = {each: _symbols(shapes[each], numbers) for each in invariant.parameters}
+        state = map(self._tape.state, count())
+        v, y = _symbols(equations.v_shape, state), _symbols(equations.y_shape, state)
+        with recording() as self._marks:
+            made = equations.of_state(invariant, self._tape.time(), v, y, parameters)
+        self._value = made if isinstance(made, _core.Symbol) else self._tape.number(float(made))
+        self._state = [*v.flat, *y.flat]
+        self._of_value = Operations(*self._tape.operations([self._value]))
+        if any(name == "time" for name, *_ in self._of_value.lines):
+            raise ArgumentError(
+                f"{equations.name}: {invariant.name}: expected a quantity of the state and the parameters, got one that depends "
+                f"on the time t"
+            )
+
+    @cached_property
+    def _of_gradient(self) -> Operations:
+        from ...reference.tape.modes import gradient  # slow to import, and only gradients need it
+
+        along = gradient(self._tape, self._value, self._state, self._marks)
+        square = along[0] * along[0]
+        for each in along[1:]:
+            square = square + each * each
+        return Operations(*self._tape.operations([*along, square]))
+
+    def value(self, v: Any, y: Any, given: dict[str, Any]) -> Any:
+        """The invariant of a state."""
+        return self._made(self._of_value, v, y, given)[0]
+
+    def gradient(self, v: Any, y: Any, given: dict[str, Any]) -> tuple[list[Any], list[Any], Any]:
+        """Its derivatives by the numbers of v and of y, and the square of their length."""
+        *along, square = self._made(self._of_gradient, v, y, given)
+        n_v = prod(self.equations.v_shape)
+        return along[:n_v], along[n_v:], square
+
+    def _made(self, operations: Operations, v: Any, y: Any, given: dict[str, Any]) -> list[Any]:
+        equations = self.equations
+        state = [*_numbers(v, equations.v_shape), *_numbers(y, equations.y_shape)]
+        numbers: list[Any] = []
+        for name in self.invariant.parameters:
+            value = np.asarray(given[name])
+            numbers += _numbers(value, value.shape[: equations.own_axes(name)])
+        with np.errstate(all="ignore"):
+            return operations(state, numbers)
+
+
+def _symbols(shape: Any, symbols: Any) -> Any:
+    made = np.empty(shape, dtype=object)
+    for index in np.ndindex(*shape):
+        made[index] = next(symbols)
+    return made
+
+
+def _numbers(block: Any, shape: Any) -> list[Any]:
+    """The numbers of a block, each of the shape of the batch, or symbols."""
+    block = np.asarray(block)
+    return [block[index] for index in np.ndindex(*shape)]

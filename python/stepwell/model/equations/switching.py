@@ -1,0 +1,333 @@
+"""Switching times: when rates change from one piece to another by the time alone, whatever the state does.
+
+A user's function that compares the time with a number, as ``np.where((t > 5) & (t < 6), 1.0, 0.0)`` does, jumps there or has a
+kink. Adaptive steps see rates at a few times only, and would pass over what lies between. But the comparison is on the tape: it
+is solved for the time by inverting the operations on it one after the other, from the outside in. So ``np.sin(omega * t) > 0.9``,
+``t % period < 0.1``, ``abs(t - middle) < width`` and ``np.interp(t, …)`` are solved, for the parameters of each member. The time
+must stand once in a comparison, or once in each of some factors whose product is compared with zero.
+
+A narrow bell or ramp would be passed over, too, though it is smooth. It has a middle, at which the argument of an even power, an
+exponential or the like is zero. A step that ends there sees it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.checks import concatenated
+from ...reference.marks import Mark
+from ...reference.tape.fused import Evaluated
+from ...reference.tape.operations import Operation, needed
+from ...reference.tape.rules import COMPARISONS, number
+from .series import Line
+
+if TYPE_CHECKING:
+    from .series import Rates
+
+#: A condition that switches more often than this within a run is no pulse that steps could pass over without a sign.
+MOST_PERIODS = 4096
+#: How many values of the argument of a periodic function tell how far it goes.
+ARGUMENT_SAMPLES = 33
+#: What inversion finds is off by roundings of the numbers on the way, and rates switch where their own roundings let them: it is
+#: sought within so many roundings of the time, the fewest that hold it.
+WIDER = (1.0, 2.0**6, 2.0**16, 2.0**28)
+
+
+def numbers_of(parameters: dict[str, Any], own_axes: Callable[[str], int]) -> list[Array | None]:
+    """The numbers of parameters one after the other, as the rates have them; None is an input."""
+    numbers: list[Array | None] = []
+    for name, value in parameters.items():
+        if hasattr(value, "at"):
+            numbers.append(None)
+        elif not callable(value):
+            numbers += [np.asarray(value[index]) for index in np.ndindex(np.shape(value)[: own_axes(name)])]
+    return numbers
+
+
+class Switch(NamedTuple):
+    """Rates change where ``left`` is ``right``, or with a period where it is whole periods away from it: lines or numbers.
+
+    ``smooth`` is whether that is the middle of a bell or a ramp.
+    """
+
+    left: Any
+    right: Any
+    period: Any = None
+    smooth: bool = False
+
+
+#: Where functions jump, by their arguments.
+JUMPS: dict[str, Callable[..., list[Switch]]] = {
+    "sign": lambda x: [Switch(x, 0.0)],
+    "copysign": lambda x, y: [Switch(y, 0.0)],
+    "floor": lambda x: [Switch(x, 0.0, 1.0)],
+    "ceil": lambda x: [Switch(x, 0.0, 1.0)],
+    "trunc": lambda x: [Switch(x, 0.0, 1.0)],
+    "round": lambda x: [Switch(x, 0.5, 1.0)],
+    "mod": lambda x, y: [Switch(x, 0.0, y)],
+    "remainder": lambda x, y: [Switch(x, 0.0, y)],
+}
+#: Where functions have a kink.
+KINKS: dict[str, Callable[..., list[Switch]]] = {
+    "abs": lambda x: [Switch(x, 0.0)],
+    "minimum": lambda x, y: [Switch(x, y)],
+    "maximum": lambda x, y: [Switch(x, y)],
+    "clip": lambda x, low, high: [Switch(x, low), Switch(x, high)],
+}
+#: Functions that make a bell or a ramp with its middle where their first argument is zero.
+WITH_MIDDLE = {"exp", "exp2", "expm1", "tanh", "cosh", "arctan", "hypot", "power"}
+#: What these make of the time repeats itself, and is no single bell or ramp.
+REPEATING = {"sin", "cos", "tan", "mod", "remainder"}
+
+#: Where a function of one argument has a value: the arguments within one period, and the period.
+INVERSES: dict[str, tuple[Callable[[Any], Sequence[Any]], float | None]] = {
+    "abs": (lambda y: (-y, y), None),
+    "square root": (lambda y: (np.where(y < 0.0, np.nan, y * y),), None),
+    "cbrt": (lambda y: (y * y * y,), None),
+    "sin": (lambda y: (np.arcsin(y), np.pi - np.arcsin(y)), 2.0 * np.pi),
+    "cos": (lambda y: (-np.arccos(y), np.arccos(y)), 2.0 * np.pi),
+    "tan": (lambda y: (np.arctan(y),), np.pi),
+    "arcsin": (lambda y: (np.sin(y),), None),
+    "arccos": (lambda y: (np.cos(y),), None),
+    "arctan": (lambda y: (np.tan(y),), None),
+    "sinh": (lambda y: (np.arcsinh(y),), None),
+    "cosh": (lambda y: (-np.arccosh(y), np.arccosh(y)), None),
+    "tanh": (lambda y: (np.arctanh(y),), None),
+    "arcsinh": (lambda y: (np.sinh(y),), None),
+    "arccosh": (lambda y: (np.cosh(y),), None),
+    "arctanh": (lambda y: (np.tanh(y),), None),
+    "exp": (lambda y: (np.log(y),), None),
+    "exp2": (lambda y: (np.log2(y),), None),
+    "expm1": (lambda y: (np.log1p(y),), None),
+    "log": (lambda y: (np.exp(y),), None),
+    "log2": (lambda y: (np.exp2(y),), None),
+    "log10": (lambda y: (10.0**y,), None),
+    "log1p": (lambda y: (np.expm1(y),), None),
+}
+
+#: The operand that makes an operation of two have a value, by the value and the other operand: the first one, and the second.
+OPERANDS: dict[str, tuple[Callable[[Any, Any], Any], Callable[[Any, Any], Any]]] = {
+    "add": (lambda value, other: value - other, lambda value, other: value - other),
+    "subtract": (lambda value, other: value + other, lambda value, other: other - value),
+    "multiply": (lambda value, other: value / other, lambda value, other: value / other),
+    "divide": (lambda value, other: value * other, lambda value, other: other / value),
+}
+
+
+class Switches:
+    """The switches of a function's rates.
+
+    Args:
+        rates: its operations, with the functions among them.
+        numbers: those of parameters, one after the other; None is an input, which knows its own jumps.
+    """
+
+    def __init__(self, rates: Rates, numbers: Sequence[Array | None]) -> None:
+        self.tape = [Operation(name, tuple(of), extra) for name, of, extra in rates.operations.lines]
+        self.functions = rates.functions
+        #: Of each line whether it changes with the time; None if with the state or an input, too.
+        self.changes: list[bool | None] = []
+        #: Of each line what it is a whole power of, and the exponent.
+        self.powers: list[tuple[Any, int]] = []
+        #: Of each line whether a function in it repeats itself.
+        self.repeats: list[bool] = []
+        for line, (name, of, extra) in enumerate(self.tape):
+            mark = self.functions.get(line)
+            self.repeats.append(any(self.repeats[each] for each in of) if mark is None else self._repeating(mark))
+            factors = [self.powers[each] for each in of] if name == "multiply" and line not in self.functions else []
+            alike = len(factors) == 2 and factors[0][0] == factors[1][0]
+            self.powers.append((factors[0][0], factors[0][1] + factors[1][1]) if alike else (Line(line), 1))
+            operands = [self.changes[line] for line in of]
+            unknown = None in operands or name == "state" or (name == "parameter" and numbers[extra] is None)
+            self.changes.append(None if unknown else name == "time" or any(operands))
+        values = self._of_values(rates.operations.places)
+        switches = [each for line in rates.needed for each in self._jumps(line)]
+        switches += [each for line in rates.needed if line in values for each in self._bends(line)]
+        solvable = [each for each in switches if self._solvable(each)]
+        #: The times with which the time itself is compared, where they are constants of the function; and all other switches.
+        self.constants = np.unique([time for each in solvable if (time := self._constant_time(each)) is not None])
+        self.switches = [each for each in solvable if self._constant_time(each) is None]
+        self._tapes: dict[int, tuple[list[Operation], list[int]]] = {}
+
+    def _repeating(self, mark: Mark) -> bool:
+        return mark.name in REPEATING or any(isinstance(each, Line) and self.repeats[each] for each in mark.arguments)
+
+    def _constant_time(self, switch: Switch) -> float | None:
+        """The constant with which a switch compares the time itself; None if it does something else."""
+        sides = [self.tape[each] if isinstance(each, Line) else each for each in switch[:2]]
+        for time, other in (sides, sides[::-1]):
+            if switch.period is None and isinstance(time, Operation) and time.name == "time":
+                if not isinstance(other, Operation):
+                    return float(other)
+                return number(other.given) if other.name == "constant" else None
+        return None
+
+    def of_line(self, line: int) -> tuple[list[Operation], list[int]]:
+        """The operations that a line needs, and its place among them."""
+        if line not in self._tapes:
+            self._tapes[line] = needed(self.tape, [line])
+        return self._tapes[line]
+
+    def _of_values(self, roots: Sequence[int]) -> set[int]:
+        """Lines whose values reach the rates, and not only the truth of a comparison."""
+        reached, waiting = set(), list(roots)
+        while waiting:
+            line = waiting.pop()
+            if line not in reached and self.tape[line].name not in COMPARISONS:
+                reached.add(line)
+                mark = self.functions.get(line)
+                waiting += self.tape[line].of if mark is None else [each for each in mark.arguments if isinstance(each, Line)]
+        return reached
+
+    def _jumps(self, line: int) -> list[Switch]:
+        """Where a line jumps, or the truth of a comparison changes."""
+        name, of, _ = self.tape[line]
+        if (mark := self.functions.get(line)) is not None:
+            return JUMPS[mark.name](*mark.arguments) if mark.name in JUMPS else []
+        if name in COMPARISONS:
+            return [Switch(Line(of[0]), Line(of[1]))]
+        return JUMPS["floor"](Line(of[0])) if name == "floor" else []
+
+    def _bends(self, line: int) -> list[Switch]:
+        """Where a line has a kink, or the middle of a bell or a ramp."""
+        if (mark := self.functions.get(line)) is not None:
+            middle = [Switch(mark.arguments[0], 0.0, smooth=True)] if mark.name in WITH_MIDDLE else []
+            return KINKS[mark.name](*mark.arguments) if mark.name in KINKS else middle
+        base, exponent = self.powers[line]
+        return [Switch(base, 0.0, smooth=True)] if exponent % 2 == 0 else []
+
+    def _solvable(self, switch: Switch) -> bool:
+        lines = [each for each in switch[:3] if isinstance(each, Line)]
+        changes = [self.changes[each] for each in lines]
+        once = any(changes) and None not in changes and not (isinstance(switch.period, Line) and changes[-1])
+        return once and not (switch.smooth and any(self.repeats[each] for each in lines))
+
+    def times(self, numbers: Sequence[Array | None], begin: float, end: float) -> Array:
+        """When members switch from ``begin`` to ``end``, and once before and after, shape (times, *batch); NaN is no time.
+
+        ``numbers`` are those of the parameters, with axes that broadcast to those of the batch.
+        """
+        if not self.switches:
+            return self.constants
+        with np.errstate(all="ignore"):
+            solving = Solving(self, numbers, begin, end)
+            times = [self.constants, *(times for switch in self.switches for times in solving.of(switch))]
+        return concatenated(times)
+
+
+class Solving:
+    """The solution for the time, with numbers for parameters. Values have shape (values, *batch)."""
+
+    def __init__(self, switches: Switches, numbers: Sequence[Array | None], begin: float, end: float) -> None:
+        self.of_line, self.tape, self.functions = switches.of_line, switches.tape, switches.functions
+        self.changes, self.powers = switches.changes, switches.powers
+        self.numbers = dict(enumerate(numbers))
+        self.axes = max((each.ndim for each in numbers if each is not None), default=0)
+        self.samples = np.linspace(begin, end, ARGUMENT_SAMPLES).reshape(-1, *self.axes * (1,))
+
+    def of(self, switch: Switch) -> Iterator[Array]:
+        """The times of a switch."""
+        left, right, period, smooth = switch
+        if not self._changing(left):
+            left, right = right, left
+        if self._changing(right):
+            return
+        values = self._constant(right)[np.newaxis]
+        if period is not None:
+            values = self._periodic(left, values, self._constant(period))
+        waiting = [(left, values)]
+        while waiting:
+            line, values = waiting.pop()
+            if self.tape[line].name == "time":
+                yield values if smooth else self._exact(values, switch)
+            else:
+                waiting += self._inverted(line, values)
+
+    def _inverted(self, line: Any, values: Array) -> Iterator[tuple[Any, Array]]:
+        """Where a line has one of these values: its operands that change, and the values that they have there."""
+        name, of, _ = self.tape[line]
+        operands: Sequence[Any] = [Line(each) for each in of]
+        if (mark := self.functions.get(line)) is not None:
+            name, operands = mark.name, mark.arguments
+        changing = [each for each in operands if self._changing(each)]
+        base, exponent = self.powers[line]
+        if exponent > 1:
+            yield from self._root(base, np.asarray(float(exponent)), values)
+        elif len(changing) == 2 and name == "multiply" and not values.any():
+            yield from ((factor, values) for factor in changing)
+        if len(changing) != 1:
+            return
+        argument = changing[0]
+        place = 0 if argument is operands[0] else 1
+        if name in OPERANDS:
+            yield argument, OPERANDS[name][place](values, self._constant(operands[1 - place]))
+        elif name == "negate":
+            yield argument, -values
+        elif name in ("minimum", "maximum"):
+            yield argument, values
+        elif name in ("mod", "remainder") and place == 0:
+            period = self._constant(operands[1])
+            within = np.where(np.abs(values) < np.abs(period), values, np.nan)
+            yield argument, self._periodic(argument, within, period)
+        elif name == "power" and place == 0:
+            yield from self._root(argument, self._constant(operands[1]), values)
+        elif name in INVERSES:
+            inverse, turn = INVERSES[name]
+            for each in inverse(values):
+                yield argument, each if turn is None else self._periodic(argument, each, np.asarray(turn))
+
+    def _root(self, base: Any, exponent: Array, values: Array) -> Iterator[tuple[Any, Array]]:
+        """Where a power has one of these values."""
+        size, odd = np.abs(values) ** (1.0 / exponent), exponent % 2.0 == 1.0
+        yield base, np.where(odd, np.copysign(size, values), np.where(values < 0.0, np.nan, size))
+        if not odd.all():
+            yield base, np.where(odd | (values < 0.0), np.nan, -size)
+
+    def _periodic(self, line: Any, values: Array, period: Array) -> Array:
+        """Values that are whole periods away from these, as far as the line goes and one more; none if there are too many."""
+        seen, period = self._at(line, self.samples), np.abs(period)
+        places = [(edge - values) / period for edge in (seen.min(axis=0), seen.max(axis=0))]
+        first, last = np.floor(np.nanmin(places)) - 1.0, np.ceil(np.nanmax(places)) + 1.0
+        if not 0.0 <= last - first <= MOST_PERIODS:
+            return values[:0]
+        every = np.arange(first, last + 1.0).reshape(-1, *np.ndim(values) * (1,))
+        periodic = values + period * every
+        return periodic.reshape(-1, *periodic.shape[2:])
+
+    def _exact(self, times: Array, switch: Switch) -> Array:
+        """The same times to the last bits: where the piece changes, if there is one change around."""
+        rounding = np.spacing(np.maximum(np.abs(times), np.finfo(np.float64).eps))
+        for roundings in WIDER:
+            before, after = times - roundings * rounding, times + roundings * rounding
+            first = self._piece(switch, before)
+            changes = first != self._piece(switch, after)
+            if (changes | np.isnan(times)).all():
+                break
+        if roundings == 1.0:
+            return times
+        for _ in range(int(np.log2(roundings)) + 1):
+            middle = before + 0.5 * (after - before)
+            same = self._piece(switch, middle) == first
+            before, after = np.where(same, middle, before), np.where(same, after, middle)
+        return np.where(changes, after, times)
+
+    def _piece(self, switch: Switch, times: Array) -> Array:
+        """Which piece rates take: whether a comparison holds, or the number of the period."""
+        left, right = (self._at(each, times) if isinstance(each, Line) else each for each in switch[:2])
+        return np.asarray(left < right if switch.period is None else np.floor((left - right) / self._constant(switch.period)))
+
+    def _changing(self, what: Any) -> bool:
+        return isinstance(what, Line) and bool(self.changes[what])
+
+    def _constant(self, what: Any) -> Array:
+        """The number of each member that does not change with the time, shape (*batch)."""
+        each = np.asarray(self._at(what, 0.0) if isinstance(what, Line) else what, np.float64)
+        return each.reshape((self.axes - each.ndim) * (1,) + each.shape)
+
+    def _at(self, line: Any, t: Any) -> Array:
+        """The value of a line at these times."""
+        return np.asarray(Evaluated(*self.of_line(line), self.numbers, ())([], t, 0.0)[0])

@@ -1,0 +1,210 @@
+"""The methods and their metadata, read from the records in the core."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from functools import cache
+from typing import Any, Protocol, cast
+
+from .. import _core
+from ..base import checks
+from ..base.arrays import Array, Blocks, Scaled
+from ..base.immutable import Fixed
+from ..base.reprs import facts
+from ..errors import ArgumentError
+
+
+class Steps(Protocol):
+    """What a file in ``reference/steppers`` defines. ``start`` and ``finish`` are there if the method has a carry."""
+
+    def step(self, s: Scaled, t: float, h: float, v: Array, y: Array, /) -> Blocks:
+        """One step."""
+
+    def start(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
+        """The carry, in place of v."""
+
+    def finish(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
+        """The velocity from the carry."""
+
+
+class Method(Fixed):
+    """A method with its metadata, read from its record in the core.
+
+    Example:
+        >>> rk4 = sw.method("rk4")
+        >>> rk4
+        <method rk4: Runge-Kutta 4, order 4, 4 function evaluations per step>
+        >>> rk4.order, rk4.evaluations, round(rk4.limit, 4)
+        (4, 4, 2.8284)
+    """
+
+    #: The name by which it is chosen.
+    name: str
+    #: The document's name.
+    title: str
+    #: Standard names of the same method.
+    other_names: tuple[str, ...]
+    #: Methods with which it is easily confused.
+    false_friends: tuple[str, ...]
+    #: Order of convergence.
+    order: int
+    #: Function evaluations per step of fixed length (of both rates: rate evaluations). Of a series those of a linear system; of
+    #: others it may be more, see ``stepwell.stability.operations``.
+    evaluations: int
+    #: Function evaluations of an attempt at an adaptive step; 0 if it does not estimate its error.
+    attempt_evaluations: int
+    #: The family of methods to which it belongs.
+    family: str
+    #: Whether its steps are sums of the solution's series; with a tolerance it then has the order that takes least work.
+    has_series: bool
+    #: The undamped oscillator is stable for Φ = ω₀·dt below this; 0 means never.
+    limit: float
+    #: Times within a step at which rates are evaluated, as fractions of the step.
+    nodes: tuple[float, ...]
+    #: Whether it needs a second-order system whose forces do not depend on the velocity.
+    needs_acceleration: bool
+    #: What it carries between steps in place of v, or None.
+    carry: str | None
+    #: Ways to start it, the default first.
+    starts: tuple[str, ...]
+    #: Order of h in which it estimates the error of a step, or None; with one it takes ``tolerance=``.
+    error_order: int | None
+    #: Section of the document.
+    section: str
+    #: Publication.
+    reference: str
+    #: Description.
+    about: str
+
+    def __init__(self, record: dict[str, Any]) -> None:
+        for key, value in record.items():
+            setattr(self, key, tuple(value) if isinstance(value, list) else value)
+        self.has_series = self.family == "Taylor"
+        self.__doc__ = self._text()
+
+    @property
+    def _instead(self) -> str:
+        return "it is that of the core; another method is chosen by its name, stepwell.method(name)"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """There is one object for each name: a copy or an unpickled method is that object."""
+        return method, (self.name,)
+
+    @property
+    def steps(self) -> Steps:
+        """The NumPy reference: the module in ``stepwell.reference.steppers`` that is the method's specification."""
+        return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))
+
+    def start_choice(self, start: str | None) -> int:
+        """The number of a start, for the core."""
+        if start is None:
+            return 0
+        if not self.starts:
+            raise ArgumentError(f"start: {self.name} starts in one way only, got {checks.short(start)}")
+        return self.starts.index(checks.known("start", start, self.starts))
+
+    def _text(self) -> str:
+        limit = f"Φ = ω₀·dt < {self.limit:.10g}" if self.limit else "never"
+        lines = [
+            f"{self.title}: order {self.order}, {self._costs()} per step.",
+            "",
+            self.about,
+            "",
+        ]
+        if self.other_names:
+            lines.append(f"Also called: {', '.join(self.other_names)}.")
+        if self.false_friends:
+            lines.append(f"Not to be taken for: {', '.join(self.false_friends)}.")
+        lines += [
+            f"Undamped oscillator stable: {limit}.",
+            f"Source: {'the document’s ' if self.section.startswith('§') else ''}{self.section}; {self.reference}.",
+        ]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<method {self.name}: {self.title}, order {self.order}, {self._costs()} per step>"
+
+    def _costs(self) -> str:
+        if self.has_series:
+            return f"{self.evaluations} function evaluations (of a linear system)"
+        return f"{self.evaluations} function evaluation{'s' * (self.evaluations != 1)}"
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        return facts(
+            f"{self.title} ({self.name})",
+            [
+                ("order", self.order),
+                ("costs", f"{self._costs()} per step"),
+                ("undamped oscillator stable", f"Φ = ω₀·dt < {self.limit:.10g}" if self.limit else "never"),
+                ("adaptive steps", "no" if self.error_order is None else "yes (tolerance=)"),
+                ("also called", "; ".join(self.other_names)),
+                ("not to be taken for", "; ".join(self.false_friends)),
+                ("source", f"{self.section}; {self.reference}"),
+            ],
+            self.about,
+        )
+
+
+def _section(method: Method) -> int:
+    """The number of the document's section; what has none comes last."""
+    number = re.search(r"\d+", method.section)
+    return int(number[0]) if number else 99
+
+
+@cache
+def _catalogue() -> dict[str, Method]:
+    by_section = sorted(map(Method, _core.catalogue()), key=lambda m: (_section(m), m.order, m.name))
+    return {m.name: m for m in by_section}
+
+
+def methods() -> tuple[Method, ...]:
+    """Every method, in the order of the document.
+
+    Example:
+        >>> [method.name for method in sw.methods() if "Fehlberg" in method.title]
+        ['fehlberg', 'fehlberg_5']
+    """
+    return tuple(_catalogue().values())
+
+
+def choice(methods: Any) -> list[Method]:
+    """The methods named by an argument ``methods``, each once; all if None.
+
+    Raises:
+        ArgumentError: if it is not a list of methods, or is empty.
+    """
+    chosen = list(_catalogue().values()) if methods is None else checks.several("methods", methods, "names")
+    if not chosen:
+        raise ArgumentError("methods: expected at least one, got none")
+    return list(dict.fromkeys(map(method, chosen)))
+
+
+def method(name: str | Method) -> Method:
+    """The method of that name.
+
+    Args:
+        name: its name, or any other of its record, in any spelling: ``"false_euler"``, ``"symplectic Euler"`` or
+            ``"Euler-Cromer"``.
+
+    Returns:
+        The ``Method``, with its record.
+
+    Raises:
+        UnknownNameError: if there is none, or more than one. The message names the nearest; of the name of another method that is
+            easily confused with one of these (``"RK45"``), it says what that is.
+
+    Example:
+        >>> sw.method("velocity Verlet").name
+        'leapfrog'
+    """
+    if isinstance(name, Method):
+        return name
+    if type(name) is str and (known := _catalogue().get(name)) is not None:
+        return known
+    if isinstance(name, str):
+        from .method_names import resolved  # other names may take their time; the import of stepwell may not
+
+        return resolved(str(name), _catalogue())
+    return _catalogue()[checks.known("method", name, _catalogue())]

@@ -1,0 +1,270 @@
+"""Surfaces that points cannot pass: floors, walls, balls and bowls (§1, elastic reflection)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from ..base import checks
+from ..base.arrays import Array, Shape
+from ..base.immutable import Fixed, Value, changed
+from ..base.reprs import brief
+from ..errors import ArgumentError, DTypeError, ShapeError
+
+if TYPE_CHECKING:
+    from ..base.literals import ContactWay
+
+#: Arguments with components along their first axis.
+VECTORS = ("normal", "centre")
+
+WAYS: tuple[ContactWay, ...] = ("safe", "restitution", "flip", "spring")
+
+
+class Surface(Fixed, Value, ABC):
+    """A plane or a sphere that points meet; see ``Floor`` and ``Sphere``."""
+
+    #: What kind of surface it is, and the names of its arguments besides those that all have.
+    kind: ClassVar[str]
+    own: ClassVar[tuple[str, ...]]
+
+    def __init__(self, restitution: Any, friction: Any, way: ContactWay, omega: Any) -> None:
+        self.way = checks.known("way", way, WAYS)
+        self.restitution = checks.not_negative("restitution", restitution)
+        if (self.restitution > 1.0).any():
+            raise ArgumentError(f"restitution: expected numbers of 0 to 1, got {self.restitution.max():g}")
+        self.friction = None if friction is None else checks.not_negative("friction", friction)
+        self.omega = None if omega is None else checks.numbers("omega", omega, positive=True, unit="rad per unit of time")
+        springs = way == "spring"
+        if springs != (omega is not None):
+            raise ArgumentError(
+                "omega: expected the frequency of the spring, got None"
+                if springs
+                else f'omega: goes with way="spring" only, got way={way!r}'
+            )
+        if way in ("flip", "spring") and (self.restitution != 1.0).any():
+            raise ArgumentError(f'restitution: goes with way="safe" or "restitution", got way={way!r}')
+        if springs and friction is not None:
+            raise ArgumentError('friction: goes with ways other than "spring", which has no impulse')
+
+    @property
+    def batch(self) -> Shape:
+        """The shape to which its numbers broadcast."""
+        given = {"restitution": self.restitution, "friction": self.friction, "omega": self.omega}
+        shapes = {name: each.shape for name, each in given.items() if each is not None}
+        return checks.batch_shape(shapes | self._shapes())
+
+    @abstractmethod
+    def _shapes(self) -> dict[str, Shape]:
+        """The batch shapes of its own arguments."""
+
+    @property
+    @abstractmethod
+    def dim(self) -> int | None:
+        """In how many dimensions it is; None if in any."""
+
+    @abstractmethod
+    def place(self, dim: int) -> dict[str, Any]:
+        """Where it is, by name, in so many dimensions; vectors have their components along the first axis."""
+
+    def given(self, dim: int) -> dict[str, Any]:
+        """Its parameters by name."""
+        common: dict[str, Any] = {"way": self.way}
+        if self.way == "spring":
+            common["omega"] = self.omega
+        elif self.way != "flip":
+            common["restitution"] = self.restitution
+        return common | {"friction": self.friction} | self.place(dim)
+
+    def member(self, one: Callable[..., Array]) -> Surface:
+        """The same for a single member."""
+        numbers = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return changed(self, **{name: one(value, 1 if name in VECTORS else 0) for name, value in numbers.items()})
+
+    def __repr__(self) -> str:
+        names = (*self.own, "restitution", "friction", "way", "omega")
+        values = {name: getattr(self, name) for name in names}
+        said = (
+            f"{name}={brief(value)}"
+            for name, value in values.items()
+            if value is not None and not (name == "restitution" and value.ndim == 0 and value == 1.0)
+        )
+        return f"{type(self).__name__}({', '.join(said)})"
+
+
+class Floor(Surface):
+    """A plane that points stay above: normal·y ≥ offset.
+
+    | way | what happens to a point that is behind the surface after a step | energy |
+    |---|---|---|
+    | ``"safe"`` | it leaves with e² of the energy of impact, as late as it arrived; or it rests | never added |
+    | ``"restitution"`` | its normal velocity becomes −e times what it was, if it points inward | may be added |
+    | ``"flip"`` | the same with e = 1 | may be added |
+    | ``"spring"`` | a spring pushes it back with ω² times its depth | may be added |
+
+    With ``"safe"`` no contact adds energy, for any method, step and time of impact, where the force is uniform over a step. A
+    point whose next flight would be shorter than two steps comes to rest on the surface. See docs/howto/contact.md.
+
+    Args:
+        restitution: e, the velocity after an impact divided by that before it, 0 to 1, without a unit; broadcasts over the batch.
+        friction: Coulomb's coefficient μ, without a unit, zero or more; broadcasts. None leaves the term out.
+        normal: a vector out of the floor, of any length, shape (dim,) or (dim, *batch); the last axis if None.
+        offset: distance of the plane from the origin along the normal, in units of length; broadcasts. Without ``normal`` it is
+            the height of the floor.
+        way: one of the table.
+        omega: ω of the spring in rad per unit of time, its stiffness per mass being ω²; with ``way="spring"`` only. Broadcasts.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> sw.Particles(floor=sw.Floor(restitution=0.8))
+        Particles(masses=1.0, gravity=9.81, floor=Floor(offset=0.0, restitution=0.8, way='safe'))
+    """
+
+    kind = "plane"
+    own = ("normal", "offset")
+
+    def __init__(
+        self,
+        *,
+        restitution: Any = 1.0,
+        friction: Any = None,
+        normal: Any = None,
+        offset: Any = 0.0,
+        way: ContactWay = "safe",
+        omega: Any = None,
+    ) -> None:
+        super().__init__(restitution, friction, way, omega)
+        self.normal = None if normal is None else _unit(_vector("normal", normal))
+        self.offset = checks.numbers("offset", offset, unit="units of length")
+
+    def _shapes(self) -> dict[str, Shape]:
+        return {"offset": self.offset.shape} | ({} if self.normal is None else {"normal": self.normal.shape[1:]})
+
+    @property
+    def dim(self) -> int | None:
+        """In how many dimensions its normal is; None without one."""
+        return None if self.normal is None else len(self.normal)
+
+    def place(self, dim: int) -> dict[str, Any]:
+        """The unit normal and the offset."""
+        normal = np.eye(dim)[-1] if self.normal is None else self.normal
+        return {"normal": normal, "offset": self.offset}
+
+
+class Sphere(Surface):
+    """A ball that points stay outside of, or a bowl that they stay inside of; a circle in the plane.
+
+    The ways are those of ``Floor``.
+
+    Args:
+        centre: shape (dim,) or (dim, *batch), in units of length.
+        radius: in units of length, above zero; broadcasts over the batch.
+        inside: whether points are inside.
+        restitution: as of ``Floor``, and so are the others.
+        friction: Coulomb's coefficient.
+        way: what happens.
+        omega: ω of the spring.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> sw.Particles(floor=sw.Sphere((0.0, 0.0), 1.0, inside=True))
+        Particles(masses=1.0, gravity=9.81, floor=Sphere(centre=[0.0, 0.0], radius=1.0, inside=True, way='safe'))
+    """
+
+    kind = "sphere"
+    own = ("centre", "radius", "inside")
+
+    def __init__(
+        self,
+        centre: Any,
+        radius: Any,
+        *,
+        inside: bool = False,
+        restitution: Any = 1.0,
+        friction: Any = None,
+        way: ContactWay = "safe",
+        omega: Any = None,
+    ) -> None:
+        super().__init__(restitution, friction, way, omega)
+        self.centre = _vector("centre", centre)
+        self.radius = checks.numbers("radius", radius, positive=True, unit="units of length")
+        self.inside = checks.flag("inside", inside)
+
+    def _shapes(self) -> dict[str, Shape]:
+        return {"centre": self.centre.shape[1:], "radius": self.radius.shape}
+
+    @property
+    def dim(self) -> int:
+        """In how many dimensions it is."""
+        return len(self.centre)
+
+    def place(self, dim: int) -> dict[str, Any]:
+        """The side, the centre and the radius."""
+        return {"side": "inside" if self.inside else "outside", "centre": self.centre, "radius": self.radius}
+
+
+#: The most components of a vector: points are on a line, in the plane or in space.
+MOST_DIMENSIONS = 3
+
+
+def _vector(argument: str, value: Any) -> Array:
+    """A vector, its components along the first axis."""
+    vector = checks.numbers(argument, value)
+    if vector.ndim == 0 or not 1 <= len(vector) <= MOST_DIMENSIONS:
+        raise ShapeError(
+            f"{argument}: expected a vector, 1 to {MOST_DIMENSIONS} components along the first axis, got shape {vector.shape}"
+        )
+    return vector
+
+
+def _unit(vector: Array) -> Array:
+    """A vector of length 1."""
+    size = np.abs(vector).max(axis=0)
+    if not (size > 0.0).all():
+        raise ArgumentError("normal: expected a vector with a direction, got one of length 0")
+    scaled = vector / size
+    square = scaled[0] * scaled[0]
+    for each in scaled[1:]:
+        square = square + each * each
+    return np.asarray(scaled / np.sqrt(square))
+
+
+def surfaces(argument: str, value: Any) -> tuple[Surface, ...]:
+    """The argument ``floor``: a surface, a list of them, or None."""
+    if value is None:
+        return ()
+    found = tuple(value) if isinstance(value, (list, tuple)) else (value,)
+    for each in found:
+        if not isinstance(each, Surface):
+            raise DTypeError(f"{argument}: expected a Floor, a Sphere, a list of them or None, got {type(each).__name__}")
+    return found
+
+
+def batches(given: tuple[Surface, ...]) -> dict[str, Shape]:
+    """The batch shapes of surfaces, with a name for each."""
+    return {f"floor {i}": each.batch for i, each in enumerate(given)}
+
+
+def dimensions(given: tuple[Surface, ...]) -> dict[str, int]:
+    """In how many dimensions surfaces are, where that is known, with a name for each."""
+    return {f"floor {i}": each.dim for i, each in enumerate(given) if each.dim is not None}
+
+
+def parameters(given: tuple[Surface, ...], dim: int, batch: Shape) -> dict[str, Any]:
+    """The parameters of surfaces by name, in the form of ``System.given``; none if there are no surfaces."""
+    if not given:
+        return {}
+    found: dict[str, Any] = {"contacts": len(given)}
+    for i, each in enumerate(given):
+        found[f"contact_{i}"] = each.kind
+        for name, value in each.given(dim).items():
+            if name in VECTORS:
+                value = value.reshape((len(value), *(1,) * (len(batch) - value.ndim + 1), *value.shape[1:]))
+            found[f"contact_{i}_{name}"] = value
+    return found

@@ -1,0 +1,29 @@
+"""By what the operations of an own system are known."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING, Any
+
+from ... import _core
+from ...base.immutable import changed
+from ...reference.traced import Tracer
+from ..controls import Projection
+
+if TYPE_CHECKING:
+    from .own import OwnSystem
+
+
+def digest(system: OwnSystem) -> str:
+    """What the operations of an own system are known by: of its rates, its invariants, and the gradient of one that is kept."""
+    known: Any = system if system.equations is not None else system.sized()
+    tape = _core.Tape()
+    tracer = Tracer(changed(known, control=None), tape)
+    v, y, _ = tracer.state()
+    s = tracer.scaled(tape.step())
+    values = tracer.flat(*s.rates(tape.time(), v, y))
+    for name in known.quantities:
+        values += tracer.flat(s.record(name, v, y))
+    if isinstance(known.keeper, Projection):
+        values += tracer.flat(*s.gradient(v, y))
+    return hashlib.sha256(repr(tape.operations(values)).encode()).hexdigest()

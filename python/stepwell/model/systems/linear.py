@@ -1,0 +1,260 @@
+"""Any linear system, by its matrices (§3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array, Shape
+from ...base.reprs import counted
+from ...errors import ArgumentError, ShapeError
+from ...reference.product import times
+from ...reference.systems.linear import Linear as Reference
+from ..inputs import Input, Pulse, as_input
+from .base import System, aligned
+
+#: A run of many states holds so many copies of A: as it is given, by rows, and as the core steps it.
+COPIES_OF_A = 5
+
+
+class LinearSystem(System):
+    """ṡ = A·s + B·x(t), with auxiliary outputs z = C·s + D·x(t): the state space equations of the document's §3.
+
+    The state s has n numbers in the order that you choose. Some of them form the block v, which methods such as False Euler
+    advance first, the others form the block y: see ``velocities``. The blocks have shapes (velocities,) and (n − velocities,);
+    either may be empty.
+
+    Args:
+        A: state matrix, shape (n, n, *batch), in one per unit of time.
+        B: input matrix, shape (n, m, *batch); None for no inputs. If A has two axes, a column (n,) is accepted for one input.
+        C: output matrix, shape (r, n, *batch); None for no outputs. If A has two axes, a row (n,) is accepted for one output.
+        D: feedthrough matrix, shape (r, m, *batch); None for zero. A number is accepted for one input and one output.
+        x: the inputs, a sequence of m: each a number, an array over the batch, ``Sinusoid``, ``Sampled``, or None for zero. A
+            single input need not be in a sequence. None if all are zero.
+        velocities: the states in the block v: a number, for the first so many, or a sequence of indices in the order of the
+            block; the other states, in their order, are the block y. By default the first n // 2.
+
+    Attributes:
+        second_order: whether ẏ is v times a number, so that Verlet can step it if no row of v depends on v.
+        input_names: ``("x",)`` for one input, ``("x[0]", "x[1]", …)`` for several.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> mass = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], x=1.0)  # states: velocity, place
+        >>> run = sw.integrate(mass, "rk4", v=0.0, y=0.0, dt=0.05, steps=2000)
+        >>> run.y[-1].round(4)
+        array([0.25])
+    """
+
+    kernel = "linear"
+    reference = Reference
+    complex_step = True
+    axes = "states"
+    linear = True
+
+    def __init__(self, A: Any, B: Any = None, C: Any = None, D: Any = None, *, x: Any = None, velocities: Any = None) -> None:
+        self.A = _square(A)
+        n = len(self.A)
+        checks.fits("A: the matrix and its copies", COPIES_OF_A * n * n, (), "take fewer states")
+        single = self.A.ndim == 2  # else a single axis might be meant for the batch
+        self.B = None if B is None else _matrix("B", B, ("n", n), ("m", None), (n, 1) if single else None)
+        m = 0 if self.B is None else self.B.shape[1]
+        self.C = None if C is None else _matrix("C", C, ("r", None), ("n", n), (1, n) if single else None)
+        r = 0 if self.C is None else len(self.C)
+        for given, needed, why in (
+            (D, C, "D: expected C too, without which there are no outputs to add inputs to"),
+            (D, B, "D: expected B too, without which there are no inputs"),
+            (x, B, "x: expected B too, without which there are no inputs"),
+        ):
+            if given is not None and needed is None:
+                raise ArgumentError(why)
+        self.D = None if D is None else _matrix("D", D, ("r", r), ("m", m), (1, 1) if r == m == 1 else None)
+        self.input_names = ("x",) if m == 1 else tuple(f"x[{i}]" for i in range(m))
+        self.x = _inputs(x, self.input_names)
+        if velocities is None and B is not None and C is not None:
+            velocities = 0  # a model of inputs and outputs, whose states are of no kind
+        self.velocities = _velocities(velocities, n)
+        self.coordinates = tuple(i for i in range(n) if i not in set(self.velocities))
+        self.v_shape, self.y_shape = (len(self.velocities),), (len(self.coordinates),)
+        matrices = {"A": self.A, "B": self.B, "C": self.C, "D": self.D}
+        self.batch = checks.batch_shape(
+            {name: matrix.shape[2:] for name, matrix in matrices.items() if matrix is not None}
+            | {name: given.batch for name, given in self.given_inputs().items()}
+        )
+        self._find_order()
+
+    def _find_order(self) -> None:
+        """Find from A and B whether ẏ is v times a number, and whether v̇ depends on v."""
+        v, y = list(self.velocities), list(self.coordinates)
+        speeds, n = self.A[y][:, v], len(v)
+        unit = np.eye(n).reshape(n, n, *(1,) * (self.A.ndim - 2))
+        self.second_order = (
+            len(v) == len(y)
+            and bool((speeds[0, 0] != 0).all() and (speeds == speeds[0, 0] * unit).all())
+            and not self.A[y][:, y].any()
+            and not (self.B is not None and self.B[y].any())
+        )
+        self.velocity_term = "velocities in the rows of v" if self.A[v][:, v].any() else None
+
+    def said(self) -> list[str]:
+        """Its arguments, for its repr."""
+        m, r = (0 if self.B is None else self.B.shape[1]), (0 if self.C is None else len(self.C))
+        v = self.v_shape[0]
+        states = f"{counted(len(self.A), 'state')}{f', {v} of them velocities' if v else ''}"
+        return [states, counted(m, "input"), counted(r, "output")]
+
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """Each state is one of its own, for their units differ."""
+        return tuple(range(len(self.A)))
+
+    def given_inputs(self) -> dict[str, Input]:
+        """Its inputs by name, without those that were not given."""
+        return {name: given for name, given in zip(self.input_names, self.x, strict=True) if given is not None}
+
+    def without_inputs(self) -> LinearSystem:
+        """The same system without inputs."""
+        return LinearSystem(self.A, self.B, self.C, self.D, velocities=self.velocities)
+
+    def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> LinearSystem:
+        """The same system with these samples as its only input."""
+        if name not in self.input_names:
+            raise KeyError(name)
+        x = [Pulse(values, interval, start) if name == each else None for each in self.input_names]
+        return LinearSystem(self.A, self.B, self.C, self.D, x=x, velocities=self.velocities)
+
+    def _parts(self) -> list[Array]:
+        """A and the columns of B of the inputs that were given, both in the order of the blocks."""
+        order = [*self.velocities, *self.coordinates]
+        return [self.A[order][:, order]] + ([] if self.B is None else [self.B[order][:, self._columns()]])
+
+    def _columns(self) -> list[int]:
+        """The columns of the inputs that were given; what was not given is zero and left out."""
+        return [i for i, each in enumerate(self.x) if each is not None]
+
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """The matrix [A B] in the order of the blocks, the inputs, and whether it gives an acceleration."""
+        return {
+            "kind": "acceleration" if self.second_order and self.velocity_term is None else "",
+            "n_v": self.v_shape[0],
+            "rows": _side_by_side(self._parts(), batch),
+            "inputs": [each.signal() for each in self.given_inputs().values()],
+        }
+
+    def named(self, name: str, index: Shape) -> str:
+        """As in A and B, whose rows and columns the core has in the order of the blocks, but for inputs that are not given."""
+        if name != "rows":
+            position, dot, rest = name.removeprefix("inputs[").partition("]")
+            return (list(self.given_inputs())[int(position)] + rest) if dot else name
+        order = [*self.velocities, *self.coordinates]
+        row, column = index
+        if column < len(order):
+            return f"A[{order[row]},{order[column]}]"
+        return f"B[{order[row]},{self._columns()[column - len(order)]}]"
+
+    def split(self, state: Any) -> tuple[Array, Array]:
+        """The blocks (v, y) of a state in the order of A, shape (n, *batch).
+
+        Raises:
+            ArgumentError: what is wrong with the state.
+        """
+        array = checks.block("state", state, (len(self.A),), self.axes)
+        return array[list(self.velocities)], array[list(self.coordinates)]
+
+    def state(self, v: Any, y: Any) -> Array:
+        """The state in the order of A, shape (n, *batch), of the blocks v and y: undoes ``split``.
+
+        Raises:
+            ArgumentError: what is wrong with which block.
+        """
+        v = checks.block("v", v, self.v_shape, self.axes, finite=False)
+        y = checks.block("y", y, self.y_shape, self.axes, finite=False)
+        batch = checks.batch_shape({"v": v.shape[1:], "y": y.shape[1:]})
+        state = np.empty((len(self.A), *batch))
+        for order, block in ((self.velocities, v), (self.coordinates, y)):
+            state[list(order)] = aligned(block, 1, batch)
+        return state
+
+    def auxiliary(self, t: float, v: Array, y: Array) -> Array:
+        """The auxiliary outputs C·s + D·x(t) of states at time t, of shape (r, *batch).
+
+        The sums run over the states in the order of A, then over the inputs, and do not depend on the machine.
+
+        Raises:
+            UnsupportedError: if the system was given no C.
+        """
+        if self.C is None:
+            return super().auxiliary(t, v, y)
+        state = self.state(v, y)
+        batch = np.broadcast_shapes(state.shape[1:], self.batch)
+        parts, columns = [self.C], [*state]
+        if self.D is not None:
+            parts.append(self.D[:, self._columns()])
+            columns += [each.signal().at(t) for each in self.given_inputs().values()]
+        z = times(_side_by_side(parts, batch), columns)
+        return np.array(np.broadcast_to(z, (len(self.C), *batch)))
+
+
+def _square(A: Any) -> Array:
+    array = checks.numbers("A", A)
+    if array.ndim < 2 or array.shape[0] != array.shape[1] or array.shape[0] == 0:
+        raise ShapeError(f"A: expected shape (n, n, batch…) with at least one state, got {array.shape}")
+    return array
+
+
+def _matrix(
+    argument: str, value: Any, rows: tuple[str, int | None], columns: tuple[str, int | None], single: tuple[int, int] | None
+) -> Array:
+    """A matrix of so many rows and columns, each with its name, None for any number.
+
+    ``single`` is the shape of a single row, column or number that may be given without its other axes.
+    """
+    array = checks.numbers(argument, value)
+    if single is not None and array.ndim < 2 and array.size == single[0] * single[1]:
+        array = array.reshape(single)
+    fits = array.ndim >= 2 and all(
+        n in (None, got) and got > 0 for (_, n), got in zip((rows, columns), array.shape, strict=False)
+    )
+    if not fits:
+        wanted = ", ".join(name if n is None else f"{name} = {n}" for name, n in (rows, columns))
+        raise ShapeError(f"{argument}: expected shape ({wanted}, batch…), got {array.shape}")
+    return array
+
+
+def _side_by_side(parts: list[Array], batch: Shape) -> Array:
+    """Matrices of equally many rows as one, with as many batch axes as there are."""
+    parts = [aligned(each, 2, batch) for each in parts]
+    common = np.broadcast_shapes(*(each.shape[2:] for each in parts))
+    return np.concatenate([np.broadcast_to(each, (*each.shape[:2], *common)) for each in parts], axis=1)
+
+
+def _inputs(x: Any, names: tuple[str, ...]) -> tuple[Input | None, ...]:
+    """One input for each name, of what users give for x."""
+    if x is None:
+        return (None,) * len(names)
+    if len(names) == 1 and not (isinstance(x, (list, tuple)) and len(x) == 1):
+        return (as_input("x", x),)
+    several = isinstance(x, (list, tuple)) or (isinstance(x, np.ndarray) and x.ndim > 0)
+    if not several or len(x) != len(names):
+        got = f"{len(x)}" if several else f"one {type(x).__name__}"
+        raise ShapeError(f"x: expected a sequence of {len(names)} inputs, one for each column of B, got {got}")
+    return tuple(as_input(name, each) for name, each in zip(names, x, strict=True))
+
+
+def _velocities(velocities: Any, n: int) -> tuple[int, ...]:
+    """The indices of the states in the block v."""
+    if velocities is None:
+        return tuple(range(n // 2))
+    if not isinstance(velocities, Iterable) or isinstance(velocities, str) or getattr(velocities, "ndim", 1) == 0:
+        return tuple(range(checks.count("velocities", velocities, 0, n)))
+    several = checks.several("velocities", velocities, "states")
+    chosen = tuple(checks.count(f"velocities[{i}]", each, 0, n - 1) for i, each in enumerate(several))
+    for each in chosen:
+        if chosen.count(each) > 1:
+            raise ArgumentError(f"velocities: expected distinct states, got {each} twice")
+    return chosen

@@ -1,0 +1,161 @@
+"""Bodies that attract each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array, Shape
+from ...base.immutable import changed
+from ...errors import ShapeError
+from ...reference.systems import nbody as reference
+from .. import surfaces
+from .base import System, aligned
+
+if TYPE_CHECKING:
+    from ...base.literals import BodyForce
+
+FORCES: tuple[BodyForce, ...] = ("logarithmic", "newton", "printed")
+
+
+class NBody(System):
+    """Bodies that attract each other in the plane or in space (Appendix C, D). Blocks have shape (bodies, dim).
+
+    | force | of a pair | potential of a pair |
+    |---|---|---|
+    | ``"logarithmic"`` | G·m·m/r, as the document prints it | G·m·m·ln r |
+    | ``"newton"`` | G·m·m/r² | −G·m·m/r |
+    | ``"printed"`` | G·m·m/r | −G·m·m/r, the document's potential, which belongs to Newton's force instead |
+
+    Args:
+        masses: one for each body, shape (bodies,) or (bodies, *batch), zero or more. A body without mass is attracted but does
+            not attract.
+        force: the force and its potential, one of the table.
+        G: gravitational constant, above zero; broadcasts over the batch.
+        softening: length ε, which replaces distances r by √(r² + ε²) so that bodies may meet; broadcasts.
+        floor: a ``Floor`` or ``Sphere`` that bodies meet, or a list of them; each body meets them by itself.
+        dim: 2 or 3; if None, taken from the shape of the state.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> sun_and_planet = sw.NBody([1.0, 1e-3], force="newton", G=1.0)
+        >>> v, y = [[0.0, 0.0], [0.0, 1.0]], [[0.0, 0.0], [1.0, 0.0]]
+        >>> run = sw.integrate(sun_and_planet, "leapfrog", v=v, y=y, dt=0.01, steps=628)
+        >>> run.y[-1, 1].round(2)
+        array([1.  , 0.02])
+    """
+
+    kernel = "nbody"
+    reference = reference.NBody
+    complex_step = True
+    axes = "bodies, dim"
+
+    def __init__(
+        self,
+        masses: Any = (1.0, 1.0, 1.0),
+        *,
+        force: BodyForce = "logarithmic",
+        G: Any = 1.0,
+        softening: Any = 0.0,
+        floor: Any = None,
+        dim: int | None = None,
+    ) -> None:
+        self.masses = checks.not_negative("masses", masses)
+        if self.masses.ndim == 0 or len(self.masses) == 0:
+            raise ShapeError(f"masses: expected one for each body along the first axis, got shape {self.masses.shape}")
+        self.force = checks.known("force", force, FORCES)
+        self.G = checks.numbers("G", G, positive=True)
+        self.softening = checks.not_negative("softening", softening, "lengths")
+        self.dim = None if dim is None else checks.count("dim", dim, 2, 3)
+        self.contacts = surfaces.surfaces("floor", floor)
+        size = self.dim
+        for name, found in surfaces.dimensions(self.contacts).items():
+            if found not in (2, 3) or found != (size or found):
+                raise ShapeError(f"{name}: expected a vector of {size or '2 or 3'} components, as many as dim, got {found}")
+            size = found
+        self.dim = size
+        self.v_shape = self.y_shape = (len(self.masses), size or 2)
+        shapes = {"masses": self.masses.shape[1:], "G": self.G.shape, "softening": self.softening.shape}
+        self.batch = checks.batch_shape(shapes | surfaces.batches(self.contacts))
+
+    def said(self) -> list[str]:
+        """Its arguments, for its repr."""
+        n = len(self.masses)
+        masses = self.masses.tolist() if self.masses.ndim == 1 and n <= 5 else f"{n} bodies"
+        softening = [f"softening={self.softening}"] * bool(self.softening.any())
+        return [f"masses={masses}", f"force={self.force!r}", f"G={self.G}", *softening, *self.said_of_contacts()]
+
+    def sized(self, *states: Any) -> NBody:
+        """The same bodies in as many dimensions as the states, v and y, have."""
+        if self.dim is not None:
+            return self
+        n, dims = len(self.masses), set()
+        shapes = [checks.shape_of(name, state) for name, state in zip(("v", "y"), states, strict=False)]
+        for name, shape in zip(("v", "y"), shapes, strict=False):
+            if shape and (len(shape) < 2 or shape[0] != n or shape[1] not in (2, 3)):
+                raise ShapeError(
+                    f"{name}: expected shape ({n}, 2 or 3, batch…) = ({self.axes}, batch…), got {shape}; batch axes come last"
+                )
+            dims |= set(shape[1:2])
+        if len(dims) > 1:
+            raise ShapeError(f"v and y: expected as many dimensions in both, got shapes {shapes[0]} and {shapes[1]}")
+        if not dims:
+            return self
+        (dim,) = dims
+        return changed(self, dim=dim, v_shape=(n, dim), y_shape=(n, dim))
+
+    def member(self, index: tuple[int, ...], batch: Shape) -> NBody:
+        """One member of a batch, alone."""
+
+        def one(values: Array, own: int = 0) -> Array:
+            return checks.member(np.broadcast_to(aligned(values, own, batch), (*values.shape[:own], *batch)), index)
+
+        numbers = {"masses": one(self.masses, 1), "G": one(self.G), "softening": one(self.softening)}
+        alone = changed(self, **numbers, batch=(), contacts=tuple(each.member(one) for each in self.contacts))
+        return alone if self.control is None else changed(alone, control=self.control.member(one))
+
+    def closest(self, y: Array) -> tuple[tuple[int, int], float]:
+        """The two bodies that are nearest to each other in one state, and their distance."""
+        n, best = len(y), ((0, 0), np.inf)
+        for i in range(n - 1):
+            with np.errstate(all="ignore"):
+                distance = np.sqrt(((y[i + 1 :] - y[i]) ** 2).sum(axis=1))
+            j = int(np.argmin(np.where(np.isnan(distance), np.inf, distance)))
+            if distance[j] < best[1]:
+                best = (i, i + 1 + j), float(distance[j])
+        return best
+
+    def kinetic(self, v: Array) -> Array:
+        """½·Σ m·v² of velocities with the blocks' axes first."""
+        return np.asarray(0.5 * (aligned(self.masses, 1, v.shape[2:]) * (v * v).sum(axis=1)).sum(axis=0))
+
+    @property
+    def keeps_energy(self) -> bool:
+        """Whether the energy is constant in the true motion."""
+        return self.control is None and not self.contacts and self.force != "printed"
+
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """Force, dimensions, masses, G·m, softening."""
+        masses = aligned(self.masses, 1, batch)
+        sizes = {"force": self.force, "dim": self.y_shape[1]}
+        return sizes | {"masses": masses, "strength": self.G * masses, "softening": self.softening}
+
+    def named(self, name: str, index: Shape) -> str:
+        """G·m has a name of its own."""
+        return super().named("Gm" if name == "strength" else name, index)
+
+    @property
+    def quantities(self) -> dict[str, Shape]:
+        """The quantities that can be recorded, with the shape of each; the reference defines them."""
+        return {name: each.shape(self.y_shape[1]) for name, each in reference.QUANTITIES.items()}
+
+    def energy(self, v: Array, y: Array) -> Array:
+        """½·Σ m·v² and the potential of every pair; see the table above."""
+        batch = np.broadcast_shapes(v.shape[2:], y.shape[2:])
+        with np.errstate(all="ignore"):
+            energy: Array = self.alone(1.0, batch).energies(v, y)[2]
+        return energy

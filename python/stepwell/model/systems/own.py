@@ -1,0 +1,440 @@
+"""Systems of users' own equations."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import nullcontext
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...base import checks
+from ...base.arrays import Array, Shape
+from ...base.immutable import changed, complete
+from ...errors import ShapeError, TraceError, UnsupportedError
+from ...reference.marks import Marks, recording
+from ...reference.systems.equations import Equations as Reference
+from ...reference.traced import Tracer
+from ..controls import WAYS, AnyControl, ConstraintControl, Control, EnergyControl, Projection
+from ..equations.definition import Definition, fits
+from ..equations.recognised import Unknown, told
+from ..equations.series import derivatives_of_functions
+from ..equations.trace import Equations
+from ..inputs import Input, Sampled, Sinusoid
+from .base import TINY, Given, System, aligned, flat, shown
+
+#: The name of the function among those of parameters; no parameter can have it.
+RATES = "equations()"
+#: Attributes that are found out of the others and kept.
+FOUND_LATER = ("_core", "_single", "_with_functions", "_digest", "_bounds", "_met")
+#: Of how many shapes of states it is remembered what they are of.
+MOST_MET = 256
+#: Of how many functions the operations are kept.
+MOST_TRACED = 256
+_TRACED: dict[Any, Any] = {}
+#: Without a state the shortest vector is looked for that the function can do with, up to this length.
+LONGEST_GUESS = 32
+SHORTEST: tuple[Shape, ...] = ((), *((n,) for n in range(1, LONGEST_GUESS + 1)))
+
+
+class OwnSystem(System):
+    """A system of your own equations: calling a function that is decorated by ``stepwell.system`` returns one."""
+
+    kernel = "equations"
+    #: The operations, and what they are known by.
+    _digest: tuple[Any, str] | None = None
+    reference = Reference
+    #: The control that keeps an invariant as a part of the rates, or None.
+    push: Control | None = None
+
+    def __init__(self, definition: Definition, parameters: dict[str, Any]) -> None:
+        self.definition = definition
+        self.parameters_given: dict[str, Any] = {}
+        batches = {}
+        for name, value in parameters.items():
+            own = definition.own_axes[name]
+            argument = f"{definition.name}: {name}"
+            if isinstance(value, (Sinusoid, Sampled)) or callable(value):
+                if not isinstance(value, (Sinusoid, Sampled)):
+                    checks.argument_order(argument, value, ("t",))
+                if own:
+                    raise ShapeError(f"{argument}: expected an array of {own} axes of its own, as its default, got {value!r}")
+                self.parameters_given[name] = value
+                batches[name] = getattr(value, "batch", ())
+                continue
+            numbers = checks.numbers(argument, value)
+            if numbers.ndim < own:
+                raise ShapeError(f"{argument}: expected {own} axes of its own, as its default has, got shape {numbers.shape}")
+            self.parameters_given[name] = numbers
+            batches[name] = numbers.shape[own:]
+        self.batch = checks.batch_shape({f"{definition.name}: {name}": shape for name, shape in batches.items()})
+        self.second_order = definition.order == 2 and definition.blocks == 1
+        self.equations: Equations | None = None
+        #: The operations of the function, and those in float32.
+        self._core: Any = None
+        self._single: Any = None
+        #: The same rates as ``_core``, and what series must know of the functions in them.
+        self._with_functions: tuple[Any, Any] | None = None
+        #: The same system for blocks of these shapes, and for states of these, which may have batch axes.
+        self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
+        self._met: dict[tuple[Shape | None, Shape | None], OwnSystem] = {}
+
+    @property
+    def keeper(self) -> AnyControl | None:
+        """A control is a part of the rates, and a projection is not."""
+        return self.push if self.push is not None else self.control
+
+    @property
+    def kind_name(self) -> str:
+        """The name of the function."""
+        return self.definition.name
+
+    def said(self) -> list[str]:
+        """The parameters."""
+        return shown(**self.parameters_given)
+
+    def __repr__(self) -> str:
+        said = self.said() + [repr(each) for each in (self.control, self.push) if each is not None]
+        return f"{self.definition.name}({', '.join(said)})"
+
+    def _held(self) -> dict[str, Any]:
+        return {name: value for name, value in super()._held().items() if name not in FOUND_LATER}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}
+
+    def __deepcopy__(self, memo: Any) -> OwnSystem:
+        again = changed(self, parameters_given=copy.deepcopy(self.parameters_given, memo), _bounds={}, _met={})
+        if self.control is not None:
+            complete(again, control=copy.deepcopy(self.control, memo))
+        return again
+
+    def own_axes(self, name: str) -> int:
+        """How many axes of its own a parameter has."""
+        return self.definition.own_axes[name]
+
+    # ---- shapes
+
+    def sized(self, *states: Any) -> OwnSystem:
+        """The same system for the states v and y of these shapes; None is what was not given."""
+        given = zip(("v", "y"), states, strict=False)
+        shapes = {name: checks.shape_of(name, state) for name, state in given if state is not None}
+        if self.equations is not None and self._fits(shapes):
+            return self
+        met = shapes.get("v"), shapes.get("y")
+        if (known := self._met.get(met)) is not None:
+            return known
+        refused: list[TraceError] = []
+        for v_shape, y_shape in self._candidates(shapes):
+            try:
+                if len(self._met) >= MOST_MET:
+                    self._met.clear()
+                self._met[met] = self._bound(v_shape, y_shape)
+                return self._met[met]
+            except TraceError as error:
+                refused.append(error)
+        if not refused:
+            raise ShapeError(
+                f"{self.definition.name}: no state of the declared shape {self.definition.shape[1]} fits what was given: "
+                + ", ".join(f"{name} of shape {shape}" for name, shape in shapes.items())
+            )
+        # The error of a function of arrays that is run with a number would be misleading.
+        told = next((error for error in refused if not error.of_shape), None)
+        if told is None and (hint := self._batch_first(shapes)):
+            raise ShapeError(f"{self.definition.name}: {hint}") from refused[-1]
+        raise told or refused[0]
+
+    def _batch_first(self, shapes: dict[str, Shape]) -> str:
+        """What to say if the function does with the last axes of the states what it does not do with the first; else nothing."""
+        if self.definition.blocks == 2 or not shapes:
+            return ""
+        name, shape = max(shapes.items(), key=lambda each: len(each[1]))
+        for n in range(1, len(shape)):
+            last = shape[-n:]
+            try:
+                self._bound((0,) if self.definition.order == 1 else last, last)
+            except TraceError:
+                continue
+            return f"batch axes come last: expected {name} of shape {(*last, *shape[:-n])}, got {shape}"
+        return ""
+
+    def _fits(self, shapes: dict[str, Shape]) -> bool:
+        """Whether blocks of the known shapes can be the first axes of these."""
+        mine = {"v": self.v_shape, "y": self.y_shape}
+        return all(shape == () or shape[: len(mine[name])] == mine[name] for name, shape in shapes.items())
+
+    def _candidates(self, shapes: dict[str, Shape]) -> Iterator[tuple[Shape, Shape]]:
+        """Shapes of v and y that the function may be written for, the shortest first."""
+        declared_v, declared_y = self.definition.shape
+        v, y = shapes.get("v", ()), shapes.get("y", ())
+        pairs: Iterable[tuple[Shape, Shape]]
+        if self.definition.blocks == 2:
+            pairs = ((v[:i], y[:j]) for j in range(len(y) + 1) for i in range(len(v) + 1))
+        elif not (v or y):
+            # The state is not known: a number, or the shortest vector.
+            whole = declared_y is not None and None not in declared_y
+            sizes: Sequence[Shape] = (tuple(n or 1 for n in declared_y),) if whole and declared_y is not None else SHORTEST
+            pairs = (((0,) if self.definition.order == 1 else size, size) for size in sizes)
+        elif self.definition.order == 1:
+            pairs = (((0,), y[:n]) for n in range(len(y) + 1))
+        else:
+            longest = max(v, y, key=len)
+            pairs = ((longest[:n], longest[:n]) for n in range(len(longest) + 1))
+        for v_shape, y_shape in pairs:
+            if fits(v_shape, declared_v) and fits(y_shape, declared_y):
+                yield v_shape, y_shape
+
+    def _bound(self, v_shape: Shape, y_shape: Shape) -> OwnSystem:
+        """The same system for blocks of these shapes; the function is traced twice, to check that it always does the same."""
+        if (known := self._bounds.get((v_shape, y_shape))) is not None:
+            return known
+        definition = self.definition
+        shapes = {
+            name: value.shape[: self.own_axes(name)] if isinstance(value, np.ndarray) else None
+            for name, value in self.parameters_given.items()
+        }
+        equations = Equations(definition, v_shape, y_shape, shapes)
+        bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _single=None, _bounds={}, _met={})
+        bound._trace_once()
+        self._bounds[v_shape, y_shape] = bound
+        return bound
+
+    def _trace_once(self) -> None:
+        """Trace the function, or take what was traced of the same function with parameters of the same kinds."""
+        key = self._key()
+        core = None if key is None else _TRACED.get(key)
+        if core is None:
+            self._trace()
+            if key is not None:
+                if len(_TRACED) >= MOST_TRACED:
+                    _TRACED.clear()
+                _TRACED[key] = self._core
+            return
+        self._core = core
+        complete(self, velocity_term="forces that do" if core.reads_v else None)
+
+    def _key(self) -> Any:
+        """What its operations depend on; None if that cannot be told."""
+        definition = self.definition
+        try:
+            parameters = tuple((name, self._kind_of(name, value)) for name, value in self.parameters_given.items())
+            invariants = tuple((each.name, each.parameters, told(each.function)) for each in definition.invariants.values())
+            function = told(definition.function)
+            key = definition.order, definition.blocks, definition.quick_sines, self.v_shape, self.y_shape
+            return *key, function, parameters, invariants, definition.name
+        except Unknown:
+            return None
+
+    def _kind_of(self, name: str, value: Any) -> Any:
+        """What the operations depend on of a parameter: not its numbers."""
+        if isinstance(value, np.ndarray):
+            return value.shape[: self.own_axes(name)]
+        if isinstance(value, (Sinusoid, Sampled)):
+            signal = value.signal()
+            return type(signal).__name__, *getattr(signal, "parts", dict)()
+        return told(value)
+
+    def _trace(self) -> None:
+        """Run the function with symbols, twice to check that it always does the same; a control is a part of the rates."""
+        self._core = self._rates()
+        complete(self, velocity_term="forces that do" if self._core.reads_v else None)
+
+    def _rates(self, marks: Marks | None = None) -> Any:
+        """The rates as operations; with marks also the derivatives of the functions among them."""
+        equations, definition = self.equations, self.definition
+        assert equations is not None
+        plain = changed(self, control=None)  # a projection comes after the step, and is the core's
+        tape = _core.Tape()
+        traced = []
+        for _ in range(2):
+            tracer = Tracer(plain, tape)
+            v, y, _more = tracer.state()
+            with nullcontext() if marks is None else recording(marks):
+                s = tracer.scaled(tape.step())
+                dv, dy = s.rates(tape.time(), v, y)
+            traced.append((tracer.flat(dv), tracer.flat(dy)))
+        if [each.id for block in traced[0] for each in block] != [each.id for block in traced[1] for each in block]:
+            raise TraceError(
+                f"{definition.name}: expected the same operations at every call, got others: a function of a step may not draw "
+                f"random numbers or count its calls"
+            )
+        dv, dy = traced[0]
+        quantities = [(name, *tracer.flat(s.record(name, v, y))) for name in self.quantities]
+        kept = None
+        if equations.kept is not None and not equations.pushed:
+            value = equations.invariants[equations.kept].value(v, y, s.given)
+            along_v, along_y, square = s.gradient(v, y)
+            kept = (*tracer.flat(value), tracer.flat(along_v), tracer.flat(along_y), *tracer.flat(square))
+        own_dv, own_dy = dv if equations.v_shape != (0,) else [], None if equations.second_order else dy
+        functions = [] if marks is None else derivatives_of_functions(tape, marks)
+        return tape.equations(own_dv, own_dy, quantities, kept, functions)
+
+    def _known(self) -> OwnSystem:
+        """The same system with known shapes of its blocks."""
+        return self if self.equations is not None else self.sized()
+
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """By the definition's ``scale``: each component, each row along the last axis, or each block."""
+        if self.definition.scale == "block":
+            return ()
+        groups: list[int] = []
+        for shape in (self.v_shape, self.y_shape):
+            of_one = prod(shape[-1:]) if self.definition.scale == "row" else 1
+            first = groups[-1] + 1 if groups else 0
+            groups += [first + place // max(of_one, 1) for place in range(prod(shape))]
+        return tuple(groups)
+
+    # ---- for the core and the reference
+
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """The function, and parameters by name."""
+        made: dict[str, Any] = {RATES: self._known().equations}
+        for name, value in self.parameters_given.items():
+            if isinstance(value, (Sinusoid, Sampled)):
+                made[name] = value.signal()
+            elif isinstance(value, np.ndarray):
+                own = self.own_axes(name)
+                made[name] = aligned(value, own, batch) if own else value
+            else:
+                made[name] = value
+        return made if self.push is None else made | self.push.given()
+
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> Given:
+        """The operations of the function, and parameters by name, as the core takes them; for ``series`` with derivatives."""
+        bound = self._retraced()
+        rates = bound._in_single() if single else bound._series_rates() if series else bound._core
+        given = {name: value for name, value in bound.given(batch).items() if name != RATES and not callable(value)}
+        return [(RATES, rates), *flat(given | ({} if self.control is None else self.control.given()), batch)]
+
+    def _in_single(self) -> Any:
+        """The operations of the function in float32. Invariants are not among them."""
+        if self._single is None:
+            equations = self.equations
+            assert equations is not None
+            tape = _core.Tape(single=True)
+            tracer = Tracer(self, tape)
+            v, y, _ = tracer.state()
+            dv, dy = (tracer.flat(rate) for rate in tracer.scaled(tape.step()).rates(tape.time(), v, y))
+            self._single = tape.equations(dv if equations.v_shape != (0,) else [], None if equations.second_order else dy)
+        return self._single
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
+        return bool(self._retraced()._series_rates().chooses)
+
+    def switching_times(self, begin: float, end: float) -> Array:
+        """The comparisons of the function with the time, solved for it, with the parameters of each member."""
+        bound = self._retraced()
+        if not bound._core.reads_time:
+            return np.empty(0)
+        assert bound.equations is not None
+        parameters = {name: value for name, value in bound.given(bound.batch).items() if name in self.parameters_given}
+        return bound.equations.switching_times(parameters, begin, end)
+
+    def _series_rates(self) -> Any:
+        """The rates as operations, with the derivatives of the functions among them."""
+        if self._with_functions is None or self._with_functions[0] is not self._core:
+            self._with_functions = self._core, self._rates({})
+        return self._with_functions[1]
+
+    @property
+    def digest(self) -> str:
+        """What its operations are known by; a long list of them takes long to write out, so it is kept."""
+        from .digest import digest  # only runs that go on need it
+
+        bound = self._retraced()
+        if bound._digest is None or bound._digest[0] is not bound._core:
+            bound._digest = bound._core, digest(bound)
+        return bound._digest[1]
+
+    def _retraced(self) -> OwnSystem:
+        """With its operations, which an unpickled copy lacks."""
+        known = self._known()
+        if known._core is None:
+            known._trace()
+        return known
+
+    # ---- invariants
+
+    @property
+    def quantities(self) -> dict[str, Shape]:
+        """The invariants, each one number; what is made of a parameter that changes with the time is none."""
+        given = self.parameters_given
+        constant = (
+            name
+            for name, each in self.definition.invariants.items()
+            if all(isinstance(given[parameter], np.ndarray) for parameter in each.parameters)
+        )
+        return dict.fromkeys(constant, ())
+
+    def energy(self, v: Array, y: Array) -> Array:
+        """The invariant that is called ``energy``."""
+        if "energy" not in self.definition.invariants:
+            raise UnsupportedError(
+                f"energy: {self!r} has no invariant of that name; declare one: @{self.definition.name}.invariant above "
+                f"def energy({'v, y' if self.definition.has_v else 'y'}, *, …)"
+            )
+        return np.asarray(self.alone(1.0, np.shape(y)[len(self.y_shape) :]).record("energy", v, y))
+
+    def controlled(self, control: Any, v: Array, y: Array, dt: float) -> OwnSystem:
+        """The same system with an invariant that is kept, at its value at the start if the control has no target."""
+        name = self._invariant_of(control)
+        with np.errstate(all="ignore"):
+            start = np.asarray(self.alone(1.0, np.shape(y)[len(self.y_shape) :]).record(name, v, y))
+        return self._keeping(name, control.aimed(start, start, dt))
+
+    def under(self, control: Any, batch: Shape) -> OwnSystem:
+        """The same, for unknown states of that batch shape."""
+        return self._keeping(self._invariant_of(control), control.aimed(np.ones(batch), np.zeros(batch), TINY))
+
+    def _invariant_of(self, control: Any) -> str:
+        """The name of the invariant that a control keeps."""
+        if isinstance(control, EnergyControl):
+            raise UnsupportedError(
+                f"control: EnergyControl pushes velocities by the kinetic energy, which {self!r} does not tell; use "
+                f"Control('energy', gain), which pushes along the gradient of an invariant"
+            )
+        if isinstance(control, ConstraintControl):
+            self._controllable(control)
+        name = control.invariant
+        if isinstance(control, Projection) and control.way in WAYS:
+            if control.way == "scaling":
+                raise UnsupportedError(
+                    f"control: Projection('scaling') scales velocities by the kinetic energy, which {self!r} does not tell; use "
+                    f"Projection('energy'), which goes along the gradient of an invariant"
+                )
+            name = "energy"
+        return checks.known("control", name, self.definition.invariants)
+
+    def _keeping(self, name: str, control: Any) -> OwnSystem:
+        known = self._known().uncontrolled  # one control takes the place of another
+        assert isinstance(known, OwnSystem)
+        assert known.equations is not None
+        pushed = isinstance(control, Control)
+        kept = changed(
+            known,
+            _single=None,
+            _bounds={},
+            _met={},
+            _free=known,
+            batch=checks.batch_shape({"system": known.batch, "control": control.batch}),
+            equations=known.equations.keeping(name, limited=pushed and control.form == "limited", pushed=pushed),
+        )
+        complete(kept, **({"push": control, "second_order": False} if pushed else {"control": control}))
+        kept._trace()
+        complete(kept, velocity_term=kept.velocity_term or "a control of an invariant")
+        return kept
+
+    @property
+    def has_time(self) -> bool:
+        """Its function takes the time, whether or not it uses it."""
+        return True
+
+    def given_inputs(self) -> dict[str, Input]:
+        """The inputs among the parameters, by name."""
+        return {name: value for name, value in self.parameters_given.items() if isinstance(value, (Sinusoid, Sampled))}

@@ -1,0 +1,1 @@
+"""Lists of operations: what they are, their values over arrays, and their derivatives."""

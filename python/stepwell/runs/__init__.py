@@ -1,0 +1,1 @@
+"""How a model is stepped: ``integrate``, ``World``, events, and what is noticed of a run."""

@@ -1,0 +1,307 @@
+"""Warnings of runs that stayed finite and yet mean nothing."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Array, Shape
+from ..base.reprs import in_words, of_member, share
+from ..errors import AccuracyWarning, ControlWarning
+from ..model.controls import EnergyControl
+from ..model.methods import method
+from ..model.systems import NBody
+from ..model.systems.base import aligned
+from . import encounters, engine, known_energy
+from .request import time_of
+from .result import Run
+
+#: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
+DOUBTFUL_CHANGE = 0.5
+
+#: One member of at most so many bodies is summed in floats. That takes some microseconds, so a run of this many rate evaluations
+#: does not notice it.
+FEW_BODIES, FEW_EVALUATIONS = 8, 100
+
+#: Other energies take NumPy: a run must make so many rate evaluations, and of so many pairs in all, not to notice it. States of
+#: more numbers than the last would take memory that was not counted.
+EVALUATIONS, PAIRS, MOST_NUMBERS = 2000, 200_000, 1_000_000
+
+#: From so many bodies on the core has an energy, with a step that is not needed, sooner than NumPy.
+MIN_BODIES_BY_CORE = 24
+
+#: Pairs are looked at in so many saved states at most.
+STATES = 32
+
+State = tuple[Array, Array]
+
+
+class Ends(NamedTuple):
+    """Energies at the start and at the end of a run, and the larger of both kinetic energies; per member."""
+
+    first: Array
+    last: Array
+    moved: Array
+
+
+def warn_of_nonsense(run: Run, start: State | None, visited: known_energy.Visited | None = None) -> None:
+    """Warn of what is finite and yet means nothing, as far as it is seen at little cost.
+
+    Args:
+        run: which.
+        start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
+        visited: of adaptive steps, between which y some members have been, by their places.
+    """
+    system = run.system
+    if (text := system.doubt(run.y)) is not None:
+        warnings.warn(text, AccuracyWarning, stacklevel=3)
+    if not isinstance(system, NBody):
+        if text is None and is_heard(AccuracyWarning) and (text := known_energy.told(run, start, visited)) is not None:
+            warnings.warn(text, AccuracyWarning, stacklevel=3)
+        return
+    if run.force is None:
+        ends = _ends(run, system, start) if system.keeps_energy else None
+        energy = None if ends is None else _of_energy(run.method.name, ends)
+        if energy is None and system.keeps_energy and start is not None:
+            energy = _of_massless(run, system, start)
+        met = None if run.encounter is None else _of_encounters(run, system, start, None if energy is None else energy[1])
+        if text := "; ".join(text for text in (None if energy is None else energy[0], met) if text is not None):
+            warnings.warn(text, AccuracyWarning, stacklevel=3)
+    if (text := _of_a_control(run, system, start)) is not None:
+        warnings.warn(text, ControlWarning, stacklevel=3)
+
+
+def _of_a_control(run: Run, bodies: NBody, start: State | None) -> str | None:
+    """When h·C·K passed 1 under a control in the printed form, which overshoots from there on. At the start it was told before.
+
+    It is looked at in saved states, and then in every state of the first such member, or of the first that diverged.
+    """
+    control = bodies.control
+    if not (isinstance(control, EnergyControl) and control.form == "printed"):
+        return None
+    if run.paces is not None or start is None or run.overshoots is None or not is_heard(ControlWarning):
+        return None
+    with np.errstate(all="ignore"):
+        gain = run.dt * np.asarray(control.gain)
+        began = gain * bodies.kinetic(np.broadcast_to(start[0], run.y.shape[1:]))
+        if (began >= 1.0).any():
+            return None
+        saved = (gain * bodies.kinetic(np.moveaxis(run.v, 0, 2)) >= 1.0).any(axis=0)
+    over = saved | (run.status != 0)
+    if not over.any():
+        return None
+    index = tuple(np.argwhere(over)[0].tolist())
+    found = run.overshoots(index, encounters.MAX_RERUN)
+    if found is None:
+        return None
+    step, strength = found
+    return (
+        f"gain: h·C·K = {strength:.3g} at step {step} (t = {time_of(run, step, index):g}){of_member(index)}, expected below 1: "
+        f'from there on the printed form overshoots and may overflow; use a smaller gain or step, or form="limited"'
+    )
+
+
+def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple[int, ...] | None) -> str | None:
+    """Two bodies that met within a step, if there is reason to look for them and it takes a moment.
+
+    Args:
+        run: which.
+        bodies: its system.
+        start: where it began; None if it went on.
+        doubtful: a member whose energy is doubtful, or None.
+    """
+    if not is_heard(AccuracyWarning):
+        return None
+    suspects = [doubtful] if doubtful is not None else [] if start is None else _suspects(run, bodies, start)
+    left = float(encounters.MAX_RERUN)
+    for index in suspects:
+        assert run.encounter is not None
+        if left <= 0.0:
+            break
+        if run.status[index]:
+            continue  # it diverged, which was told with the pair
+        if (met := run.encounter(index, left)) is not None:
+            i, j = met.bodies
+            return (
+                f"bodies {i} and {j}{of_member(index)} met within step {met.step} "
+                f"(t = {time_of(run, met.step, index):g}), {met.distance:.3g} apart, which steps of {run.dt:g} do not follow"
+            )
+        left -= run.steps * float(np.prod(bodies.y_shape))
+    return None
+
+
+def is_heard(kind: type[Warning]) -> bool:
+    """Whether such a warning is not ignored altogether: nothing need be looked for then."""
+    for action, message, category, module, _ in warnings.filters:
+        if message is None and module is None and issubclass(kind, category):
+            return action != "ignore"
+    return True
+
+
+def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
+    """Members of whom two bodies would meet within a step.
+
+    If they went on alone, from the start or from a saved state; or that did so, alone, before the end.
+    """
+    n, members, made = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
+    # Where time runs back, bodies are looked at that go the other way.
+    h, time, way = abs(run.dt), run.steps * abs(run.dt), 1.0 if run.dt > 0.0 else -1.0
+    # As many states as are little work against the run. Time runs back from the last.
+    few = run.status.ndim == 0 and n <= FEW_BODIES
+    looked = min(STATES, len(run.t) - 1, made // EVALUATIONS)
+    between = np.linspace(1, len(run.t) - 1, looked, endpoint=False, dtype=int).tolist() if len(run.t) > 2 else []
+    states = [(way * v, y) for v, y in (start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1]))]
+    if few:
+        if made < FEW_EVALUATIONS:
+            return []
+        return (
+            [()]
+            if any(encounters.may_meet(bodies, h, time, *(_lists(block, bodies.y_shape) for block in state)) for state in states)
+            else []
+        )
+    if made < EVALUATIONS or made * members * n * n < 2 * PAIRS or members * n * n > MOST_NUMBERS:
+        return []
+    may = np.zeros(run.status.shape, dtype=bool)
+    for v, y in (states[0], states[-1]):
+        may |= encounters.may_meet_each(bodies, h, time, np.broadcast_to(v, y.shape), y)
+    return [tuple(index) for index in np.argwhere(may).tolist()]
+
+
+def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
+    """What is to be said, and of which member."""
+    first, last, _ = ends
+    wrong = _changed(ends)
+    if not wrong.any():
+        return None
+    index = tuple(np.argwhere(wrong)[0].tolist())
+    some = int(np.count_nonzero(wrong))
+    text = (
+        f"{share(some, wrong.shape, wrong.size)} {'has' if some == 1 else 'have'} another energy at the end: "
+        f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}{last[index]:.3g} instead of {first[index]:.3g}, "
+        f"so {method} did not follow its orbit"
+    )
+    return text, index
+
+
+def _changed(ends: Ends) -> Any:
+    """Where an energy at the end is of another size than at the start."""
+    first, last, moved = ends
+    with np.errstate(all="ignore"):
+        wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
+    return wrong & np.isfinite(last)  # members that diverged were named before
+
+
+def _of_massless(run: Run, bodies: NBody, start: State) -> tuple[str, tuple[int, ...]] | None:
+    """What is to be said of bodies without mass around a single one with mass, and of which member.
+
+    The energy of all bodies is blind to them. Relative to a single attractor each keeps its energy per unit of mass; several
+    attractors may take from it or add to it as much as they like.
+    """
+    if bodies.masses.all():
+        return None  # the usual case, which takes a microsecond
+    alone = np.count_nonzero(bodies.masses, axis=0) == 1
+    made = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
+    if not alone.any() or made < FEW_EVALUATIONS or run.y[-1].size > MOST_NUMBERS:
+        return None
+    (v, y), batch = (run.v[-1], run.y[-1]), run.status.shape
+    masses = np.broadcast_to(aligned(bodies.masses, 1, batch), (len(y), *batch))
+    attractor = masses.argmax(axis=0)[np.newaxis, np.newaxis]
+    strength = bodies.G * masses.max(axis=0)
+
+    def energies(v: Array, y: Array) -> tuple[Array, Array]:
+        d, w = (each - np.take_along_axis(each, attractor, axis=0) for each in (y, v))
+        r2 = (d * d).sum(axis=1) + bodies.softening * bodies.softening
+        kinetic = 0.5 * (w * w).sum(axis=1)
+        return kinetic + strength * (-1.0 / np.sqrt(r2) if bodies.force == "newton" else 0.5 * np.log(r2)), kinetic
+
+    with np.errstate(all="ignore"):
+        (first, began), (last, ended) = energies(np.broadcast_to(start[0], y.shape), start[1]), energies(v, y)
+    wrong = _changed(Ends(first, last, np.maximum(began, ended))) & (masses == 0.0) & alone
+    if not wrong.any():
+        return None
+    body, *index = np.argwhere(wrong)[0].tolist()
+    some = int(np.count_nonzero(wrong))
+    who, energies_at = f"body {body}{of_member(tuple(index))}", f"{last[body, *index]:.3g} instead of {first[body, *index]:.3g}"
+    energy, followed = "another energy per mass at the end", f"so {run.method.name} did not follow"
+    text = (
+        f"{who}, which has no mass, has {energy}: {energies_at}, {followed} its orbit"
+        if some == 1
+        else f"{some} bodies without mass have {energy}: {who} has {energies_at}, {followed} their orbits"
+    )
+    return text, tuple(index)
+
+
+def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
+    """What was recorded, or what is computed now where that costs little against the run; None where it would not."""
+    if "energy" in run.recorded and len(run.t) > 1:
+        with np.errstate(all="ignore"):
+            moved = np.maximum(bodies.kinetic(run.v[0]), bodies.kinetic(run.v[-1]))
+        first, last = run.recorded["energy"][[0, -1]]
+        return Ends(first, last, moved)
+    if start is None:
+        return None
+    end = run.v[-1], run.y[-1]
+    n, members = len(end[1]), run.status.size
+    made = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
+    if run.status.ndim == 0 and n <= FEW_BODIES:
+        return _of_few(bodies, start, end) if made >= FEW_EVALUATIONS else None
+    if made < EVALUATIONS or made * members * n * n < 2 * PAIRS or prod(end[1].shape) > MOST_NUMBERS or not members:
+        return None
+    start = np.broadcast_to(start[0], end[0].shape), start[1]  # one number may have been given for all
+    with np.errstate(all="ignore"):
+        moved = np.maximum(bodies.kinetic(start[0]), bodies.kinetic(end[0]))
+        return Ends(_energies(run, bodies, *start), _energies(run, bodies, *end), moved)
+
+
+def _energies(run: Run, bodies: NBody, v: Array, y: Array) -> Array:
+    """The energies of a state, which have the same bits either way."""
+    if len(y) < MIN_BODIES_BY_CORE:
+        return bodies.energy(v, y)
+    step = engine.Plan(bodies, method("false_euler"), run.status.shape, 1.0, every=1, threads=1, record=("energy",))
+    recorded = engine.advance(step, v, y).recorded
+    assert recorded is not None
+    energies: Array = recorded["energy"][0]
+    return energies
+
+
+def _least(counts: Any) -> int:
+    """The least of some counts."""
+    return int(counts) if counts.ndim == 0 else int(counts.min(initial=2**62))
+
+
+def _of_few(bodies: NBody, start: State, end: State) -> Ends | None:
+    """The energies of one member, or None where they are not doubtful, which is told without an array."""
+    (first, moved_first), (last, moved_last) = (_summed(bodies, v.tolist(), y.tolist()) for v, y in (start, end))
+    moved = max(moved_first, moved_last)
+    if abs(last - first) <= DOUBTFUL_CHANGE * max(moved, abs(first), abs(last)):
+        return None
+    return Ends(np.asarray(first), np.asarray(last), np.asarray(moved))
+
+
+def _lists(block: Array, shape: Shape) -> Any:
+    """A block of one member as lists; one number may have been given for all."""
+    found = block.tolist()
+    return found if isinstance(found, list) else [[found] * shape[1]] * shape[0]
+
+
+def _summed(bodies: NBody, v: Any, y: Any) -> tuple[float, float]:
+    """The energy of one state, of lists or of one number for all of v, and its kinetic part, in floats; NaN if not finite."""
+    if not isinstance(v, list):
+        v = [[v] * len(row) for row in y]
+    masses, soft = bodies.masses.tolist(), float(bodies.softening) ** 2
+    strength = float(bodies.G)
+    newton = bodies.force == "newton"
+    try:
+        kinetic = sum(0.5 * m * sum(x * x for x in row) for m, row in zip(masses, v, strict=True))
+        potential = 0.0
+        for i, (m, place) in enumerate(zip(masses, y, strict=True)):
+            for j in range(i):
+                square = sum((a - b) * (a - b) for a, b in zip(place, y[j], strict=True)) + soft
+                potential += m * masses[j] * (-1.0 / math.sqrt(square) if newton else 0.5 * math.log(square))
+    except (ValueError, ZeroDivisionError):  # two bodies in one place, or what is not finite
+        return math.nan, math.nan
+    return kinetic + strength * potential, kinetic

@@ -1,0 +1,103 @@
+"""Slots in, slots out: the same run by the Rust core or by the NumPy reference, in direct, matrix or power form.
+
+A slot is the array that holds a block between steps: v for most methods, the carry for those that have one. Everything
+above this folder works with states, everything below with slots.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+
+from ... import _core
+from .adaptive import (
+    ABSOLUTE,
+    BLIND,
+    COUNTS,
+    ERROR,
+    HELD,
+    LASTS,
+    LEAST,
+    MOST_STEP,
+    PACE_NUMBERS,
+    RELATIVE,
+    STEP,
+    TARGET,
+    TIME,
+    WORK,
+    Adapted,
+    AdaptiveArrays,
+    CorePacing,
+    Pacing,
+    Tolerances,
+    adapt,
+    attempt_by_numpy,
+    attempts,
+    begun,
+    begun_again,
+    evaluations,
+    groups_of,
+    jumps_of,
+    numbers_of,
+    of_unit_step,
+    pace_numbers,
+    pace_of,
+    paces,
+    pacing_of_core,
+)
+from .direct import to_slot
+from .forms import advance
+from .plan import Arrays, Outcome, Plan, Watched, model, pushes
+
+__all__ = [
+    "ABSOLUTE",
+    "BLIND",
+    "COUNTS",
+    "ERROR",
+    "HELD",
+    "LASTS",
+    "LEAST",
+    "MOST_STEP",
+    "PACE_NUMBERS",
+    "RELATIVE",
+    "STEP",
+    "TARGET",
+    "TIME",
+    "WORK",
+    "Adapted",
+    "AdaptiveArrays",
+    "Arrays",
+    "CorePacing",
+    "Outcome",
+    "Pacing",
+    "Plan",
+    "Tolerances",
+    "Watched",
+    "adapt",
+    "advance",
+    "attempt_by_numpy",
+    "attempts",
+    "begun",
+    "begun_again",
+    "evaluations",
+    "groups_of",
+    "jumps_of",
+    "model",
+    "numbers_of",
+    "of_unit_step",
+    "pace_numbers",
+    "pace_of",
+    "paces",
+    "pacing_of_core",
+    "pushes",
+    "to_slot",
+]
+
+if hasattr(os, "register_at_fork"):
+    #: Whether there was another thread when the process forked: what it was compiling or had locked stays so in the child.
+    _others: list[bool] = []
+    os.register_at_fork(
+        before=lambda: _others.append(threading.active_count() > 1),
+        after_in_parent=lambda: _others.clear(),
+        after_in_child=lambda: _core.forget() if _others.pop() else None,
+    )

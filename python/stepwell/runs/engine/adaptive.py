@@ -1,0 +1,293 @@
+"""Runs with adaptive steps, by the core or by the reference."""
+
+from __future__ import annotations
+
+from functools import partial
+from math import prod
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ...base.arrays import Array, Shape, Whole
+from ...model.methods import Method
+from ...model.systems import System
+from ...model.systems.base import rows
+from .by_tape import blocks_of, evaluated, rows_of
+from .plan import Plan, model
+
+if TYPE_CHECKING:
+    from ...reference.adaptive import Jumps, Pace
+
+#: How many numbers a ``Pace`` has that are not of each group of components; behind them are those of the groups.
+PACE_NUMBERS = 20
+#: Places among them; the counts are of accepted, rejected and extra steps.
+TIME, STEP, TARGET, HELD, RELATIVE, ABSOLUTE, LASTS, ERROR = 0, 1, 2, 4, 5, 6, 7, 18
+MOST_STEP, COUNTS, WORK = 11, slice(15, 18), 19
+#: The first step where the state tells nothing, in units of time; in a run of less than SHORT of them, this part of its time. So
+#: steps of other runs do not depend on when states are saved.
+BLIND = 1.0 / (1 << 20)
+SHORT = 32.0 * BLIND
+#: The least absolute tolerance, 1024 times the smallest number above zero. A state that grows out of zero, before a smooth push,
+#: begins with numbers of few bits, of which an error cannot be small beside the whole.
+LEAST = 2.0**-1064
+
+
+class Tolerances(NamedTuple):
+    """What is tolerated of a step: numbers over the batch, or with one for each group along the first axis.
+
+    Without ``absolute`` the relative error is one of the largest that a group has been.
+    """
+
+    relative: Array
+    absolute: Array | None
+    of_groups: bool = False
+
+
+class Pacing(NamedTuple):
+    """When the state is asked for, ascending, the most attempts of a member, and whether members have yet to begin.
+
+    ``at`` and ``jumps``, the times that no step crosses, are the same for all members or of each, shape (times, *batch).
+    """
+
+    at: Array
+    budget: int
+    begins: bool = False
+    jumps: Array | None = None
+
+
+class CorePacing(NamedTuple):
+    """The same as the core takes it: rows of one number for all or for each member, those of jumps twice, before and after."""
+
+    at: Array
+    jumps: Array
+    budget: int
+    begins: bool
+
+
+def jumps_of(plan: Plan, pacing: Pacing) -> Jumps | None:
+    """The times that no step crosses."""
+    from ...reference import adaptive
+
+    return None if pacing.jumps is None or not len(pacing.jumps) else adaptive.Jumps.around(pacing.jumps, plan.t0)
+
+
+def pacing_of_core(plan: Plan, pacing: Pacing) -> CorePacing:
+    """As the core takes it."""
+    jumps = jumps_of(plan, pacing)
+    both = np.empty((0, 1)) if jumps is None else np.concatenate([_rows(jumps.before, plan), _rows(jumps.after, plan)])
+    return CorePacing(_rows(pacing.at, plan), both, pacing.budget, pacing.begins)
+
+
+def _rows(times: Array, plan: Plan) -> Array:
+    """Times as rows of one number for all, or one for each member."""
+    width = plan.members if times.ndim > 1 else 1
+    of_each = np.broadcast_to(times, (len(times), *plan.batch)) if times.ndim > 1 else times
+    return np.ascontiguousarray(of_each.reshape(len(times), width), dtype=np.float64)
+
+
+class AdaptiveArrays(NamedTuple):
+    """What a run with a tolerance begins with and what it fills, for the core.
+
+    Attributes:
+        v: rows of v, of one number for each member or one for all.
+        y: rows of y, likewise.
+        paces: where members stand at the start, shape (numbers, members), or (…, 1) where that is the same for all.
+        saved_v: velocities at the asked times, shape (times, *block, *batch); NaN from where a member stopped.
+        saved_y: coordinates, likewise.
+        last_state: the state where members stand at the end, shape (numbers of v and y, members).
+        last_paces: where they stand, as ``paces``.
+        status: how they ended, shape (members,).
+        trail: None; or times and steps to try next, shape (2, times, members), where attempts are made one by one until the asked
+            time, and what is kept is where members stand before the first and after each.
+    """
+
+    v: Array
+    y: Array
+    paces: Array
+    saved_v: Array
+    saved_y: Array
+    last_state: Array
+    last_paces: Array
+    status: Whole
+    trail: Array | None = None
+
+
+class Adapted(NamedTuple):
+    """Saved states, and of each member at the end the state, the numbers of its ``Pace`` and the status.
+
+    ``evaluations`` is how many function evaluations an attempt takes.
+    """
+
+    v: Array
+    y: Array
+    last_v: Array
+    last_y: Array
+    paces: Array
+    status: Whole
+    evaluations: int
+
+
+def groups_of(plan: Plan) -> int:
+    """How many groups of components a plan has."""
+    return sum(plan.acceptance.counts(prod(plan.system.v_shape), prod(plan.system.y_shape)))
+
+
+def pace_numbers(plan: Plan) -> int:
+    """How many numbers say where a member stands."""
+    return PACE_NUMBERS + groups_of(plan) * (3 if plan.acceptance.own else 1)
+
+
+def paces(
+    plan: Plan, first: Array | None, tolerances: Tolerances, most_step: Array | None = None, pacing: Pacing | None = None
+) -> Array:
+    """Where members stand before they begin, shape (numbers, *batch), or (numbers,) if it is the same for all.
+
+    Of ``pacing`` it takes the time of the run, of which a part may be the first step where the state tells nothing, and a jump at
+    the start.
+    """
+    from ...reference import adaptive  # only such runs need it
+
+    t0, groups, own = plan.t0, groups_of(plan), []
+    relative, absolute = tolerances.relative, np.maximum(LEAST, 0.0 if tolerances.absolute is None else tolerances.absolute)
+    if tolerances.of_groups:
+        absolute = np.broadcast_to(absolute, relative.shape) if tolerances.absolute is None else absolute
+        own = [*relative, *absolute]
+        relative, absolute = relative.min(axis=0), absolute.max(axis=0)
+    step: Any = first
+    if pacing is not None:
+        if (jumps := jumps_of(plan, pacing)) is not None:
+            t0 = jumps.begun(t0)
+        if step is None:
+            span = pacing.at[-1] - plan.t0
+            step = -BLIND * np.where((span > 0.0) & (span < SHORT), span, 1.0)
+    each = [-BLIND if step is None else step, relative, absolute, np.inf if most_step is None else most_step, t0]
+    h, *both, longest, begin = (np.asarray(number).item() if np.size(number) == 1 else number for number in each)
+    tolerance = both[0], both[1], float(tolerances.absolute is None)
+    numbers = [*adaptive.waiting(begin, h, tolerance, plan.system.samples, longest, groups).numbers, *own]
+    if all(np.ndim(number) == 0 for number in numbers):
+        return np.array(numbers, dtype=np.float64)
+    out = np.empty((len(numbers), *plan.batch))
+    for row, number in zip(out, numbers, strict=True):
+        row[...] = number
+    return out
+
+
+def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
+    """Where members stand at the start, by the reference; of them it is known where they stand before."""
+    from ...reference import adaptive
+
+    system, pace = of_unit_step(plan, plan.batch), pace_of(plan, paces)
+    return adaptive.begin(system, pace, v, y, plan.block_axes, plan.acceptance.groups, series=plan.method.has_series)
+
+
+def begun_again(plan: Plan, numbers: Array, t: Array, v: Array, y: Array) -> Array:
+    """The numbers of members that begin again at these times, with the tolerances and counts of before."""
+    from ...reference import adaptive
+
+    pace, zero = pace_of(plan, numbers), np.zeros(plan.batch)
+    anew = pace._replace(t=t, h=zero - BLIND, target=t, extra=zero, held=zero, begin=t, wall=zero + np.inf)
+    anew = anew._replace(before=zero + 1.0, most=zero + adaptive.MAX_FACTOR)
+    return numbers_of(begun(plan, numbers_of(anew), v, y))
+
+
+def of_unit_step(plan: Plan, batch: Shape) -> Any:
+    """The NumPy reference of the system, scaled to a step of 1, or of −1 where its time runs backward."""
+    from ...reference import adaptive
+
+    return adaptive.Backward(plan.system.alone(-1.0, batch)) if plan.backward else plan.system.alone(1.0, batch)
+
+
+def pace_of(plan: Plan, numbers: Array) -> Pace:
+    """Where the members of a plan stand, from the numbers of each, or those of all."""
+    from ...reference import adaptive
+
+    batch = plan.batch
+    rows = numbers if numbers.shape[1:] == batch else [np.broadcast_to(row, batch) for row in numbers]
+    return adaptive.Pace.of(list(rows), groups_of(plan))
+
+
+def numbers_of(pace: Pace) -> Array:
+    """The numbers of a pace, of each member."""
+    return np.array(np.broadcast_arrays(*pace.numbers))
+
+
+def evaluations(method: Method, system: System, *, order: int = 0, paced: bool = False) -> int:
+    """Function evaluations of a step, or of an attempt at an adaptive one by a series of that order.
+
+    Of a series: operations of all coefficients of the rates over those of one evaluation, rounded up. All operations count alike.
+
+    Raises:
+        UnsupportedError: if the series of the system is too long.
+    """
+    if method.has_series:
+        batch = system.batch if system.control is None else np.broadcast_shapes(system.batch, system.control.batch)
+        plan = Plan(system, method, batch, 1.0, order=order)
+        return _core.series_evaluations(model(plan.of_core()), attempts=paced)
+    return method.attempt_evaluations if paced else method.evaluations
+
+
+def attempts(plan: Plan, system: Any) -> Any:
+    """An attempt at an adaptive step by the reference: a function of a pace, a budget, v and y."""
+    from ...reference import adaptive, series_pace
+
+    steps: Any = plan.method.steps
+    if plan.method.has_series:
+        return partial(series_pace.attempt, plan.order or steps.ORDER, system, plan.block_axes, plan.acceptance)
+    assert plan.method.error_order is not None
+    return partial(adaptive.attempt, steps, system, plan.method.error_order, plan.block_axes, plan.acceptance)
+
+
+def evaluated_attempt(plan: Plan, budget: int) -> Any:
+    """An attempt at an adaptive step."""
+    made = evaluated(plan, "attempt", budget)
+
+    def attempt(pace: Pace, budget: int, v: Array, y: Array) -> tuple[Pace, Array, Array]:
+        numbers = np.broadcast_arrays(*pace.numbers)
+        out = made([*rows_of(plan, v, y), *numbers], None)
+        return (pace_of(plan, out[-len(numbers) :]), *blocks_of(v, y, out))
+
+    return attempt
+
+
+def attempt_by_numpy(plan: Plan, budget: int) -> Any:
+    """The same, by the tape if it has to be."""
+    from ...reference import adaptive
+
+    if plan.by_tape:
+        return evaluated_attempt(plan, budget)
+    return attempts(plan, adaptive.Attempted(of_unit_step(plan, plan.batch), plan.system.control))
+
+
+def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
+    """Go on from where members stand, of whom ``paces`` has the numbers of each or those of all."""
+    if plan.backend == "numpy":
+        return _adapt_by_numpy(plan, pacing, paces, v, y)
+    times, n_v, members, numbers = len(pacing.at), prod(plan.system.v_shape), plan.members, pace_numbers(plan)
+    saved_v, saved_y = np.empty((times, *v.shape)), np.empty((times, *y.shape))
+    last = np.empty((n_v + prod(plan.system.y_shape), members))
+    last_paces, status = np.empty((numbers, members)), np.empty(plan.batch, dtype=np.int64)
+    before = paces.reshape(numbers, paces.size // numbers)
+    rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
+    arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, status.reshape(-1))
+    core_pacing, core_plan = pacing_of_core(plan, pacing), plan._replace(t0=0.0)
+    spec = model(core_plan)
+    if not _core.adapt(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
+        before = numbers_of(begun(plan, paces, v, y)).reshape(numbers, members)
+        _core.adapt(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
+    series = plan.method.has_series
+    each = _core.series_evaluations(spec, attempts=True) if series else plan.method.attempt_evaluations
+    last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
+    return Adapted(saved_v, saved_y, last_v, last_y, last_paces.reshape(numbers, *plan.batch), status, each)
+
+
+def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
+    """The same by the reference."""
+    from ...reference import adaptive
+
+    pace = begun(plan, paces, v, y) if pacing.begins else pace_of(plan, paces)
+    attempt, jumps = attempt_by_numpy(plan, pacing.budget), jumps_of(plan, pacing)
+    series = plan.method.has_series
+    out = adaptive.run(attempt, v, y, pace, at=pacing.at, budget=pacing.budget, jumps=jumps, series=series)
+    each = evaluations(plan.method, plan.system, order=plan.order, paced=True)
+    return Adapted(out.v, out.y, out.last_v, out.last_y, numbers_of(out.pace), out.status, each)

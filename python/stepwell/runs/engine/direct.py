@@ -1,0 +1,164 @@
+"""A run step by step, by the core or by the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...base import buffer_pool
+from ...base.arrays import Array, Blocks, Whole
+from ...model.systems.base import rows
+from ...reference import contact
+from ...reference import run as reference
+from ...reference.signal import of_slot, over
+from .by_tape import evaluated_slot, evaluated_step
+from .plan import Arrays, Outcome, Plan, model, per_step
+
+Looped = tuple[Array, Array, Blocks, Whole]
+
+
+def advance_direct(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
+    """Make the run step by step: see ``advance``."""
+    before = first_bad_steps(plan, before)
+    if plan.backend == "numpy":
+        return _run_by_reference(plan, v, y, before, carried)
+    return run_by_core(plan, model(plan), v, y, before, carried)
+
+
+def first_bad_steps(plan: Plan, before: Whole | None) -> Whole:
+    """Those of earlier runs, to be written to; −1 for members that were finite so far."""
+    if before is not None:
+        return before.copy()
+    none: Whole = buffer_pool.empty(plan.batch, np.int64)
+    none.fill(-1)
+    return none
+
+
+def _run_by_reference(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
+    steps, s = plan.method.steps, plan.scaled()
+    if plan.single:
+        v, y = v.astype(plan.dtype), y.astype(plan.dtype)
+
+    def plain(t: float, v: Array, y: Array) -> Blocks:
+        made: Blocks = contact.step(steps, s, plan.choice, t, plan.dt, v, y)
+        return made
+
+    step = evaluated_step(plan, s) if plan.by_tape else plain
+    slot = v if carried else to_slot(plan, v, y)
+    slot, y, kept, first_bad = looped(plan, step, slot, y, before, plan.block_axes, to_velocity(plan))
+    out = finished(plan, slot, kept, first_bad)
+    with np.errstate(all="ignore"):
+        recorded = {
+            name: _stacked((s.record(name, *state) for state in zip(out.v, out.y, strict=True)), plan.kept)
+            for name in plan.record
+        }
+    work = None if plan.system.control is None else np.broadcast_to(np.asarray(s.work), plan.batch).copy()
+    return out._replace(recorded=recorded, work=per_step(plan, work))
+
+
+def _stacked(states: Iterable[Array], count: int) -> Array:
+    """So many arrays of one shape as one, without a list of them."""
+    stack = np.empty(0)
+    for i, state in enumerate(states):
+        if i == 0:
+            stack = np.empty((count, *state.shape))
+        stack[i] = state
+    return stack
+
+
+def to_velocity(plan: Plan) -> reference.Velocity | None:
+    """Makes velocities of what the method carries in their place at a time; None if it carries nothing else."""
+    if plan.method.carry is None:
+        return None
+    if plan.by_tape:
+        return evaluated_slot(plan, "finish")
+    s, finish = plan.scaled(), plan.method.steps.finish
+
+    def velocity(t: float, slot: Array, y: Array) -> Array:
+        with over(of_slot(t, plan.dt)):
+            return np.asarray(finish(s, plan.choice, t, slot, y))
+
+    return velocity
+
+
+def looped(
+    plan: Plan,
+    step: reference.Step,
+    v: Array,
+    y: Array,
+    before: Whole,
+    block_axes: tuple[int, int],
+    velocity: reference.Velocity | None,
+) -> Looped:
+    """The steps of the plan by the reference, which tells of its progress."""
+    done, every = 0, max(1, plan.steps // 100)
+
+    def told(t: float, v: Array, y: Array) -> Blocks:
+        nonlocal done
+        done += 1
+        if plan.progress is not None and done % every == 0:
+            plan.progress(done / plan.steps)
+        return step(t, v, y)
+
+    counts: Any = {"h": plan.dt, "t0": plan.t0, "first": plan.first, "steps": plan.steps, "saves": plan.saves}
+    return reference.run(told, v, y, before, block_axes, velocity=velocity, **counts)
+
+
+def to_slot(plan: Plan, v: Array, y: Array) -> Array:
+    """What the method carries at the first step."""
+    if plan.method.carry is None:
+        return v
+    t = plan.t0 + plan.first * plan.dt
+    with np.errstate(all="ignore"):
+        if plan.by_tape:
+            return evaluated_slot(plan, "start")(t, v, y)
+        with over(of_slot(t, plan.dt)):
+            return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
+
+
+def finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
+    """The states from the kept slots, which are the caller's to spend."""
+    v, y = kept
+    if velocity := to_velocity(plan):
+        if np.shares_memory(slot, v):
+            slot = slot.copy()
+        with np.errstate(all="ignore"):
+            for i, step in enumerate(plan.saves):
+                v[i] = velocity(plan.t0 + (plan.first + int(step)) * plan.dt, v[i], y[i])
+    return Outcome(v, y, slot, np.asarray(first_bad, dtype=np.int64))
+
+
+def run_by_core(
+    plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
+) -> Outcome:
+    """The run by the core. ``carries`` is whether it has a carry at the end, where that does not go by the method."""
+    carries = plan.method.carry is not None if carries is None else carries
+    kept = plan.kept
+    empty = np.empty if kept * (v.size + y.size) < buffer_pool.LEAST_LENT // 8 else buffer_pool.empty
+    saved_v, saved_y = empty((kept, *v.shape), plan.dtype), empty((kept, *y.shape), plan.dtype)
+    carry = np.empty(v.shape, plan.dtype) if carries else None
+    recorded = None
+    if plan.record:
+        shapes = {name: plan.system.quantities[name] for name in plan.record}
+        recorded = buffer_pool.empty((kept, sum(map(prod, shapes.values())), *plan.batch))
+    work = None if plan.system.control is None else np.empty(plan.batch, plan.dtype)
+    tally, noticed = None if work is None else work.reshape(-1), None
+    if plan.watched is not None:
+        before_it = 0 if work is None else 1
+        sums = np.full((before_it + plan.watched.number + 1, *plan.batch), np.nan)
+        tally, noticed, work = sums.reshape(-1), sums[before_it:], None
+    rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
+    diverged = _core.run(
+        model, plan.of_core(), Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
+    )
+    by_name: dict[str, Array] = {}
+    if recorded is not None:
+        for name, shape in shapes.items():
+            mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
+            by_name[name] = mine.reshape(kept, *shape, *plan.batch)
+    work = None if work is None else per_step(plan, work)
+    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged, noticed)

@@ -1,0 +1,20 @@
+"""A run in its form: step by step, by the transition matrix, or by its powers."""
+
+from __future__ import annotations
+
+from ...base.arrays import Array, Whole
+from .direct import advance_direct, first_bad_steps
+from .plan import Outcome, Plan
+
+
+def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
+    """Make the run. ``v`` holds what the method carries if ``carried``; both have the shape of a block and a batch.
+
+    ``before`` has the first bad steps of earlier runs, −1 for members that were finite so far.
+    """
+    if plan.form == "direct":
+        return advance_direct(plan, v, y, before, carried=carried)
+    from . import linear  # only such runs need it
+
+    go = linear.by_matrix if plan.form == "matrix" else linear.by_power
+    return go(plan, v, y, first_bad_steps(plan, before), carried)

@@ -1,0 +1,227 @@
+"""Linear systems: a step by the transition matrix (Appendix B), and many steps by a power of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import count
+from math import floor, prod
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...base import checks
+from ...base.arrays import Array, Blocks, Whole
+from ...model.systems import Sampled
+from ...model.systems.base import flat
+from ...reference import run as reference
+from .direct import Looped, advance_direct, finished, looped, run_by_core, to_slot, to_velocity
+from .plan import BEGINS, Outcome, Plan
+
+#: Numbers that are kept at a time for each element of the matrix: unit vectors, their states after a step, what the core makes of
+#: them; and of powers one that is squared, one that is made, and their product.
+NUMBERS_OF_AN_ELEMENT, NUMBERS_OF_A_POWER = 8, 3
+
+#: Numbers of states, and of matrices that members have of their own, that are stepped at once: an operation with so many takes a
+#: millisecond.
+NUMBERS_AT_ONCE = 1 << 20
+
+
+def _fits(plan: Plan, numbers: int) -> None:
+    """Raise if there is no memory for transition matrices."""
+    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    checks.fits(f"the transition matrices of {n} × {n} numbers", float(numbers) * n * n, plan.batch, "use form='direct'")
+
+
+def transition(plan: Plan) -> Array:
+    """P of shape (n, n, *batch), from one step of each unit vector of the slots (v slot first).
+
+    Each vector of a member takes the member's parameters with it, as many as a matrix has, so some vectors go at once.
+    """
+    n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
+    n = n_v + n_y
+    free = plan._replace(system=plan.system.without_inputs())
+    at_once = max(1, NUMBERS_AT_ONCE // (n * n * prod(plan.batch))) if plan.system.batch else n
+    made: Array = np.empty((n, n, *plan.batch))
+    for k in range(0, n, at_once):
+        along = np.eye(n)[:, k : k + at_once].reshape(n, -1, *(1,) * len(plan.batch))
+        batch = (along.shape[1], *plan.batch)
+        unit = np.broadcast_to(along, (n, *batch))
+        v, y = unit[:n_v].reshape(*plan.system.v_shape, *batch), unit[n_v:].reshape(*plan.system.y_shape, *batch)
+        made[:, k : k + at_once] = one_step(free._replace(batch=batch), v, y)
+    return made
+
+
+def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
+    """Q of shape (nodes, inputs, n, *batch), from one step from rest with a unit pulse of one input at one node."""
+    grid = _grid(plan.method.nodes)
+    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    inputs = list(inputs)
+    q = np.zeros((len(plan.method.nodes), len(inputs), n, *plan.batch))
+    for i, node in enumerate(plan.method.nodes):
+        pulse, part = np.zeros(grid + 1), abs(plan.dt) / grid
+        # Of a step back in time the last part comes first, and a node is at the end of its part.
+        back = plan.dt < 0.0
+        pulse[grid - _bin(node, grid) if back else _bin(node, grid)] = 1.0
+        start = -(grid + _LATE) * part if back else 0.0
+        for j, name in enumerate(inputs):
+            q[i, j] = one_step(plan._replace(system=plan.system.with_pulse(name, pulse, part, start)))
+    return q
+
+
+#: Nodes are less than 0.9 of a part behind its beginning: so much more of it lies behind all of them.
+_LATE = 0.95
+
+
+def _bin(node: float, grid: int) -> int:
+    """Which of so many parts of a step holds a node."""
+    return floor(node * grid + 1e-6)
+
+
+def _grid(nodes: Iterable[float]) -> int:
+    """The least number of parts of a step that hold its nodes apart, none of them near the end of its part."""
+    nodes = list(nodes)
+    return next(
+        n for n in count(1) if len({_bin(c, n) for c in nodes}) == len(nodes) and all(c * n - _bin(c, n) < 0.9 for c in nodes)
+    )
+
+
+def one_step(plan: Plan, v: Array | None = None, y: Array | None = None) -> Array:
+    """The slots after one step at t = 0, from rest if not from ``v`` and ``y``, as rows: those of v, then those of y."""
+    if v is None or y is None:
+        v, y = (np.zeros((*shape, *plan.batch)) for shape in (plan.system.v_shape, plan.system.y_shape))
+    one = plan._replace(t0=0.0, first=0, steps=1, every=None, form="direct", progress=None)
+    out = advance_direct(one, v, y, carried=True)
+    n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
+    return np.concatenate([out.slot.reshape(n_v, *plan.batch), out.y[-1].reshape(n_y, *plan.batch)])
+
+
+def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
+    """A step by a transition matrix, P of shape (n, n, *batch), Q of shape (nodes·inputs, n, *batch), as the core takes it."""
+    n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
+    q = Q.reshape(prod(Q.shape[: Q.ndim - 1 - len(plan.batch)]), n_v + n_y, *plan.batch)
+    inputs = [each.signal() for each in plan.system.given_inputs().values()]
+    carries = int(plan.method.carry is not None)
+    linear_map: dict[str, Any] = {"n": n_v + n_y, "n_v": n_v, "carries": carries, "p": P, "q": q, "inputs": inputs}
+    if isinstance(plan.t0, np.ndarray) and inputs:
+        linear_map[BEGINS] = plan.t0
+    return _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(list(plan.method.nodes), n_v))
+
+
+def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
+    """The run by the transition matrix, step by step."""
+    _fits(plan, NUMBERS_OF_AN_ELEMENT)
+    given = plan.system.given_inputs()
+    p, q = transition(plan), pulses(plan, given)
+    q = q.reshape(q.shape[0] * q.shape[1], *q.shape[2:])
+    slot = v if carried else to_slot(plan, v, y)
+    n_v, n_y = v.size // max(1, prod(plan.batch)), y.size // max(1, prod(plan.batch))
+    blocks = (*plan.system.v_shape, *plan.batch), (*plan.system.y_shape, *plan.batch)
+    flat_v, flat_y = slot.reshape(n_v, *plan.batch), y.reshape(n_y, *plan.batch)
+
+    linear = reference.linear_step(
+        p, q, [i.signal() for i in given.values()], plan.method.nodes, plan.dt, plan.method.carry is not None
+    )
+    finish = to_velocity(plan)
+
+    def step(t: float, v: Array, y: Array) -> Blocks:
+        s = linear(t, np.concatenate([v, y]))
+        return s[:n_v], s[n_v:]
+
+    def velocity(t: float, v: Array, y: Array) -> Array:
+        return v if finish is None else np.reshape(finish(t, v.reshape(blocks[0]), y.reshape(blocks[1])), v.shape)
+
+    def by_reference(plan: Plan, v: Array, y: Array, before: Whole) -> Looped:
+        return looped(plan, step, v, y, before, (1, 1), None if finish is None else velocity)
+
+    if plan.backend == "numpy":
+        flat_v, _, kept, first_bad = by_reference(plan, flat_v, flat_y, before)
+    else:
+        spec = matrix_model(plan, p, q)
+
+        def by_core(plan: Plan, v: Array, y: Array, before: Whole) -> Outcome:
+            return run_by_core(plan, spec, v, y, before.copy(), carried=True, carries=False)
+
+        out = by_core(plan, flat_v, flat_y, before)
+        first_bad = out.first_bad if finish is None else _seen(plan, by_core, by_reference, flat_v, flat_y, before, out)
+        flat_v, kept = out.slot, (out.v, out.y)
+    v, y = (a.reshape(len(a), *block) for a, block in zip(kept, blocks, strict=True))
+    return finished(plan, flat_v.reshape(blocks[0]), (v, y), first_bad)
+
+
+#: As the core's ``HUGE``.
+_HUGE = 2.0**960
+
+#: Steps between two checks of whether a velocity may have overflowed.
+_PIECE = 1024
+
+
+def _seen(
+    plan: Plan,
+    by_core: Callable[[Plan, Array, Array, Whole], Outcome],
+    by_reference: Callable[[Plan, Array, Array, Whole], Looped],
+    v: Array,
+    y: Array,
+    before: Whole,
+    out: Outcome,
+) -> Whole:
+    """The first bad steps of a run in matrix form, whose velocities the core does not know.
+
+    Members that come near the end of the number range are stepped again by the reference, from the last check before that.
+    """
+    most = _HUGE * min(abs(plan.dt), 1.0)
+
+    def is_near(v: Array, y: Array) -> Any:
+        return (before < 0) & ~((np.abs(v) < most).all(axis=-1 - before.ndim) & (np.abs(y) < most).all(axis=-1 - before.ndim))
+
+    near = np.logical_or.reduce(is_near(out.v, out.y), axis=0) | (out.first_bad > before)
+    if not near.any():
+        return out.first_bad
+    # Members whose carry is not finite need no further checks.
+    last = plan.steps if (near & (out.first_bad < 0)).any() else int(out.first_bad.max()) - plan.first
+    for done in range(0, last, _PIECE):
+        piece = plan._replace(first=plan.first + done, steps=min(_PIECE, last - done), every=None, progress=None)
+        ahead = by_core(piece, v, y, before)
+        if is_near(ahead.v[-1], ahead.y[-1]).any():
+            before = by_reference(piece, v, y, before)[3]
+        v, y = ahead.slot, ahead.y[-1]
+    return np.asarray(before)
+
+
+def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
+    """By powers of the transition matrix; the backend finds P and Q, the rest is the reference's."""
+    from ...reference import power  # only this form needs it
+    from ...reference.signal import Constant, Sine
+
+    def wide(array: Any) -> Array:
+        return np.broadcast_to(array, plan.batch).reshape(-1)
+
+    _fits(plan, NUMBERS_OF_AN_ELEMENT + NUMBERS_OF_A_POWER)
+    given = plan.system.given_inputs()
+    inputs = [
+        Constant(wide(each.values[0]))
+        if isinstance(each, Sampled)
+        else Sine(wide(each.amplitude), wide(each.omega), wide(each.phase))
+        for each in given.values()
+    ]
+    members, n_v = plan.members, prod(plan.system.v_shape)
+    slot = v if carried else to_slot(plan, v, y)
+    s = np.concatenate([slot.reshape(n_v, members), y.reshape(prod(plan.system.y_shape), members)])
+    p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in (transition(plan), pulses(plan, given)))
+
+    drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt)
+    kept, saves = (np.empty((plan.kept, *v.shape)), np.empty((plan.kept, *y.shape))), plan.saves
+    with np.errstate(all="ignore"):
+        step = power.one_step(p, q, inputs, plan.method.nodes, drive)
+        states = power.run(step, drive, s, before.reshape(-1), t0=wide(plan.t0), first=plan.first, saves=map(int, saves))
+        for i, s in enumerate(states):
+            kept[0][i], kept[1][i] = s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)
+            if plan.progress is not None:
+                plan.progress((i + 1) / len(saves))
+    out = finished(plan, kept[0][-1], kept, before)
+    # Velocities are made of what is carried at saved states only, so a power cannot tell of those between.
+    first_bad = out.first_bad.reshape(-1)
+    for save, v in zip(plan.saves, out.v.reshape(plan.kept, n_v, members), strict=True):
+        bad, k = ~np.isfinite(v).all(axis=0), plan.first + int(save)
+        first_bad[bad & ((first_bad < 0) | (first_bad > k)) & (save > 0)] = k
+    return out

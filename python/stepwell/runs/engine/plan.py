@@ -1,0 +1,192 @@
+"""What to run, and the same as the core takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ...base import checks
+from ...base.arrays import Array, Shape, Whole
+from ...model.controls import EnergyControl
+from ...model.methods import Method
+from ...model.systems import System
+from ...model.systems.base import rows
+from ...reference.acceptance import Acceptance
+
+#: Under this name the core takes the times of step 0 of members that have their own.
+BEGINS = "time.begins"
+
+
+class Watched(NamedTuple):
+    """Quantities whose changes of sign the core notices while it makes steps: what it computes them by, and how many they are."""
+
+    quantities: _core.Equations
+    number: int
+
+
+class Plan(NamedTuple):
+    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
+
+    ``t0`` is the time of step 0, or that of each member, shape (*batch), which the core takes as a parameter: see ``of_core``.
+    ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32. Of adaptive steps,
+    ``acceptance`` is what they must satisfy, and ``backward`` whether the time of the system is that of the run, negated.
+    """
+
+    system: System
+    method: Method
+    batch: Shape
+    dt: float
+    t0: Any = 0.0
+    first: int = 0
+    steps: int = 1
+    every: int | None = None
+    choice: int = 0
+    threads: int = 0
+    backend: str = "rust"
+    form: str = "direct"
+    progress: Callable[[float], object] | None = None
+    record: tuple[str, ...] = ()
+    fused: bool = False
+    force: Array | None = None
+    watched: Watched | None = None
+    order: int = 0
+    single: bool = False
+    acceptance: Acceptance = Acceptance()  # it is immutable
+    backward: bool = False
+
+    def t0_of(self, members: Any) -> Any:
+        """The time of step 0 of these members of one batch axis, which may be that of all."""
+        return self.t0[members] if isinstance(self.t0, np.ndarray) else self.t0
+
+    def of_core(self) -> Plan:
+        """The same with one clock for all members, at 0 where each has a time of its own."""
+        return self._replace(t0=0.0) if isinstance(self.t0, np.ndarray) else self
+
+    @property
+    def dtype(self) -> type[Any]:
+        """Of the states."""
+        return np.float32 if self.single else np.float64
+
+    @property
+    def saves(self) -> Whole:
+        """The steps, counted from the first, at which the state is kept: every so many, and the last."""
+        if self.every is None:
+            return np.array([self.steps], dtype=np.int64)
+        every = min(self.every, self.steps)
+        kept = np.arange(0, self.steps + every, every, dtype=np.int64)  # an array, for there may be millions of them
+        kept[-1] = self.steps
+        return kept
+
+    @property
+    def kept(self) -> int:
+        """How many states are kept."""
+        return 1 if self.every is None else -(-self.steps // min(self.every, self.steps)) + 1
+
+    def scaled(self) -> Any:
+        """The NumPy reference of the system, scaled to the step, with the force."""
+        return self.system.scaled(self.dt, self.batch, self.force)
+
+    @property
+    def by_tape(self) -> bool:
+        """Whether the NumPy backend evaluates the tape of the reference, as for what is fused or of float32, and for a series."""
+        return self.fused or self.single or self.method.has_series
+
+    @property
+    def members(self) -> int:
+        """How many trajectories."""
+        return prod(self.batch)
+
+    @property
+    def block_axes(self) -> tuple[int, int]:
+        """How many axes a block of v and one of y have."""
+        return len(self.system.v_shape), len(self.system.y_shape)
+
+
+class Arrays(NamedTuple):
+    """The arrays of a run for the core: those it starts from and those it fills.
+
+    Attributes:
+        v: rows of the v slot, with one number for each member or one for all.
+        y: rows of y, likewise.
+        carried: whether the v slot holds the carry of the method instead of velocities.
+        saved_v: the saved velocities (in the matrix form: v slots), shape (saved, *block, *batch).
+        saved_y: the saved coordinates.
+        recorded: recorded quantities, shape (saved, numbers, *batch); None if there are none.
+        tally: for each member the sum that a control or projection accumulates; None without one.
+        carry: the last v slots; None if the method carries v.
+        first_bad: for each member the first step that was not finite, −1 for none; read and written.
+    """
+
+    v: Array
+    y: Array
+    carried: bool
+    saved_v: Array
+    saved_y: Array
+    recorded: Array | None
+    tally: Array | None
+    carry: Array | None
+    first_bad: Whole
+
+
+class Outcome(NamedTuple):
+    """Saved states, last slots, each member's first step that was not finite, recorded quantities, and the sum of a control.
+
+    ``diverged`` is False if it is known that no member has such a step. ``noticed`` has for each watched quantity its value at
+    the start of the last step, and last how many changes of sign there were up to there; NaN where the core did not count.
+    """
+
+    v: Array
+    y: Array
+    slot: Array
+    first_bad: Whole
+    recorded: dict[str, Array] | None = None
+    work: Array | None = None
+    diverged: bool = True
+    noticed: Array | None = None
+
+
+def model(plan: Plan) -> _core.ModelSpec:
+    """What to step, as the core takes it."""
+    if plan.single:
+        return _single_model(plan)
+    given = plan.system.parameters(plan.batch, series=plan.method.has_series)
+    if isinstance(plan.t0, np.ndarray) and plan.system.has_time:
+        given.append((BEGINS, rows(plan.t0, plan.batch, 0)))
+    if plan.force is not None:
+        given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
+    if plan.watched is not None:
+        given.append(("watched()", plan.watched.quantities))
+    special = plan.order or plan.backward or plan.acceptance != Acceptance()
+    if not plan.record and not plan.fused and not special:
+        return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
+    options: Any = {"record": list(plan.record), "fused": plan.fused, "order": plan.order}
+    if special:
+        options |= {"acceptance": tuple(plan.acceptance), "backward": plan.backward}
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, **options)
+
+
+def _single_model(plan: Plan) -> _core.ModelSpec:
+    """The same for steps of float32."""
+    given = plan.system.parameters(plan.batch, single=True)
+    if plan.force is not None:
+        given.append(("added.force", rows(np.asarray(plan.force, np.float64), plan.batch, len(plan.system.v_shape))))
+    for name, value in given:
+        if isinstance(value, np.ndarray):
+            checks.fits_single(name, value)
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, fused=plan.fused, single=True)
+
+
+def per_step(plan: Plan, work: Array | None) -> Array | None:
+    """What a control did, in units of energy, from h times the sum over all evaluations."""
+    if work is None:
+        return None
+    return np.asarray(np.asarray(work, dtype=np.float64) / (pushes(plan.system.control, plan.method.evaluations) * plan.dt))
+
+
+def pushes(control: Any, evaluations: int) -> int:
+    """How many times a step with so many evaluations adds to what a control did."""
+    return evaluations if isinstance(control, EnergyControl) and not control.between else 1

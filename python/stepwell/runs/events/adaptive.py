@@ -1,0 +1,368 @@
+"""A run with events and adaptive steps: attempts are made some at a time, and the states between them are looked at.
+
+An event that changes the state ends a member's part of the run. The next part begins from the new state as a run does, with the
+step chosen anew; only the sizes to which errors are relative are those of all parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array, Whole
+from ...reference.adaptive import sizes
+from .. import engine
+from ..result import Status
+from .attempts import Attempts, attempted
+from .collected import AT_START, Collected, Stops
+from .event import Event, names_of_changing
+from .parts import Changes
+from .resets import LARGEST_RATIO, NO_TIME, SETTLED, Resets
+from .trials import AdaptiveTrials
+
+#: Numbers of the states of members that are looked at together: a megabyte, which stays in a cache.
+NUMBERS_AT_ONCE = 1 << 17
+#: The first attempts of members are few, then twice as many are made together each time, up to the most: a member may stop early.
+FIRST_ATTEMPTS, MOST_ATTEMPTS = 16, 1 << 10
+#: Members are cut into groups such that at least so many attempts of each group are looked at together.
+LEAST_ATTEMPTS = 16
+#: Times between changes of the state that shrink geometrically end in a limit. A member is set there when no more than this share
+#: of its time is left to it, and when the time since the last change is less than NO_FLIGHT of it, however they shrink.
+LEFT_OF_SERIES, NO_FLIGHT = 2.0**-20, 2.0**-44
+#: Before the first step of a run this share of it stands for the length of a step.
+SHARE_OF_RUN = 2.0**-10
+
+
+class AdaptiveRun:
+    """A run with events, in place of ``engine.adapt``: first the events are found, up to where each member stops.
+
+    Then the run is made as without events, to there, so that all that it returns is the same.
+    """
+
+    def __init__(self, events: Sequence[Event]) -> None:
+        self._events = events
+        self._driver: _Driver | None = None
+
+    def adapt(self, plan: engine.Plan, pacing: engine.Pacing, paces: Array, v: Array, y: Array) -> engine.Adapted:
+        """Make it."""
+        numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
+        rows = sum(numbers * min(event.most, int(event.terminal) or pacing.budget) for event in self._events)
+        checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
+        changing = any(event.then for event in self._events)
+        self._driver = driver = (_Resetting if changing else _Driver)(plan, self._events, pacing)
+        out = driver.run(paces, v, y)
+        if plan.progress is not None:
+            plan.progress(1.0)
+        return out
+
+    def tell(self, run: Any) -> None:
+        """Give the result what was found."""
+        assert self._driver is not None
+        by_themselves, stops = run.stopped_at, self._driver.stops()
+        run.events, run.changed_by = self._driver.occurrences(), names_of_changing(self._events)
+        if stops is not None:
+            run.status = np.where(np.isnan(stops), run.status, Status.EVENT).astype(np.int8)
+            run.stopped_at = stops if by_themselves is None else np.where(np.isnan(stops), by_themselves, stops)
+        self._driver.tell_of_rest(run)
+
+
+class _Driver(Collected):
+    """The run of all members."""
+
+    def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
+        super().__init__(plan, events, AdaptiveTrials)
+        #: The time at which each member is at the end.
+        self.pacing, self.end = pacing, np.broadcast_to(pacing.at[-1], plan.batch).reshape(-1)
+        self.numbers = engine.pace_numbers(plan)
+        self.jumps = pacing.jumps
+        if self.jumps is not None and self.jumps.ndim > 1:
+            self.jumps = np.broadcast_to(self.jumps, (len(self.jumps), *plan.batch)).reshape(len(self.jumps), -1)
+        total, blocks = plan.members, (plan.system.v_shape, plan.system.y_shape)
+        #: Of members that stopped: their states, and how many attempts they had made and steps they had taken by then.
+        self.stop_state = tuple(np.full((*shape, total), np.nan) for shape in blocks)
+        self.attempts, self.steps = np.zeros(total), np.zeros(total)
+        self.begin, self.since = np.broadcast_to(plan.t0, plan.batch).reshape(-1), np.full(total, -np.inf)
+        self.reached = np.array(self.begin, dtype=np.float64)
+
+    def run(self, paces: Array, v: Array, y: Array) -> engine.Adapted:
+        """Find all events, then make the run up to where members stop."""
+        system, total = self.plan.system, self.plan.members
+        rows = np.broadcast_to(paces.reshape(self.numbers, -1), (self.numbers, total))
+        blocks = v.reshape(*system.v_shape, total), y.reshape(*system.y_shape, total)
+        if not self.pacing.begins:
+            # A step that is held has been looked at before, up to the last time of the run that goes on.
+            self.since = np.where(rows[engine.HELD] > 0.0, rows[engine.TARGET], -np.inf)
+            self.begin = rows[engine.TIME]
+        self.look(np.arange(total), rows, *blocks, self.pacing.begins)
+        return self.stepped(self.plan, self.pacing, np.arange(total), paces, v, y)
+
+    def look(self, index: Whole, paces: Array, v: Array, y: Array, begins: bool) -> None:
+        """Find the events of some members, from where they stand."""
+        numbers = 2 + prod(self.plan.system.v_shape) + prod(self.plan.system.y_shape)
+        size = max(1, NUMBERS_AT_ONCE // (numbers * LEAST_ATTEMPTS))
+        for first in range(0, len(index), size):
+            some = slice(first, first + size)
+            most = max(1, NUMBERS_AT_ONCE // numbers)
+            self._group(index[some], paces[:, some], v[..., some], y[..., some], most, begins)
+
+    def _group(self, index: Whole, paces: Array, v: Array, y: Array, most: int, begins: bool) -> None:
+        """All attempts of some members; those that stop, or are at the end, leave the group."""
+        together = FIRST_ATTEMPTS
+        some = self.members.plan(index)._replace(progress=None)
+        while len(index):
+            attempts = max(1, min(together, most // len(index), MOST_ATTEMPTS))
+            jumps = self.jumps if self.jumps is None or self.jumps.ndim == 1 else self.jumps[:, index]
+            out = attempted(some, self.end[index], attempts, self.pacing.budget, begins, np.ascontiguousarray(paces), v, y, jumps)
+            before = np.zeros((2, len(index))) if begins else paces[engine.COUNTS][:2]
+            longest = paces[engine.PACE_NUMBERS : engine.PACE_NUMBERS + engine.groups_of(self.plan)]
+            stopped = self._look(some, index, out, before, longest, not begins)
+            after = out.paces[engine.COUNTS][:2].sum(axis=0)
+            # Members that make no attempt cannot, or may not: they are out of attempts, or a step no longer moves the time.
+            on = (
+                ~stopped & (out.t[-1] < self.end[index]) & (after - before.sum(axis=0) == attempts) & (after < self.pacing.budget)
+            )
+            self.reached[index] = np.where(on, out.t[-1], self.end[index])
+            index, paces, v, y = index[on], out.paces[:, on], out.v[-1][..., on], out.y[-1][..., on]
+            begins, together = False, 2 * together
+            if not on.all():
+                some = self.members.plan(index)._replace(progress=None)
+            if self.plan.progress is not None:
+                gone = np.mean(self.reached - self.begin) / max(np.mean(self.end - self.begin), np.finfo(float).tiny)
+                self.plan.progress(min(0.99, max(0.0, float(gone))))
+
+    def _look(self, now: engine.Plan, index: Whole, out: Attempts, before: Array, longest: Array, goes_on: bool) -> Any:
+        """Find the events within these steps; which of the members stop."""
+        v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
+        given, h = self.members.numbers(index), out.lengths(now)
+        g = [self.quantity(e, out.t, v, y, given) for e in range(len(self.events))]
+        may, moves = [self.may_change(e, index, each) for e, each in enumerate(g)], out.t[1:] > out.t[:-1]
+        self.looks(index, out, may)
+        if not np.any([each.any() for each in may]):
+            return np.zeros(len(index), dtype=bool)
+        taken = np.concatenate([np.zeros((1, len(index))), np.cumsum(moves, axis=0)]) + before[0]
+
+        def known(e: int, row: Whole, place: Whole) -> Changes:
+            begins, ends = ([each[..., row + later, place] for each in states] for later in (0, 1))
+            step, places = taken[row, place].astype(np.int64), (row, place)
+            low, high, values = np.zeros(len(row)), np.ones(len(row)), (g[e][places], g[e][row + 1, place])
+            return Changes(row, place, index[place], step, out.t[places], h[places], low, high, *values, *begins, *ends)
+
+        changes = [self.parts(e, known(e, *np.nonzero(each & moves))) for e, each in enumerate(may)]
+        # Of steps that go beyond the end, or began before this run, only a part is in it.
+        partial = out.t[1:] > self.end[index]
+        if goes_on:
+            partial |= out.t[:-1] < self.since[index]
+        for e, each in enumerate(changes):
+            beyond = np.flatnonzero(partial[each.row, each.place])
+            if len(beyond):
+                t, who = self.located(e, each.some(beyond)).t, each.member[beyond]
+                inside = (t <= self.end[who]) & (t > self.since[who])
+                changes[e] = each.some(np.delete(np.arange(len(each.row)), beyond[~inside]))
+        stops = self.take(index, len(h), changes)
+        if stops is None:
+            return np.zeros(len(index), dtype=bool)
+        which, whose = stops.which, index[stops.which]
+        for kept, state in zip(self.stop_state, (stops.v, stops.y), strict=True):
+            kept[..., whose] = state[..., which]
+        row = stops.step[which]
+        self.attempts[whose] = before.sum(axis=0)[which] + row + 1
+        self.steps[whose] = taken[row + 1, np.flatnonzero(which)]
+        self.left(whose, np.flatnonzero(which), row, longest, out, stops)
+        return which
+
+    def looks(self, index: Whole, out: Attempts, may: list[Any]) -> None:
+        """Steps that are looked into whatever the values at their ends are."""
+
+    def parts(self, e: int, steps: Changes) -> Changes:
+        """Where one event changes its sign in these steps."""
+        return self.within(e, steps)[0]
+
+    def left(self, member: Whole, place: Whole, row: Whole, longest: Array, out: Attempts, stops: Stops) -> None:
+        """Members stop in these steps; ``longest`` are the largest sizes of each group before them."""
+
+    def tell_of_rest(self, run: Any) -> None:
+        """Tell of members that came to rest at an event."""
+
+    def stepped(self, plan: engine.Plan, pacing: engine.Pacing, index: Whole, paces: Array, v: Array, y: Array) -> engine.Adapted:
+        """The run of some members as without events; those that stopped make no more attempts than up to there."""
+        stopped_at = self.stopped_at[index]
+        stopped, plan = ~np.isnan(stopped_at), plan._replace(progress=None)
+        if not stopped.any():
+            return engine.adapt(plan, pacing, paces, v, y)
+        batch, total, rejected = plan.batch, plan.members, 1 + engine.COUNTS.start
+        # What they may not make any more counts as if it had been rejected before.
+        spare = np.where(stopped, pacing.budget - self.attempts[index], 0.0)
+        given = np.broadcast_to(paces.reshape(self.numbers, -1), (self.numbers, total)).copy()
+        given[rejected] += spare
+        out = engine.adapt(plan, pacing, given.reshape(self.numbers, *batch), v, y)
+        last, status = out.paces.reshape(self.numbers, total).copy(), out.status.reshape(total).copy()
+        last[rejected] -= spare
+        last[engine.TIME, stopped], last[engine.WORK, stopped] = stopped_at[stopped], np.nan
+        last[engine.COUNTS.start, stopped] = self.steps[index[stopped]]
+        status[stopped] = 0
+        at = pacing.at if pacing.at.ndim == 1 else np.broadcast_to(pacing.at, (len(pacing.at), *batch))
+        later = (at.reshape(len(at), -1) >= stopped_at) & stopped
+        states = []
+        for saved, at_end, all_stops in zip((out.v, out.y), (out.last_v, out.last_y), self.stop_state, strict=True):
+            stop = all_stops[..., index]
+            kept = saved.reshape(len(pacing.at), *stop.shape)
+            np.copyto(kept, stop, where=np.expand_dims(later, tuple(range(1, stop.ndim))))
+            ends = np.where(stopped, stop, np.reshape(at_end, stop.shape))
+            states.append((kept.reshape(saved.shape), ends.reshape(saved.shape[1:])))
+        (saved_v, last_v), (saved_y, last_y) = states
+        paces, status = last.reshape(self.numbers, *batch), status.reshape(batch)
+        return out._replace(v=saved_v, y=saved_y, last_v=last_v, last_y=last_y, paces=paces, status=status)
+
+
+class _Resetting(_Driver):
+    """A run with events that change the state, part by part: members whose state was changed make their next parts together."""
+
+    def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
+        super().__init__(plan, events, pacing)
+        self._resets, total = Resets(self), plan.members
+        #: When the part of each member began and in which state, how long the one before lasted, over how long that before it.
+        self._start, self._flight, self._ratio = (np.full(total, np.nan) for _ in range(3))
+        self._state = tuple(np.full_like(each, np.nan) for each in self.stop_state)
+        self._longest = np.zeros((engine.groups_of(plan), total))
+        #: From which side members came to each event that ended their part, 0 for others, and how large it was around.
+        self._sides, self._sizes = (np.zeros((len(events), total)) for _ in range(2))
+        #: How long the steps were that ended in these events.
+        self._lengths = np.zeros(total)
+        #: The number of the event at which a member is at rest; else −1.
+        self._rests = np.full(total, -1)
+
+    def run(self, paces: Array, v: Array, y: Array) -> engine.Adapted:
+        system, total, batch = self.plan.system, self.plan.members, self.plan.batch
+        shapes, times = (system.v_shape, system.y_shape), len(self.pacing.at)
+        if self.pacing.begins:
+            self._start[:] = np.broadcast_to(self.plan.t0, batch).reshape(-1)
+            begins = [block.reshape(*shape, total) for block, shape in zip((v, y), shapes, strict=True)]
+            self._state = tuple(block.copy() for block in begins)
+            self._resets.begin(self._start, SHARE_OF_RUN * (self.end - self._start), *begins)
+        out = super().run(paces, v, y)
+        saved = [np.array(each).reshape(times, *shape, total) for each, shape in zip((out.v, out.y), shapes, strict=True)]
+        ends = [np.array(each).reshape(*shape, total) for each, shape in zip((out.last_v, out.last_y), shapes, strict=True)]
+        rows, status = out.paces.reshape(self.numbers, total).copy(), out.status.reshape(total).copy()
+        at, index = np.broadcast_to(self.pacing.at.reshape(times, -1), (times, total)), self._going_on(np.arange(total))
+
+        def keep(index: Whole, states: Sequence[Array], last: Sequence[Array]) -> None:
+            later = at[:, index] >= self._start[index]
+            for all_saved, all_ends, state, end in zip(saved, ends, states, last, strict=True):
+                where = np.expand_dims(later, tuple(range(1, all_ends.ndim)))
+                all_saved[..., index], all_ends[..., index] = np.where(where, state, all_saved[..., index]), end
+
+        while len(index):
+            self._go_on_anew(index)
+            rests = self._rests[index] >= 0
+            there = [each[..., index[rests]] for each in self.stop_state]
+            keep(index[rests], there, there)
+            rows[engine.TIME, index[rests]] = self.stopped_at[index[rests]]
+            index = index[~rests]
+            if not len(index):
+                break
+            v, y = (each[..., index] for each in self._state)
+            plan, pacing, pace = self._begun(index, np.ascontiguousarray(at[:, index]), rows[:, index], v, y)
+            self.look(index, pace, v, y, begins=False)
+            part = self.stepped(plan, pacing, index, pace, v, y)
+            keep(index, (part.v, part.y), (part.last_v, part.last_y))
+            rows[:, index], status[index] = part.paces, part.status
+            index = self._going_on(index)
+        return out._replace(
+            v=saved[0].reshape(out.v.shape),
+            y=saved[1].reshape(out.y.shape),
+            last_v=ends[0].reshape(out.last_v.shape),
+            last_y=ends[1].reshape(out.last_y.shape),
+            paces=rows.reshape(out.paces.shape),
+            status=status.reshape(batch),
+        )
+
+    def _going_on(self, index: Whole) -> Whole:
+        """Which of these members go on from another state: those that no terminal event stopped."""
+        ends = self._sides[:, index] != 0.0
+        changes = np.array([self._resets.changes(e) for e in range(len(self.events))])
+        on: Whole = index[ends.any(axis=0) & ~ends[~changes].any(axis=0)]
+        return on
+
+    def _go_on_anew(self, index: Whole) -> None:
+        """Change the states of these members, from which they go on or in which they are at rest."""
+        t, sides, sizes_of = self.stopped_at[index], self._sides[:, index], self._sizes[:, index]
+        v, y = (each[..., index] for each in self.stop_state)
+        v, y, at, event = self._resets.new_states(t, self._lengths[index], v, y, index, sides, sizes_of)
+        with np.errstate(all="ignore"):
+            returned = ((self._resets.at[:, index] != 0.0) & (at != 0.0)).any(axis=0)
+            flight, since = np.where(returned, t - self._start[index], np.nan), t - self.begin[index]
+            ratio = flight / self._flight[index]
+            rest_of_series = np.where(ratio < 1.0, ratio / (1.0 - ratio), 0.0)
+            settled = (np.abs(ratio - self._ratio[index]) <= SETTLED) & (ratio <= LARGEST_RATIO)
+            settled &= flight * rest_of_series <= LEFT_OF_SERIES * since
+            rests = settled | (flight <= NO_FLIGHT * since)
+            limit = np.where(settled, rest_of_series, 0.0)
+            self._flight[index], self._ratio[index] = flight, ratio
+            for block, earlier in zip((v, y), self._state, strict=True):
+                block[...] = np.where(settled, block + (block - earlier[..., index]) * limit, block)
+                earlier[..., index] = block
+        self._rests[index[rests]] = event[rests]
+        limit = np.where(settled, t + flight * limit, t)
+        self.stopped_at[index] = np.where(rests, np.minimum(limit, self.end[index]), np.nan)
+        for kept, block in zip(self.stop_state, (v, y), strict=True):
+            kept[..., index] = block
+        self._start[index], self._resets.at[:, index], self.before[:, index] = t, at, np.nan
+        self._sides[:, index], self.since[index] = 0.0, -np.inf
+
+    def _begun(self, index: Whole, at: Array, rows: Array, v: Array, y: Array) -> tuple[engine.Plan, engine.Pacing, Array]:
+        """Of these members where they stand at the start of their next parts."""
+        plan = self.members.plan(index)
+        jumps = self.jumps if self.jumps is None or self.jumps.ndim == 1 else self.jumps[:, index]
+        pacing = self.pacing._replace(at=at, begins=False, jumps=jumps)
+        if (walls := engine.jumps_of(plan, pacing)) is not None:
+            self._start[index] = walls.begun(self._start[index])
+        pace = engine.begun_again(plan, rows, self._start[index], v, y)
+        longest = slice(engine.PACE_NUMBERS, engine.PACE_NUMBERS + len(self._longest))
+        pace[longest] = np.maximum(pace[longest], self._longest[:, index])
+        return plan, pacing, pace
+
+    def looks(self, index: Whole, out: Attempts, may: list[Any]) -> None:
+        at = self._resets.at[:, index]
+        if at.any():
+            first = out.t[:-1] == self._start[index]
+            for e, each in enumerate(may):
+                each |= first & (at[e] != 0.0)
+
+    def parts(self, e: int, steps: Changes) -> Changes:
+        side = self._side(e, steps)
+        parts, stuck = self.within(e, steps, side)
+        held = np.flatnonzero((side != 0.0) & self._resets.led_back[e, steps.member])
+        stuck = np.union1d(stuck, held)
+        soon = (self._side(e, parts) != 0.0) & (parts.high <= NO_TIME)
+        if not len(stuck) and not soon.any():
+            return parts
+        # A member that returns in no time is at the event where its step begins, and nothing else happens to it before.
+        back = (steps.some(stuck), parts.some(soon))
+        there = Changes(*(np.concatenate(pair, axis=-1) for pair in zip(*back, strict=True)))
+        none = np.zeros(len(there.t))
+        there = there._replace(low=none, high=none + AT_START, g=self._side(e, there), v_end=there.v, y_end=there.y)
+        parts = parts.some(~soon)
+        together = Changes(*(np.concatenate(pair, axis=-1) for pair in zip(there, parts, strict=True)))
+        return together.some(np.lexsort((together.high, together.row, together.place)))
+
+    def _side(self, e: int, steps: Changes) -> Array:
+        """From which side members came that are at an event where their steps begin, since it changed the state; else 0."""
+        return np.where(steps.t == self._start[steps.member], self._resets.at[e, steps.member], 0.0)
+
+    def left(self, member: Whole, place: Whole, row: Whole, longest: Array, out: Attempts, stops: Stops) -> None:
+        self._sides[:, member], self._sizes[:, member] = stops.side[:, place], stops.size[:, place]
+        plan = self.plan
+        self._lengths[member] = out.lengths(plan)[row, place]
+        v, y = (np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), plan.block_axes, strict=True))
+        so_far = np.maximum.accumulate(sizes(v, y, plan.block_axes, plan.acceptance.groups), axis=1)
+        self._longest[:, member] = np.maximum(longest[:, place], so_far[:, row, place])
+
+    def tell_of_rest(self, run: Any) -> None:
+        rests = (self._rests >= 0).reshape(self.plan.batch)
+        if rests.any():
+            run.status = np.where(rests, Status.REST, run.status).astype(np.int8)
+            self._resets.warn_of_rest(self._rests, self.stopped_at)

@@ -1,0 +1,340 @@
+"""A run with events: some steps of some members at a time, all of whose states are looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array, Whole
+from ...reference.events import near
+from .. import engine
+from ..result import Status
+from .collected import Collected, Known
+from .event import Event, names_of_changing
+from .parts import At, Changes
+from .resets import Resets, Stretch
+from .traced import watched
+
+#: Members × steps × numbers of a state that are looked at together: a megabyte, which stays in a cache.
+NUMBERS_AT_ONCE = 1 << 17
+#: Members are cut into groups such that at least so many steps of each group are looked at together.
+LEAST_STEPS = 16
+#: The first steps are few, then four times as many are made together each time, up to the most: a member may stop early.
+FIRST_STEPS, MOST_STEPS = 64, 1 << 13
+#: Where the core notices changes of sign, so many steps are made at once; those of a member that has one are repeated.
+#: Twice as many the next time if fewer than this share of the members had one, half as many if more than that had.
+WATCHED_STEPS, FEW_NOTICED, MANY_NOTICED = 64, 1 / 16, 1 / 4
+#: If so many have one in so few steps, all states are looked at from there on.
+TOO_MANY_NOTICED = 1 / 2
+#: All states of fewer members than these are looked at: a repetition would take longer than that.
+FEW_MEMBERS = 64
+#: Where states are saved more often than after so many steps, all are looked at instead.
+LEAST_BETWEEN_SAVES = 32
+
+
+def check_room(events: Sequence[Event], plan: engine.Plan) -> None:
+    """Raise if what may be kept of the events would not fit in memory."""
+    numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    rows = sum(numbers * min(event.most, int(event.terminal) or plan.steps) for event in events)
+    checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
+
+
+class Run:
+    """A run with events, in place of ``engine.advance``.
+
+    Args:
+        events: what was asked for.
+        v: velocities at the start, or what the method carries, shape (*block, *batch).
+        y: coordinates, likewise.
+        before: first bad steps of earlier runs, as of ``engine.advance``.
+        carried: whether ``v`` is what the method carries.
+    """
+
+    def __init__(self, events: Sequence[Event], v: Array, y: Array, before: Whole | None, carried: bool) -> None:
+        self._events, self._start = events, (v, y, before, carried)
+        self._driver: _Driver | None = None
+
+    def made(self, plan: engine.Plan) -> engine.Outcome:
+        """Make it."""
+        check_room(self._events, plan)
+        self._driver = (_Resetting if any(event.then for event in self._events) else _Driver)(plan, self._events)
+        return self._driver.run(*self._start)
+
+    def tell(self, run: Any) -> None:
+        """Give the result what was found."""
+        assert self._driver is not None
+        run.events, run.stopped_at = self._driver.occurrences(), self._driver.stops()
+        run.changed_by = names_of_changing(self._events)
+        if run.stopped_at is not None and (stopped := ~np.isnan(run.stopped_at)).any():
+            run.status = np.where(stopped, Status.EVENT, run.status).astype(np.int8)
+            run.encounter = run.overshoots = None  # these go through all of the steps
+        self._driver.tell_of_rest(run)
+
+
+class _Driver(Collected):
+    """The run of all members."""
+
+    def __init__(self, plan: engine.Plan, events: Sequence[Event]) -> None:
+        super().__init__(plan, events)
+        total = plan.members
+        self.saves = plan.saves
+        blocks = plan.system.v_shape, plan.system.y_shape
+        self.kept = tuple(np.empty((len(self.saves), *shape, total)) for shape in blocks)
+        self.slot = np.empty((*blocks[0], total))
+        self.first_bad = np.full(total, -1, dtype=np.int64)
+        self.done = 0
+        #: Members one of whose quantities is near to zero where the steps end that were made last.
+        self.close = np.zeros(total, dtype=bool)
+        self.watched: engine.Watched | None = None
+
+    def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
+        plan, total = self.plan, self.plan.members
+        numbers = max(1, prod(plan.system.v_shape) + prod(plan.system.y_shape))
+        v, y = v.reshape(*plan.system.v_shape, total), y.reshape(*plan.system.y_shape, total)
+        bad = self.first_bad.copy() if before is None else before.reshape(-1)
+        size = max(1, NUMBERS_AT_ONCE // numbers)
+        if plan.backend == "rust" and not plan.fused and (plan.every is None or plan.every >= LEAST_BETWEEN_SAVES):
+            self.watched = watched(self.quantities, self.members.plan(np.arange(min(2, total))))
+        for first in range(0, total, size):
+            index = np.arange(first, min(first + size, total))
+            self._group(index, At(v[..., index], y[..., index], bad[index], carried), size)
+        return self._outcome()
+
+    def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
+        """All further steps of some members; those that stop leave the group."""
+        plan, piece, together = self.plan, FIRST_STEPS, WATCHED_STEPS
+        some = self.members.plan(index)
+        while done < plan.steps and len(index):
+            now = some._replace(first=plan.first + done, record=(), progress=None)
+            noticing = notices and self.watched is not None and len(index) >= FEW_MEMBERS
+            size = max(1, most // LEAST_STEPS)
+            if not noticing and len(index) > size:  # too few states of so many members fit
+                for first in range(0, len(index), size):
+                    these = np.arange(first, min(first + size, len(index)))
+                    self._group(index[these], at.some(these), most, done, notices)
+                return
+            if noticing and done > 0:
+                now = now._replace(steps=min(together, self._next_save(done) - done), every=None, watched=self.watched)
+                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                if out.noticed is None or np.isnan(out.noticed[-1]).any():
+                    self.watched = None  # steps too long for one tape
+                    continue
+                stopped, share = self._look_again(now, index, at, out, done, most)
+                if share < FEW_NOTICED:
+                    together = min(2 * together, MOST_STEPS)
+                elif share > MANY_NOTICED and together > LEAST_STEPS and len(index) * together > most:
+                    together //= 2
+                elif share > TOO_MANY_NOTICED:
+                    notices = False
+            else:
+                longest = 1 if noticing else min(piece, most // len(index), MOST_STEPS)
+                now = now._replace(steps=min(max(1, longest), plan.steps - done), every=1)
+                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                self._save(done, now.steps, index, out.v, out.y)
+                stopped = self._look(now, index, out, done)
+            self.done += now.steps * len(index)
+            done, piece = done + now.steps, 4 * piece
+            at = At(out.slot, out.y[-1], out.first_bad, True)
+            self.slot[..., index], self.first_bad[index] = at.slot, at.bad
+            if stopped.any():
+                self.first_bad[index[stopped]] = -1
+                self.slot[..., index[stopped]] = np.nan  # what a method would carry from there on is not known
+                self.done += int(stopped.sum()) * (plan.steps - done)
+                index, at = index[~stopped], at.some(~stopped)
+                if len(index):
+                    some = self.members.plan(index)
+            if plan.progress is not None:
+                plan.progress(self.done / (plan.steps * plan.members))
+
+    def _look_again(self, now: engine.Plan, index: Whole, at: At, out: engine.Outcome, done: int, most: int) -> Any:
+        """Repeat the steps of members with a change of sign, to find it; which members stop, and which share was repeated."""
+        assert out.noticed is not None
+        if done + now.steps == self._next_save(done):
+            self._save(done + now.steps, 0, index, out.v, out.y)
+        end, given = now.t0 + (now.first + now.steps) * now.dt, self.members.numbers(index)
+        noticed = (out.noticed[-1] > 0.0) | self.close[index]
+        self.close[index] = False
+        for e, (quantity, before) in enumerate(zip(self.quantities, out.noticed, strict=False)):
+            g = quantity(np.array(end), out.v[-1], out.y[-1], given)
+            self.close[index] |= near(g, before)
+            noticed |= near(g, before) | near(before, g)
+            self.before[e, index] = before
+        stopped, where = np.zeros(len(index), dtype=bool), np.flatnonzero(noticed)
+        size = max(1, most // now.steps)
+        for first in range(0, len(where), size):
+            these = where[first : first + size]
+            again = self.members.plan(index[these])
+            again = now._replace(system=again.system, batch=again.batch, t0=again.t0, force=again.force, every=1, watched=None)
+            then = at.some(these)
+            states = engine.advance(again, then.slot, then.y, then.bad, carried=then.carried)
+            last = self.before[:, index[these]]
+            self.before[:, index[these]] = np.nan
+            stopped[these] = self._look(again, index[these], states, done)
+            self.before[:, index[these]] = last
+        return stopped, len(where) / len(index)
+
+    def _next_save(self, done: int) -> int:
+        """The next step after these whose state is kept."""
+        return int(self.saves[np.searchsorted(self.saves, done, "right")])
+
+    def _save(self, done: int, steps: int, index: Whole, *states: Array) -> None:
+        """Keep those of these states that are asked for."""
+        first, last = np.searchsorted(self.saves, done, "left"), np.searchsorted(self.saves, done + steps, "right")
+        if first == last:
+            return
+        where, members = self.saves[first:last] - done, slice(index[0], index[-1] + 1)
+        for kept, state in zip(self.kept, states, strict=True):
+            if len(index) == index[-1] + 1 - index[0]:
+                kept[first:last, ..., members] = state[where]
+            else:
+                kept[first:last][..., index] = state[where]
+
+    def _may(self, now: engine.Plan, index: Whole, out: engine.Outcome) -> tuple[Known, list[Any]]:
+        """What is known of these steps, and in which of them an event may change its sign."""
+        v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
+        t: Any = now.t0 + ((now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
+        given = self.members.numbers(index)
+        g = [quantity(t, v, y, given) for quantity in self.quantities]
+        may = [self.may_change(e, index, each) for e, each in enumerate(g)]
+        if (out.first_bad >= 0).any():
+            ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
+            may = [each & ((out.first_bad < 0) | (ends < out.first_bad)) for each in may]
+
+        def known(e: int, row: Whole, place: Whole) -> Changes:
+            begins, ends = ([each[..., row + later, place] for each in states] for later in (0, 1))
+            number = now.first + row
+            low, high, h = np.zeros(len(row)), np.ones(len(row)), np.full(len(row), now.dt)
+            begin: Any = now.t0_of(place) + number * now.dt
+            values = g[e][row, place], g[e][row + 1, place]
+            return Changes(row, place, index[place], number, begin, h, low, high, *values, *begins, *ends)
+
+        return known, may
+
+    def _look(self, now: engine.Plan, index: Whole, out: engine.Outcome, done: int) -> Any:
+        """Find the events within these steps; which of the members stop."""
+        known, may = self._may(now, index, out)
+        stops = self.take(index, now.steps, [self.changes(e, each, known) for e, each in enumerate(may)])
+        if stops is None:
+            return np.zeros(len(index), dtype=bool)
+        after = np.searchsorted(self.saves, done + stops.step, "right")
+        for place in np.unique(after[stops.which]):
+            these = stops.which & (after == place)
+            for kept_states, state in zip(self.kept, (stops.v, stops.y), strict=True):
+                kept_states[place:][..., index[these]] = state[..., these]
+        return stops.which
+
+    def tell_of_rest(self, run: Any) -> None:
+        """Tell of members that came to rest at an event."""
+
+    def _outcome(self) -> engine.Outcome:
+        """As that of a run without events, without what a control added up."""
+        batch, blocks = self.plan.batch, (self.plan.system.v_shape, self.plan.system.y_shape)
+        v, y = (each.reshape(len(self.saves), *shape, *batch) for each, shape in zip(self.kept, blocks, strict=True))
+        first_bad = self.first_bad.reshape(batch)
+        diverged = bool((first_bad >= 0).any())
+        return engine.Outcome(v, y, self.slot.reshape((*blocks[0], *batch)), first_bad, {}, None, diverged)
+
+
+class _Resetting(_Driver):
+    """A run with events that change the state: where the first of a group is, the group's steps end, and go on from there."""
+
+    def __init__(self, plan: engine.Plan, events: Sequence[Event]) -> None:
+        super().__init__(plan, events)
+        self.resets = Resets(self)
+        self.rests = np.full(plan.members, -1)
+
+    def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
+        plan = self.plan
+        if not carried:
+            states = v.reshape(*plan.system.v_shape, plan.members), y.reshape(*plan.system.y_shape, plan.members)
+            t = np.broadcast_to(plan.t0 + plan.first * plan.dt, plan.batch).reshape(-1)
+            self.resets.begin(t, np.full(plan.members, plan.dt), *states)
+        return super().run(v, y, before, carried)
+
+    def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
+        plan, piece, some = self.plan, FIRST_STEPS, self.members.plan(index)
+        while done < plan.steps and len(index):
+            size = max(1, most // LEAST_STEPS)
+            if len(index) > size:
+                for first in range(0, len(index), size):
+                    these = np.arange(first, min(first + size, len(index)))
+                    self._group(index[these], at.some(these), most, done)
+                return
+            steps = min(max(1, min(piece, most // len(index), MOST_STEPS)), plan.steps - done)
+            now = some._replace(first=plan.first + done, steps=steps, every=1, record=(), progress=None)
+            out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+            before = self.before[:, index]
+            known, may = self._may(now, index, out)
+            changes = [self.changes(e, each, known) for e, each in enumerate(may)]
+            # Of all members up to the end of the first step in which one of them goes on from another state, or stops.
+            rows = [each.row[self.ends(e, each.member)] for e, each in enumerate(changes)]
+            row = 0 if self.resets.at[:, index].any() else min([steps, *(each.min() for each in rows if len(each))])
+            at_event: Any = self.resets.at[:, index].any(axis=0) & (row == 0)
+            for e, each in enumerate(changes):
+                ends = self.ends(e, each.member) & (each.row == row)
+                at_event[each.place[ends]] = True
+            now = now._replace(steps=min(row + 1, steps))
+            if now.steps < steps:
+                self.before[:, index] = before
+                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                known, _ = self._may(now, index, out)
+            self.take(
+                index, now.steps, [each.some((each.row < row) | ((each.row == row) & ~at_event[each.place])) for each in changes]
+            )
+            slot: Array = out.slot
+            gone: Any = np.zeros(len(index), dtype=bool)
+            if row < steps:
+                slot, gone = self._through(now, index, out, known, np.flatnonzero(at_event), row)
+            later = int(done > 0)  # what was saved at the start is the state there, not what is made again of a carry
+            self._save(done + later, now.steps - later, index, out.v[later:], out.y[later:])
+            at = At(slot, out.y[-1], out.first_bad, True)
+            self.slot[..., index], self.first_bad[index] = at.slot, at.bad
+            if gone.any():
+                self._stay(index, gone, out, done + row)
+                self.done += int(gone.sum()) * (plan.steps - done - now.steps)
+                index, at = index[~gone], at.some(~gone)
+                some = self.members.plan(index) if len(index) else some
+            self.done += now.steps * len(gone)
+            done, piece = done + now.steps, 2 * now.steps if row < steps else 4 * piece
+            if plan.progress is not None:
+                plan.progress(self.done / (plan.steps * plan.members))
+
+    def _through(
+        self, now: engine.Plan, index: Whole, out: engine.Outcome, known: Known, which: Whole, row: int
+    ) -> tuple[Array, Any]:
+        """Take some members through the last of these steps; what all carry then, and which of them stop."""
+        step = known(0, np.full(len(which), row), which)
+        member = index[which]
+        end = now.t0_of(which) + (step.step + 1) * now.dt
+        states = step.v, step.y, step.v_end, step.y_end
+        arrived = self.resets.through(Stretch(member, step.step, step.t, end - step.t, *states, self.resets.at[:, member]))
+        out.v[-1][..., which], out.y[-1][..., which] = arrived.v, arrived.y
+        self.resets.at[:, member], self.before[:, member] = arrived.at, np.nan
+        gone, self.rests[member] = ~np.isnan(arrived.t), arrived.rests
+        self.stopped_at[member[gone]] = arrived.t[gone]
+        slot = out.slot
+        if now.method.carry is not None:
+            anew = self.members.plan(member)._replace(first=now.first + now.steps)
+            slot[..., which] = engine.to_slot(anew, arrived.v, arrived.y)
+        else:
+            slot = out.v[-1]
+        stops = np.zeros(len(index), dtype=bool)
+        stops[which[gone]] = True
+        return slot, stops
+
+    def _stay(self, index: Whole, gone: Any, out: engine.Outcome, step: int) -> None:
+        """Keep the states of members that stop in this step."""
+        place = int(np.searchsorted(self.saves, step, "right"))
+        for kept, state in zip(self.kept, (out.v[-1], out.y[-1]), strict=True):
+            kept[place:][..., index[gone]] = state[..., gone]
+        self.first_bad[index[gone]], self.slot[..., index[gone]] = -1, np.nan
+
+    def tell_of_rest(self, run: Any) -> None:
+        rests = (self.rests >= 0).reshape(self.plan.batch)
+        if rests.any():
+            run.status = np.where(rests, Status.REST, run.status).astype(np.int8)
+            self.resets.warn_of_rest(self.rests, self.stopped_at)

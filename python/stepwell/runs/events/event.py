@@ -1,0 +1,139 @@
+"""What users give as ``events=``."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base import checks
+from ...base.immutable import Fixed, Value
+from ...errors import ArgumentError, DTypeError
+
+if TYPE_CHECKING:
+    from ...base.literals import Direction
+
+#: Default of ``most``: so many occurrences of an event are kept for each member.
+MOST_KEPT = 1000
+
+
+class Event(Fixed, Value):
+    """A quantity g(t, v, y) whose changes of sign along the motion are located.
+
+    Args:
+        function: ``g(t, v, y)``, or ``g(t, y)`` for a system without velocities, that returns one number; written for one member,
+            in NumPy style, as your own equations are. Further arguments are parameters of the system, by name.
+        direction: 1 or "rising" for changes from below zero to above, −1 or "falling" for those from above to below, 0 or "both".
+            If None, as an attribute ``direction`` of the function says, as SciPy reads it; 0 without one.
+        terminal: whether a member stops at the first such change; a whole number stops it at so many. If None, as an attribute
+            ``terminal`` of the function says; False without one.
+        then: ``then(t, v, y)``, which returns the state (v, y) from which a member goes on at each such change; for a system
+            without velocities ``then(t, y)``, which returns y. It is written as ``function`` is, and may take parameters too.
+        most: so many occurrences are kept for each member, the first ones; all are counted.
+        name: its name in ``run.events``; if None, that of the function.
+
+    Raises:
+        ArgumentError: what is wrong with an argument.
+
+    Example:
+        >>> down = sw.Event(lambda t, v, y: y, direction=-1, name="down")
+        >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, events=down)
+        >>> run.events["down"].t.round(4)  # π/2, and a whole turn later
+        array([1.5708, 7.854 ])
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        *,
+        direction: int | Direction | None = None,
+        terminal: bool | int | None = None,
+        then: Callable[..., Any] | None = None,
+        most: int = MOST_KEPT,
+        name: str | None = None,
+    ) -> None:
+        if not inspect.isfunction(function):
+            raise DTypeError(
+                f"function: expected a Python function such as g(t, v, y), got {checks.short(function)} "
+                f"({type(function).__name__})"
+            )
+        if name is not None and not isinstance(name, str):
+            raise DTypeError(f"name: expected a name or None, got {checks.short(name)} ({type(name).__name__})")
+        self.function = function
+        self.direction = _agreed("direction", function, direction, _sign, 0)
+        self.terminal = _agreed("terminal", function, terminal, _stops, False)
+        if then is not None and not inspect.isfunction(then):
+            raise DTypeError(
+                f"then: expected a Python function such as then(t, v, y), got {checks.short(then)} ({type(then).__name__})"
+            )
+        if then is not None and self.terminal:
+            raise ArgumentError("then, terminal: a member that stops at an event does not go on from a new state; leave one out")
+        self.then = then
+        self.most = checks.count("most", most, 1)
+        self.name = function.__name__ if name is None else name
+
+    def __repr__(self) -> str:
+        options = {"direction": self.direction, "terminal": self.terminal}
+        if self.then is not None:
+            options["then"] = self.then.__name__
+        told = "".join(f", {name}={value}" for name, value in options.items() if value)
+        return f"Event({self.name}{told})"
+
+
+def _agreed(name: str, function: Any, argument: Any, read: Callable[[str, Any], Any], otherwise: Any) -> Any:
+    """What the argument says, or the function's attribute of that name, which may not say another thing."""
+    attribute = getattr(function, name, None)
+    its_own = None if attribute is None else read(f"{function.__name__}.{name}", attribute)
+    if argument is None:
+        return otherwise if its_own is None else its_own
+    asked = checks.direction(name, argument) if name == "direction" else read(name, argument)
+    if its_own is not None and its_own != asked:
+        raise ArgumentError(
+            f"{name}: got {asked!r}, but the function {function.__name__} has an attribute {name} = {attribute!r}; leave one out"
+        )
+    return asked
+
+
+def _sign(name: str, value: Any) -> int:
+    """A direction as SciPy reads it: by its sign."""
+    if isinstance(value, str):
+        return checks.direction(name, value)
+    number = checks.number(name, value)
+    return (number > 0.0) - (number < 0.0)
+
+
+def _stops(name: str, value: Any) -> bool | int:
+    """Whether an event stops a member, or at the how many-th change: True for the first, False for none."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    number = checks.count(name, value, 0)
+    return number if number > 1 else number == 1
+
+
+def names_of_changing(events: Sequence[Event]) -> tuple[str, ...]:
+    """The names of those that change the state."""
+    return tuple(event.name for event in events if event.then is not None)
+
+
+def several(events: Any) -> list[Event]:
+    """The events that were given: one or a list, of which each may be a function alone."""
+    given: Sequence[Any] = [events] if isinstance(events, Event) or callable(events) else []
+    made = [
+        each if isinstance(each, Event) else Event(_function(each))
+        for each in given or checks.several("events", events, "events")
+    ]
+    names = [each.name for each in made]
+    for name in names:
+        if names.count(name) > 1:
+            raise ArgumentError(f"events: expected a name for each, got {name!r} twice; give Event(…, name=…)")
+    return made
+
+
+def _function(given: Any) -> Any:
+    if not inspect.isfunction(given):
+        raise DTypeError(
+            f"events: expected functions g(t, v, y) or stepwell.Event, got {checks.short(given)} ({type(given).__name__})"
+        )
+    return given

@@ -1,0 +1,163 @@
+"""Events of a world: looked for after each of its steps, which is made again in parts where one changes the state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...base import checks
+from ...base.arrays import Array, Whole
+from ...errors import UnsupportedError
+from .. import engine
+from .collected import Collected
+from .event import Event
+from .members import Members
+from .parts import Changes
+from .resets import Resets, Stretch
+from .result import Occurrences
+from .trials import Trials
+
+
+class Frames(Collected):
+    """The events of one call of ``World.step``, in place of the core's.
+
+    Args:
+        plan: of the world; ``force`` is the array of the world, which its owner changes.
+        events: what was asked for.
+        v: the arrays that are stepped.
+        y: likewise.
+        loop: the core's world.
+    """
+
+    def __init__(
+        self,
+        plan: engine.Plan,
+        events: Sequence[Event],
+        v: Array,
+        y: Array,
+        loop: _core.World,
+    ) -> None:
+        if stops := [each for each in events if each.terminal]:
+            raise UnsupportedError(
+                f"events: no event stops a member of a world, got {stops[0]!r}; read world.events after a step, and write "
+                f"into world.v and world.y"
+            )
+        super().__init__(plan, events)
+        self._blocks, self._loop = (v, y), loop
+        self._told: dict[str, Occurrences] | None = None
+        self._all = np.arange(plan.members)
+        self._resets = Resets(self) if any(event.then for event in events) else None
+        #: Which members are at rest at an event; and the state and quantities that the last call left.
+        self._rests = np.zeros(plan.members, dtype=bool)
+        self._left: tuple[list[Array], list[Array]] | None = None
+
+    def step(self, n: int = 1) -> None:
+        """Make n steps in place; what happened in them is then in ``World.events``."""
+        n = checks.count("n", n, 0)
+        self.clear()
+        self._told = None
+        g = self._quantities(self._loop.step_number)
+        self._taken_up(g)
+        for _ in range(n):
+            step, before = self._loop.step_number, [each.copy() for each in self._blocks]
+            self._loop.step(1)
+            after = self._quantities(self._loop.step_number)
+            may = [self.may_change(e, self._all, np.stack(ends)) for e, ends in enumerate(zip(g, after, strict=True))]
+            if np.any(may) or (self._resets is not None and self._resets.at.any()):
+                g = self._found(step, may, g, after, before)
+            else:
+                g = after
+        for e in range(len(self.events)):
+            self.locate_waiting(e)
+        self._left = [each.copy() for each in self._blocks], g
+
+    def _taken_up(self, g: list[Array]) -> None:
+        """What is known of members from the last call, but for those that the user has moved since."""
+        t = np.full(len(self._all), self.plan.t0 + self._loop.step_number * self.plan.dt)
+        h, (v, y) = np.full(len(self._all), self.plan.dt), self._flat(self._blocks)
+        if self._left is None:
+            if self._resets is not None:
+                self._resets.begin(t, h, v, y)
+            return
+        blocks, last = self._left
+        moved = np.zeros(len(self._all), dtype=bool)
+        for now, then in zip(self._flat(self._blocks), self._flat(blocks), strict=True):
+            moved |= (now != then).any(axis=tuple(range(now.ndim - 1)))
+        self.before[:, moved] = np.nan
+        self._rests &= ~moved
+        if self._resets is not None:
+            changed = [now != then for now, then in zip(g, last, strict=True)]
+            self._resets.begin_again(t, h, v, y, g, changed, moved)
+
+    @property
+    def told(self) -> dict[str, Occurrences]:
+        """What happened in the last call."""
+        if self._told is None:
+            self._told = self.occurrences()
+        return self._told
+
+    def _quantities(self, step: int) -> list[Array]:
+        """The quantities of all members where the world stands."""
+        t: Any = np.array(self.plan.t0 + step * self.plan.dt)
+        given = self.members.numbers(slice(None))
+        v, y = self._flat(self._blocks)
+        return [quantity(t, v, y, given).copy() for quantity in self.quantities]  # not views of what is stepped in place
+
+    def _flat(self, blocks: Sequence[Array]) -> tuple[Array, ...]:
+        """Blocks with one axis for all members."""
+        shapes = self.plan.system.v_shape, self.plan.system.y_shape
+        return tuple(each.reshape(*shape, len(self._all)) for each, shape in zip(blocks, shapes, strict=True))
+
+    def _found(self, step: int, may: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> list[Array]:
+        """Take what happened in a step; the quantities at its end."""
+        if self.plan.force is not None:  # which may be another one than in the last call
+            force = np.array(self.plan.force)
+            self.members = Members(self.plan._replace(force=force))
+            self.trials = Trials(self.plan._replace(force=force), self.members)
+        states = *self._flat(before), *self._flat(self._blocks)
+        finite = np.logical_and.reduce([np.isfinite(each).all(axis=tuple(range(each.ndim - 1))) for each in states[2:]])
+        t = self.plan.t0 + step * self.plan.dt
+
+        def known(e: int, row: Whole, place: Whole) -> Changes:
+            number, times, lengths = (np.full(len(place), each) for each in (step, t, self.plan.dt))
+            low, high, values = np.zeros(len(row)), np.ones(len(row)), (g[e][place], after[e][place])
+            v, y, v_end, y_end = (each[..., place] for each in states)
+            return Changes(row, place, place, number, times, lengths, low, high, *values, v, y, v_end, y_end)
+
+        changes = [self.changes(e, each & finite & ~self._rests, known) for e, each in enumerate(may)]
+        if self._resets is None:
+            self.take(self._all, 1, changes)
+            return after
+        goes_through = self._resets.at.any(axis=0) & finite
+        for e, each in enumerate(changes):
+            goes_through[each.place[self.ends(e, each.member)]] = True
+        self.take(self._all, 1, [each.some(~goes_through[each.place]) for each in changes])
+        index = np.flatnonzero(goes_through)
+        if not len(index):
+            return after
+        lying = self._rests[index]
+        v, y = (each[..., index].copy() for each in states[:2])  # of members at rest that stay so
+        if not lying.all():
+            moves = index[~lying]
+            begin, end = np.full(len(moves), t), self.plan.t0 + (step + 1) * self.plan.dt
+            v_now, y_now, v_end, y_end = (each[..., moves] for each in states)
+            steps, at = np.full(len(moves), step), self._resets.at[:, moves]
+            arrived = self._resets.through(Stretch(moves, steps, begin, end - begin, v_now, y_now, v_end, y_end, at))
+            v[..., ~lying], y[..., ~lying] = arrived.v, arrived.y
+            self._resets.at[:, moves], self._rests[moves] = arrived.at, arrived.rests >= 0
+        self._write(step + 1, index, v, y)
+        self.before[:, index] = np.nan
+        return self._quantities(step + 1)
+
+    def _write(self, step: int, index: Whole, v: Array, y: Array) -> None:
+        """Set members where they are at this step; what the method carries of the others stays."""
+        carry = self._loop.carry() if self.plan.method.carry is not None else None
+        for block, new in zip(self._blocks, (v, y), strict=True):
+            block.reshape(*new.shape[:-1], len(self._all))[..., index] = new
+        if carry is not None:
+            slot = carry.reshape(*v.shape[:-1], len(self._all))
+            slot[..., index] = engine.to_slot(self.members.plan(index)._replace(first=step), v, y)
+            self._loop.carry_on(carry)

@@ -1,0 +1,97 @@
+"""What the driver of events hands on: where members are, changes of sign, occurrences."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...base.arrays import Array, Whole
+
+
+class At(NamedTuple):
+    """Where members are: the v slot, y, first bad steps, and whether the slot holds what the method carries."""
+
+    slot: Array
+    y: Array
+    bad: Whole
+    carried: bool
+
+    def some(self, which: Any) -> At:
+        """Some of them."""
+        return At(self.slot[..., which], self.y[..., which], self.bad[which], self.carried)
+
+
+class Changes(NamedTuple):
+    """Parts of steps in which one event changes its sign, or may do so: whose, in which step, and what is known at both ends.
+
+    A step begins at ``t`` and is as long as ``h``; the part goes from the share ``low`` of it to ``high``.
+
+    Attributes:
+        row: the number of the step among those that are looked at together.
+        place: the number of the member among those.
+        member: the member.
+        step: the number of the step.
+        t: the time at its start.
+        h: its length.
+        low: the share of the step where the part begins.
+        high: where it ends.
+        g: the quantity where the part begins.
+        g_end: where it ends.
+        v: velocities at the start of the step.
+        y: coordinates there.
+        v_end: velocities where the part ends.
+        y_end: coordinates there.
+    """
+
+    row: Whole
+    place: Whole
+    member: Whole
+    step: Whole
+    t: Array
+    h: Array
+    low: Array
+    high: Array
+    g: Array
+    g_end: Array
+    v: Array
+    y: Array
+    v_end: Array
+    y_end: Array
+
+    def some(self, which: Any) -> Changes:
+        """Some of them."""
+        parts: Any = (each[..., which] for each in self)
+        return Changes(*parts)
+
+
+class Found(NamedTuple):
+    """Occurrences of one event: members, numbers of steps, shares of them, times, and states there."""
+
+    member: Whole
+    step: Whole
+    share: Array
+    t: Array
+    v: Array
+    y: Array
+
+    def some(self, which: Any) -> Found:
+        """Some of them."""
+        parts: Any = (each[..., which] for each in self)
+        return Found(*parts)
+
+
+def ordinals(member: Whole) -> Whole:
+    """For each entry the how many-th of its member it is, from 1 on; entries are in the order of time."""
+    order = np.argsort(member, kind="stable")
+    ascending = member[order]
+    first = np.searchsorted(ascending, ascending, "left")
+    ordinals = np.empty(len(member), dtype=np.int64)
+    ordinals[order] = np.arange(len(member)) - first + 1
+    return ordinals
+
+
+def nothing(blocks: Any) -> Found:
+    """No occurrences."""
+    whole, real = np.empty(0, dtype=np.int64), np.empty(0)
+    return Found(whole, whole, real, real, *(np.empty((*shape, 0)) for shape in blocks))

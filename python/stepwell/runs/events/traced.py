@@ -1,0 +1,220 @@
+"""The function of an event as operations, which are the same for every member and state."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator, Sequence
+from itertools import count
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...base import checks
+from ...base.arrays import Array
+from ...errors import ArgumentError, TraceError, UnsupportedError
+from ...model.equations.namespace import rebound
+from ...model.equations.trace import kind_of, run_by, scalars
+from ...model.equations.values import Scalar, objects
+from ...model.systems import System
+from ...reference.marks import recording
+from ...reference.tape.modes import directional
+from ...reference.tape.replayed import Operations
+from .. import engine
+from .event import Event
+
+#: The share of a step whose change stands for the slope of a quantity that has no derivative: its roundings, over this, are half
+#: of the digits.
+SHORT = 2.0**-26
+
+
+def parameters_of(function: Any, name: str, system: System, given: dict[str, Any]) -> list[str]:
+    """The parameters of the system that a function of a state takes."""
+    state = ("t", "v", "y") if prod(system.v_shape) > 0 else ("t", "y")
+    own = list(inspect.signature(function).parameters.values())
+    head, rest = own[: len(state)], own[len(state) :]
+    expected = f"({', '.join(state)}, *, …)"
+    if len(head) < len(state) or any(each.kind not in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD) for each in head):
+        why = f", since {system.kind_name} has velocities" if len(state) == 3 and len(head) == 2 else ""
+        raise ArgumentError(f"{name}: expected a function {expected}{why}, got ({', '.join(map(str, own))})")
+    checks.argument_order(name, function, state)
+    taken = []
+    for each in rest:
+        if each.name in given and each.kind not in (each.POSITIONAL_ONLY, each.VAR_POSITIONAL, each.VAR_KEYWORD):
+            taken.append(each.name)
+        elif each.default is each.empty:
+            known = ", ".join(given) or "none"
+            raise ArgumentError(
+                f"{name}: expected a function {expected} whose further arguments are parameters of "
+                f"{system.kind_name} that do not change with the time, got {each}. Known: {known}."
+            )
+    return taken
+
+
+class Quantity:
+    """The quantity of an event, for a system whose parameters are known.
+
+    Args:
+        event: what it is.
+        system: what moves.
+        given: the parameters of the system that are numbers, by name, with one batch axis.
+    """
+
+    def __init__(self, event: Event, system: System, given: dict[str, Any]) -> None:
+        self.event, self.v_shape, self.y_shape = event, system.v_shape, system.y_shape
+        self.has_v = prod(system.v_shape) > 0
+        self._parameters = parameters_of(event.function, f"events: {event.name}", system, given)
+        self._quick_sines = bool(getattr(getattr(system, "definition", None), "quick_sines", False))
+        self._shapes = {name: given[name].shape[:-1] for name in self._parameters}
+        made = [self._operations_of() for _ in range(2)]
+        if made[0].lines != made[1].lines:
+            raise TraceError(
+                f"events: {event.name}: expected the same operations at every call, got others: an event may not draw random "
+                f"numbers or count its calls"
+            )
+        self._operations = made[0]
+        self._slope = self._slope_of()
+
+    def _operations_of(self) -> Operations:
+        """Its operations, of which the time is the first number of the state."""
+        tape = _core.Tape()
+        numbers, state = map(tape.param, count()), map(tape.state, count())
+        t = next(state)
+        parameters = {name: _symbols(shape, numbers) for name, shape in self._shapes.items()}
+        return Operations(*tape.operations([self.on(tape, t, state, parameters)]))
+
+    def _slope_of(self) -> Operations | None:
+        """The operations of its change along a change of time and state, which come behind the state; None if it has pieces."""
+        tape = _core.Tape()
+        numbers = map(tape.param, count())
+        n = 1 + self.has_v * prod(self.v_shape) + prod(self.y_shape)
+        state = [tape.state(i) for i in range(n)]
+        parameters = {name: _symbols(shape, numbers) for name, shape in self._shapes.items()}
+        with recording():
+            value = self.on(tape, state[0], iter(state[1:]), parameters)
+            try:
+                slope = directional(tape, [value], zip(state, (tape.state(n + i) for i in range(n)), strict=True))
+            except UnsupportedError:
+                return None
+        return Operations(*tape.operations(slope))
+
+    def on(self, tape: _core.Tape, t: _core.Symbol, state: Iterator[_core.Symbol], parameters: dict[str, Any]) -> _core.Symbol:
+        """The same on a tape."""
+        blocks = [_symbols(self.v_shape, state), _symbols(self.y_shape, state)][0 if self.has_v else 1 :]
+        name = f"events: {self.event.name}"
+        made = objects(run_by(rebound(self.event.function), name, self._quick_sines, Scalar(t), *blocks, **parameters))
+        if made.ndim or not isinstance(made[()], (Scalar, int, float)):
+            got = f"an array of shape {made.shape}" if made.ndim else kind_of(made[()])
+            raise TraceError(f"{name}: expected one number, whose changes of sign are the event, got {got}")
+        value = made[()].value if isinstance(made[()], Scalar) else made[()]
+        return value if isinstance(value, _core.Symbol) else tape.number(float(value))
+
+    def with_parameters(self, tape: _core.Tape, places: dict[str, int]) -> _core.Symbol:
+        """The same as the core computes it: parameters are those from these places on."""
+        parameters = {name: _symbols(shape, map(tape.param, count(places[name]))) for name, shape in self._shapes.items()}
+        return self.on(tape, tape.time(), map(tape.state, count()), parameters)
+
+    def __call__(self, t: Array, v: Array, y: Array, given: dict[str, Any]) -> Array:
+        """The quantity of states whose axes are the block's first; times and parameters broadcast over the others."""
+        return self._by(self._operations, self._rows_of(t, v, y), y, given)
+
+    def slope(self, t: Array, v: Array, y: Array, given: dict[str, Any], h: Array, dv: Array, dy: Array) -> Array:
+        """How much it would change in a step that goes on as the state does here; by a short way where it has no derivative."""
+        if self._slope is not None:
+            changes = self._by(self._slope, [*self._rows_of(t, v, y), *self._rows_of(h, dv, dy)], y, given)
+        else:
+            with np.errstate(all="ignore"):
+                there = self(t + SHORT * h, v + SHORT * dv, y + SHORT * dy, given)
+                changes = (there - self(t, v, y, given)) / SHORT
+        return np.nan_to_num(changes, nan=0.0)
+
+    def _rows_of(self, t: Array, v: Array, y: Array) -> list[Array]:
+        return [t, *(_rows(v, self.v_shape) if self.has_v else []), *_rows(y, self.y_shape)]
+
+    def _by(self, operations: Operations, state: list[Array], y: Array, given: dict[str, Any]) -> Array:
+        numbers = [each for name in self._parameters for each in _rows(given[name], given[name].shape[:-1])]
+        with np.errstate(all="ignore"):
+            value = operations(state, numbers)[0]
+        return np.broadcast_to(np.asarray(value, dtype=np.float64), y.shape[len(self.y_shape) :])
+
+
+class NewState:
+    """What an event makes of the state of a member, as operations.
+
+    Args:
+        event: which event; it has a function ``then``.
+        system: what moves.
+        given: the parameters of the system that are numbers, by name, with one batch axis.
+    """
+
+    def __init__(self, event: Event, system: System, given: dict[str, Any]) -> None:
+        self._name, self._function = f"events: {event.name}: then", event.then
+        self._shapes = (system.v_shape, system.y_shape) if prod(system.v_shape) > 0 else (system.y_shape,)
+        self._parameters = parameters_of(event.then, self._name, system, given)
+        quick_sines = bool(getattr(getattr(system, "definition", None), "quick_sines", False))
+        tape = _core.Tape()
+        numbers, state = map(tape.param, count()), map(tape.state, count())
+        t = next(state)
+        parameters = {name: _symbols(given[name].shape[:-1], numbers) for name in self._parameters}
+        blocks = [_symbols(shape, state) for shape in self._shapes]
+        result = run_by(rebound(self._function), self._name, quick_sines, Scalar(t), *blocks, **parameters)
+        self._operations = Operations(*tape.operations([each for block in self._blocks(result) for each in symbols(tape, block)]))
+
+    def _blocks(self, result: Any) -> list[Any]:
+        """The blocks that the function returned, each of its shape."""
+        if len(self._shapes) == 2 and not (isinstance(result, (tuple, list)) and len(result) == 2):
+            raise TraceError(f"{self._name}: expected the new state (v, y), got {kind_of(result)}")
+        blocks = []
+        for name, shape, block in zip(
+            "vy"[-len(self._shapes) :], self._shapes, result if len(self._shapes) == 2 else [result], strict=True
+        ):
+            numbers = objects(block)
+            wrong = next((each for each in numbers.flat if not isinstance(each, (Scalar, int, float))), None)
+            if wrong is not None or numbers.shape not in ((), shape):
+                got = f"shape {numbers.shape}" if wrong is None else kind_of(wrong)
+                raise TraceError(f"{self._name}: expected a new {name} of shape {shape}, got {got}")
+            blocks.append(np.broadcast_to(numbers, shape))
+        return blocks
+
+    def __call__(self, t: Array, v: Array, y: Array, given: dict[str, Any]) -> tuple[Array, Array]:
+        """The new states of members, whose axis comes last."""
+        blocks = (v, y)[-len(self._shapes) :]
+        state = [t, *(row for block, shape in zip(blocks, self._shapes, strict=True) for row in _rows(block, shape))]
+        numbers = [each for name in self._parameters for each in _rows(given[name], given[name].shape[:-1])]
+        with np.errstate(all="ignore"):
+            values = self._operations(state, numbers)
+        new_v, new_y, n = v.copy(), y.copy(), len(values) - prod(self._shapes[-1])
+        for block, shape, rows in ((new_v, self._shapes[0], values[:n]), (new_y, self._shapes[-1], values[n:])):
+            for index, row in zip(np.ndindex(*shape), rows, strict=False):
+                block[index] = row
+        return new_v, new_y
+
+
+def symbols(tape: _core.Tape, block: Any) -> list[_core.Symbol]:
+    """The symbols of an array of scalars and numbers."""
+    values = [each.value if isinstance(each, Scalar) else each for each in block.flat]
+    return [each if isinstance(each, _core.Symbol) else tape.number(float(each)) for each in values]
+
+
+def watched(quantities: Sequence[Quantity], plan: engine.Plan) -> engine.Watched:
+    """What the core computes them by, for members of this plan."""
+    places, rows = {}, 0
+    for name, value in plan.system.parameters(plan.batch):
+        if isinstance(value, np.ndarray):
+            places[name], rows = rows, rows + len(value)
+    tape = _core.Tape()
+    made = [(each.event.name, each.with_parameters(tape, places)) for each in quantities]
+    return engine.Watched(tape.equations([], [], made), len(made))
+
+
+def _symbols(shape: tuple[int, ...], symbols: Iterator[Any]) -> Any:
+    made = np.empty(shape, dtype=object)
+    for index in np.ndindex(*shape):
+        made[index] = next(symbols)
+    return scalars(made, len(shape))
+
+
+def _rows(block: Array, shape: tuple[int, ...]) -> list[Array]:
+    """The numbers of a block, each over all states."""
+    return [block[index] for index in np.ndindex(*shape)]

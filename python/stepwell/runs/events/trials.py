@@ -1,0 +1,227 @@
+"""Steps of the method from the start of a step, of any length: the trials by which a change of sign is located."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...base.arrays import Array
+from ...model.systems.own import OwnSystem
+from ...reference import contact, series_pace, tableau
+from ...reference.adaptive import Attempted, longer
+from ...reference.series import expanded
+from ...reference.signal import of_slot, over
+from ...reference.tape.replayed import Operations
+from ...reference.traced import Tracer
+from .. import engine
+from .members import Members
+
+#: A step of an own system of more operations is computed by calling its function.
+MOST_OPERATIONS = 4000
+#: Steps of up to so many members are made by the core, one after the other: NumPy's calls take as long for one member as for some
+#: hundred.
+MEMBERS_BY_CORE = 6
+#: Shorter units of time have a reciprocal that is no float.
+LEAST_UNIT = 2.0**-1000
+#: So many members of a plan are kept, each as a plan of its own.
+KEPT_PLANS = 256
+
+
+class Trials:
+    """Steps of any members of a plan, from any of their states.
+
+    The function of an own system takes long to call, so that its step is traced once for all members; of a few members the core
+    makes them, of steps of one length for all. The bits are the same.
+
+    Args:
+        plan: of the run.
+        members: its members.
+    """
+
+    def __init__(self, plan: engine.Plan, members: Members) -> None:
+        self._plan, self._members = plan, members
+        self._operations: Operations | None = None
+        self._numbers: list[Array] = []
+        #: Whether there is no other way, however long the step is.
+        self._always_traced = False
+        self._is_traced = not isinstance(plan.system, OwnSystem)
+        self._by_core = plan.backend == "rust"
+        self._plans: dict[int, engine.Plan] = {}
+        self._rates: tuple[Operations, list[Array]] | None = None
+        self._rates_traced = False
+
+    def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """A step of these members from v and y, of another time and length for each."""
+        if self._by_core and len(index) <= MEMBERS_BY_CORE:
+            return self._one_by_one(index, t, h, v, y)
+        if not self._is_traced:
+            self._trace()
+            self._is_traced = True
+        if self._operations is None:
+            return self._one(self._members.plan(index), t, h, v, y)
+        state = [t, h, *_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
+        numbers = [each if each.shape[-1] == 1 else each[index] for each in self._numbers]
+        with np.errstate(all="ignore"):
+            made = self._operations(state, numbers)
+        n = len(made) - y[..., 0].size
+        return _block(made[:n], v), _block(made[n:], y)
+
+    def rates(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """How much v and y of these members would change in a step of the length if they went on as they do here."""
+        if not self._rates_traced:
+            self._rates, self._rates_traced = self._traced_rates(), True
+        if self._rates is None:
+            s = self._scaled(self._members.plan(index), h)
+            with np.errstate(all="ignore"):
+                dv, dy = s.dv(t, v, y), s.dy(t, v, y)
+            return np.broadcast_to(dv, v.shape), np.broadcast_to(dy, y.shape)
+        operations, numbers = self._rates
+        state = [t, h, *_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
+        with np.errstate(all="ignore"):
+            changes = operations(state, [each if each.shape[-1] == 1 else each[index] for each in numbers])
+        n = len(changes) - y[..., 0].size
+        return _block(changes[:n], v), _block(changes[n:], y)
+
+    def _traced_rates(self) -> tuple[Operations, list[Array]] | None:
+        """Rates of an own system as operations, likewise."""
+        plan = self._members.plan(np.arange(self._plan.members))
+        if not isinstance(plan.system, OwnSystem):
+            return None
+        tape = _core.Tape()
+        tracer = Tracer(plan.system, tape, plan.force)
+        t, h = tape.state(0), tape.state(1)
+        leaves = (tape.state(i) for i in range(2, 1 << 30))
+        v, y = (_symbols(shape, leaves) for shape in (plan.system.v_shape, plan.system.y_shape))
+        s = self._scaled_symbols(tracer, h)
+        if tracer.tables:
+            return None
+        wide = (np.broadcast_to(s.dv(t, v, y), v.shape), np.broadcast_to(s.dy(t, v, y), y.shape))
+        operations = Operations(*tape.operations(tracer.flat(*wide)))
+        if len(operations.lines) > MOST_OPERATIONS:
+            return None
+        return operations, [np.atleast_1d(each) for each in tracer.numbers]
+
+    def _scaled(self, plan: engine.Plan, h: Any) -> Any:
+        """The system of these members, scaled to steps of another length for each."""
+        return plan.system.scaled(h, plan.batch, plan.force)
+
+    def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
+        """The same with symbols."""
+        return tracer.scaled(h)
+
+    def _one_by_one(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """The same by the core."""
+        made_v, made_y = np.empty(v.shape), np.empty(y.shape)
+        for i, (member, begin, length) in enumerate(zip(index.tolist(), t.tolist(), h.tolist(), strict=True)):
+            if member not in self._plans:
+                if len(self._plans) >= KEPT_PLANS:
+                    self._plans.clear()
+                self._plans[member] = self._members.plan(np.array([member]))._replace(
+                    first=0, steps=1, every=None, threads=1, progress=None, record=(), fused=False
+                )
+            plan, one = self._plans[member]._replace(t0=begin, dt=length), slice(i, i + 1)
+            out = engine.advance(plan, np.ascontiguousarray(v[..., one]), np.ascontiguousarray(y[..., one]))
+            made_v[..., one], made_y[..., one] = out.v[-1], out.y[-1]
+        return made_v, made_y
+
+    def _trace(self) -> None:
+        """Trace a step of an own system, if it is short and has no samples."""
+        plan = self._members.plan(np.arange(self._plan.members))
+        tape = _core.Tape()
+        tracer = Tracer(plan.system, tape, plan.force)
+        t, h = tape.state(0), tape.state(1)
+        shapes, leaves = (plan.system.v_shape, plan.system.y_shape), (tape.state(i) for i in range(2, 1 << 30))
+        v, y = (_symbols(shape, leaves) for shape in shapes)
+        made = self._on(tracer, plan, t, h, v, y)
+        if tracer.tables:
+            return
+        operations = Operations(*tape.operations(tracer.flat(*made)))
+        if len(operations.lines) <= MOST_OPERATIONS or self._always_traced:
+            self._operations, self._numbers = operations, [np.atleast_1d(each) for each in tracer.numbers]
+
+    def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """A step of all members of a plan, of another time and length for each."""
+        return one_step(plan, t, h, v, y)
+
+    def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+        """The same with symbols."""
+        s = tracer.scaled(h)
+        return (v, y) if tracer.tables else stepped(plan, s, t, h, v, y)
+
+
+class AdaptiveTrials(Trials):
+    """The same of a plan with adaptive steps: as the states within a step are made that are saved."""
+
+    def __init__(self, plan: engine.Plan, members: Members) -> None:
+        super().__init__(plan, members)
+        self._by_core = False  # which makes no steps of a given length of these
+        self._always_traced = plan.method.has_series
+        self._is_traced = self._is_traced and not self._always_traced
+
+    def _scaled(self, plan: engine.Plan, h: Any) -> Any:
+        return Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control).rates(h)
+
+    def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
+        return tracer.attempted(backward=self._plan.backward).rates(h)
+
+    def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        system = Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control)
+        with np.errstate(all="ignore"):
+            v, y = within(plan, system, t, h, v, y)
+        return np.asarray(v), np.asarray(y)
+
+    def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+        return within(plan, tracer.attempted(backward=plan.backward), t, h, v, y)
+
+
+def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+    """A step of all members of a plan, likewise."""
+    system: Any = plan.system  # whose step is one number elsewhere
+    with np.errstate(all="ignore"):
+        v, y = stepped(plan, system.scaled(h, plan.batch, plan.force), t, h, v, y)
+    return np.asarray(v), np.asarray(y)
+
+
+def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+    """A step of a method from v and y: what it carries in place of v is made anew for this length."""
+    steps, carries = plan.method.steps, plan.method.carry is not None
+    if not carries:
+        return tuple(contact.step(steps, s, plan.choice, t, h, v, y))
+    with over(of_slot(t, h)):
+        slot = steps.start(s, plan.choice, t, v, y)
+    slot, y = contact.step(steps, s, plan.choice, t, h, slot, y)
+    with over(of_slot(t + h, h)):
+        return steps.finish(s, plan.choice, t + h, slot, y), y
+
+
+def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+    """A step of a method with adaptive steps, of a length that is given."""
+    steps: Any = plan.method.steps
+    if plan.method.has_series:
+        unit = longer(series_pace.unit_of(h), LEAST_UNIT)
+        terms, share = expanded(system.s, plan.order or steps.ORDER, t, (unit, unit), v, y)[0], h * (1.0 / unit)
+        v, y = (series_pace.value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
+    else:
+        v, y = tableau.plus(v, y, steps.WEIGHTS, steps.stages(system.rates(h), t, h, v, y))
+    v, y, _ = system.project(v, y)
+    return v, y
+
+
+def _symbols(shape: tuple[int, ...], leaves: Any) -> Any:
+    made = np.empty(shape, dtype=object)
+    for index in np.ndindex(shape):
+        made[index] = next(leaves)
+    return made
+
+
+def _rows(block: Array, shape: tuple[int, ...]) -> list[Array]:
+    return [block[index] for index in np.ndindex(shape)]
+
+
+def _block(rows: list[Array], like: Array) -> Array:
+    made = np.empty((len(rows), like.shape[-1]))
+    for row, numbers in zip(made, rows, strict=True):
+        row[:] = numbers
+    return made.reshape(like.shape)

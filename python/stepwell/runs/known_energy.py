@@ -1,0 +1,399 @@
+"""Runs whose known energy or invariant tells, at their end, that they did not follow the motion; of other systems than bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi, prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Array, Shape, Whole
+from ..base.reprs import in_words, share
+from ..model.systems import Pendulum, RigidBody, System
+from ..reference.acceptance import Acceptance
+from .engine import ABSOLUTE, PACE_NUMBERS, RELATIVE
+from .result import Run
+
+State = tuple[Array, Array]
+#: From the places of members in one row to the least and the most y of each, and how many attempts were rejected.
+Visited = Callable[[Whole], tuple[Array, Array, Array]]
+#: What steps own equations, by the name that the core knows.
+KERNEL_OF_EQUATIONS = "equations"
+Members = np.ndarray[Any, np.dtype[np.bool_]]
+
+#: It is looked at where a run made so many function evaluations, and has at most so many numbers: that is little work against it.
+FEW_EVALUATIONS, MOST_NUMBERS = 100, 100_000
+#: An invariant is another at the end if it changed by more than this share of what its terms are made of, and either of what they
+#: exchange in the motion, as the kinetic energy of a swing, or of its own size; there, where terms cancel, by more than a share
+#: of its slope times the length of the state. The first two are the same whatever constant is added to it. The second alone would
+#: take a fast rotation that exchanges little for wrong, and the third alone an energy that happens to be zero. Of a quadratic
+#: energy all are the energy, but for the last, which is twice that. Changes below LITTLE of its own size are not looked at,
+#: which takes a hundred microseconds: they would count only beside a constant of a thousand times what is exchanged.
+CHANGED, CHANGED_OF_SLOPE, LITTLE = 0.5, 0.25, 2.0**-10
+#: The part of a number by which it is changed to find a derivative: a third of its digits, for a central difference.
+PART = 2.0**-17
+#: Changes of an invariant by v and by y cancel but for this share. Differences are right to the square of the part by which an
+#: angle changes, 1e-5 where a state has some hundred turns a unit of time; damping and drives leave more than a thousandth.
+CONSTANT = 1e-3
+#: Numbers of a state for whom a gradient is found by differences.
+MOST_IN_GRADIENT = 64
+#: So many places between the ends of a motion are looked at for a barrier, and so many between two of them, again and again.
+PLACES, FINER, TIMES = 1024, 33, 3
+#: A barrier counts if it is higher than the energy by more than the roundings of both.
+ROUNDING = 2.0**-40
+
+
+def keeps_energy(run: Run) -> bool:
+    """Whether nothing takes or gives energy in the true motion: no damping, drag, friction, floors, inputs or torques."""
+    system: System = run.system.uncontrolled
+    if run.force is not None or getattr(system, "torques_act", False) or system.contacts:
+        return False
+    if system.kernel == KERNEL_OF_EQUATIONS:
+        return True  # its energy is what was declared to be constant
+    terms = [getattr(system, name, None) for name in ("damping", "drag", "friction")]
+    if any(term is not None and np.any(term) for term in terms):
+        return False
+    return isinstance(system, RigidBody) or not system.given_inputs()
+
+
+def told(run: Run, start: State | None, visited: Visited | None = None) -> str | None:
+    """What is to be said, or None.
+
+    With steps of fixed length a change of the energy is a property of the method, which grows or decays by nature; there it is
+    said only where a method that keeps swings bounded passed a barrier.
+
+    Args:
+        run: which.
+        start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
+        visited: between which y some members have been, by their places, at the ends of adaptive steps.
+    """
+    system, paces = run.system, run.paces
+    names = _names(system)
+    if start is None or not names or system.keeper is not None or not keeps_energy(run):
+        return None
+    made = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
+    if made < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS or not run.status.size:
+        return None
+    if paces is None and (run.method.limit == 0.0 or not (isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS)):
+        return None  # other systems have no barrier
+    start = np.broadcast_to(start[0], run.v.shape[1:]), np.broadcast_to(start[1], run.y.shape[1:])
+    with np.errstate(all="ignore"):
+        for name in names:
+            text = _of_one(run, name, start, made, visited)
+            # An invariant may have been declared to be recorded, as the energy of what is damped or driven.
+            if text is not None and (system.kernel != KERNEL_OF_EQUATIONS or _is_constant(run, name)):
+                return text
+    return None
+
+
+def _is_constant(run: Run, name: str) -> bool:
+    """Whether an invariant is one: along the rates at the end, what its change by v and that by y add up to is nothing."""
+    system, v, y = run.system, run.v[-1], run.y[-1]
+    alone = system.alone(1.0, run.status.shape)
+    t = np.broadcast_to(run.t[-1], run.status.shape)
+    rates = np.broadcast_to(alone.dv(t, v, y), v.shape), np.broadcast_to(alone.dy(t, v, y), y.shape)
+    axes = [tuple(range(len(shape))) for shape in (system.v_shape, system.y_shape)]
+    sizes = [[np.abs(block).sum(axis=own) for block, own in zip(blocks, axes, strict=True)] for blocks in ((v, y), rates)]
+    time = PART * sum(sizes[0]) / sum(sizes[1])
+    changes = []
+    for by_v, by_y in ((time, 0.0), (0.0, time)):
+        ends = [(v + sign * by_v * rates[0], y + sign * by_y * rates[1]) for sign in (1.0, -1.0)]
+        pairs = (np.stack([end[i] for end in ends], axis=len(axes[i])) for i in range(2))
+        later, earlier = _values(system, name, tuple(pairs))  # type: ignore[arg-type]  # v and y
+        changes.append(later - earlier)
+    constant = np.abs(changes[0] + changes[1]) <= CONSTANT * (np.abs(changes[0]) + np.abs(changes[1]))
+    return bool((constant | ~np.isfinite(changes[0] + changes[1])).all())
+
+
+def _of_one(run: Run, name: str, start: State, made: int, visited: Visited | None) -> str | None:
+    """What is to be said of one invariant. States are evaluated together, since a call takes longer than a thousand numbers."""
+    system = run.system
+    # Of few members it takes some tenths of a millisecond; else a place takes as long as some hundred evaluations of the core.
+    few = run.status.size * PLACES <= MOST_NUMBERS // 10
+    places = PLACES if few else min(PLACES, MOST_NUMBERS // run.status.size, made // 100)
+    is_line = system.kernel == KERNEL_OF_EQUATIONS and system.v_shape == () and system.y_shape == ()
+    has_barriers = isinstance(system, Pendulum) or (is_line and places >= FINER)
+    if not has_barriers and run.paces is None:
+        return None
+    region = None if not has_barriers else _saved(run, start) if run.paces is None else _farthest(run)
+    first, last, above = _looked_over(run, name, start, region, places)
+    if region is not None and (above < np.inf).any():
+        between = region if run.paces is None else _stepped(run, name, start, above, visited)
+        if between is not None:
+            barrier = (
+                _upright(run, between) if isinstance(system, Pendulum) else _searched(run, name, start, first, between, places)
+            )
+            if (text := _of_a_barrier(run, name, first, barrier)) is not None:
+                return text
+    return None if run.paces is None else _of_a_change(run, name, start, (first, last))
+
+
+def _looked_over(run: Run, name: str, start: State, region: State | None, places: int) -> tuple[Array, Array, Array]:
+    """An invariant at the start and at the end, and by how much the lowest barrier of a region that is above the first is so."""
+    system, ends = run.system, _ends(run, start)
+    if region is None:
+        first, last = _values(system, name, ends)
+        return first, last, np.full(run.status.shape, np.inf)
+    if isinstance(system, Pendulum):
+        first, last = _values(system, name, ends)
+        heights = _upright(run, region).height[np.newaxis]
+    else:
+        y = _between(*region, places)
+        first, last, *_ = values = _values(system, name, (np.concatenate([ends[0], 0.0 * y]), np.concatenate([ends[1], y])))
+        heights = np.where(np.isfinite(values[2:]), values[2:], -np.inf)
+        top, *beside = heights[1:-1], heights[:-2], heights[2:]
+        # Between places it is higher by no more than it falls beside.
+        heights = np.where((top >= beside[0]) & (top >= beside[1]), 2.0 * top - np.minimum(*beside), -np.inf)
+    return first, last, np.where(heights > first, heights - first, np.inf).min(axis=0)
+
+
+def _names(system: System) -> list[str]:
+    """The invariants that it is known to have."""
+    if system.kernel == KERNEL_OF_EQUATIONS:
+        return list(system.quantities)
+    return ["energy"] if type(system).energy is not System.energy else []
+
+
+def _ends(run: Run, start: State) -> State:
+    """The states at the start and at the end, along an axis before those of the batch."""
+    pairs = zip(start, (run.v[-1], run.y[-1]), (run.system.v_shape, run.system.y_shape), strict=True)
+    v, y = (np.stack(pair, axis=len(shape)) for *pair, shape in pairs)
+    return v, y
+
+
+def _values(system: System, name: str, states: State) -> Array:
+    """An invariant of several states of all members, shape (states, *batch)."""
+    return np.broadcast_to(system.recordable(name, *states, 1.0), states[1].shape[len(system.y_shape) :])
+
+
+def _of_a_change(run: Run, name: str, start: State, values: tuple[Array, Array]) -> str | None:
+    """An invariant that has another size at the end."""
+    first, last = values
+    change = np.abs(last - first)
+    size = np.maximum(np.abs(first), np.abs(last))
+    wrong = (change > LITTLE * size) & np.isfinite(last) & (run.status == 0)  # others were named before
+    n = prod(run.system.v_shape) + prod(run.system.y_shape)
+    if not wrong.any() or n > MOST_IN_GRADIENT:
+        return None
+    to_the_end, at_most = _exchanged(run, name, start, first)
+    by_exchange = ~(change <= CHANGED * at_most)
+    by_size = ~(change <= CHANGED * np.maximum(size, to_the_end))
+    for state in (start, _end(run)):
+        if not (wrong & (by_exchange | by_size)).any():
+            return None
+        slopes = _slopes(run.system, name, state)
+        terms, steepness = _of_terms(run.system, name, state, slopes)
+        wrong &= ~(change <= CHANGED * terms) & ~(change <= _of_a_step(run, slopes))
+        by_size &= ~(change <= CHANGED_OF_SLOPE * steepness)
+    wrong &= by_exchange | by_size
+    if not wrong.any():
+        return None
+    index, some = tuple(np.argwhere(wrong)[0].tolist()), int(np.count_nonzero(wrong))
+    return (
+        f"{share(some, wrong.shape, wrong.size)} {'has' if some == 1 else 'have'} another {name} at the end: "
+        f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}{last[index]:.3g} instead of {first[index]:.3g}, "
+        f"so {run.method.name} did not follow the motion"
+    )
+
+
+def _end(run: Run) -> State:
+    return run.v[-1], run.y[-1]
+
+
+def _sizes(run: Run, numbers: Array) -> State:
+    """A number of each group of components that errors are relative to, as one for each number of v and of y."""
+    shapes = run.system.v_shape, run.system.y_shape
+    n_v, n_y = (prod(shape) for shape in shapes)
+    groups = run.system.groups or (0,) * n_v + (int(n_v > 0),) * n_y
+    rows = numbers[list(groups)]
+    v, y = (part.reshape((*shape, *part.shape[1:])) for part, shape in zip((rows[:n_v], rows[n_v:]), shapes, strict=True))
+    return v, y
+
+
+def _longest(run: Run) -> Array:
+    """The largest that each group has been at the end of a step."""
+    assert run.stand is not None
+    groups = Acceptance(run.system.groups).counts(prod(run.system.v_shape), prod(run.system.y_shape))
+    return run.stand.pace[PACE_NUMBERS : PACE_NUMBERS + sum(groups)]
+
+
+def _exchanged(run: Run, name: str, start: State, first: Array) -> tuple[Array, Array]:
+    """The most by which an invariant would change from the start if one number alone did what it did in the motion.
+
+    If it became what it is at the end; and if it went as far as it has been, to either side, too. A run that went astray went
+    farther than the motion, so of the two the second is not what the motion exchanges, but no less.
+    """
+    longest, end = _sizes(run, _longest(run)), _end(run)
+    others = [(end[which], longest[which], -longest[which]) for which in range(2)]
+    states = [_with(start, which, index, each[index]) for which, index in _places(run.system) for each in others[which]]
+    changes = np.abs(_of_several(run.system, name, states) - first)
+    changes = np.where(np.isfinite(changes), changes, 0.0)
+    return changes[::3].max(axis=0), changes.max(axis=0)
+
+
+def _places(system: System) -> list[tuple[int, tuple[int, ...]]]:
+    """The numbers of a state: 0 for v or 1 for y, and the place within it."""
+    return [(which, index) for which, shape in enumerate((system.v_shape, system.y_shape)) for index in np.ndindex(shape)]
+
+
+def _with(state: State, which: int, index: tuple[int, ...], number: Any) -> State:
+    """A state with another number in one place."""
+    v, y = (np.array(each) if k == which else each for k, each in enumerate(state))
+    (v, y)[which][index] = number
+    return v, y
+
+
+def _of_several(system: System, name: str, states: list[State]) -> Array:
+    """An invariant of several states of all members."""
+    shapes = system.v_shape, system.y_shape
+    v, y = (np.stack([each[i] for each in states], axis=len(shapes[i])) for i in range(2))
+    return _values(system, name, (v, y))
+
+
+def _length(block: Array, shape: Shape) -> Array:
+    return np.asarray(np.sqrt((block * block).sum(axis=tuple(range(len(shape))))))
+
+
+def _slopes(system: System, name: str, state: State) -> State:
+    """The gradient of an invariant, by v and by y."""
+    shapes, states, steps = (system.v_shape, system.y_shape), [], []
+    lengths = [_length(block, shape) for block, shape in zip(state, shapes, strict=True)]
+    for which, index in _places(system):
+        number, length = state[which][index], lengths[which]
+        steps.append(PART * np.where(number != 0.0, np.abs(number), np.where(length > 0.0, length, 1.0)))
+        states += [_with(state, which, index, number + sign * steps[-1]) for sign in (1.0, -1.0)]
+    values, n_v = _of_several(system, name, states), prod(system.v_shape)
+    slopes = (values[::2] - values[1::2]) / (2.0 * np.stack(steps))
+    return slopes[:n_v].reshape(state[0].shape), slopes[n_v:].reshape(state[1].shape)
+
+
+def _of_terms(system: System, name: str, state: State, slopes: State) -> tuple[Array, Array]:
+    """What the terms of an invariant are made of, and the length of its slope times that of the state; both block by block.
+
+    The first is what the length of a block, straight down or up, makes of it, or the second where that is less.
+
+    That of ½v² is the energy that would be gone at rest. A steep potential is far below its slope times the length. An angular
+    momentum of 0 changes across the motion, and its rounding is nothing beside that.
+    """
+    here, terms, along = _of_several(system, name, [state])[0], np.zeros(()), np.zeros(())
+    for which, (block, slope, shape) in enumerate(zip(state, slopes, (system.v_shape, system.y_shape), strict=True)):
+        if not prod(shape):
+            continue
+        length, steepness = _length(block, shape), _length(slope, shape)
+        way = np.where(steepness > 0.0, slope / steepness, 0.0) * length
+        both = [tuple(each + sign * way if k == which else each for k, each in enumerate(state)) for sign in (1.0, -1.0)]
+        changes = np.abs(_of_several(system, name, both) - here)  # type: ignore[arg-type]  # v and y
+        changes = np.where(np.isfinite(changes), changes, np.inf)
+        terms, along = terms + np.minimum(steepness * length, changes.min(axis=0)), along + steepness * length
+    return np.asarray(terms), np.asarray(along)
+
+
+def _of_a_step(run: Run, slopes: State) -> Array:
+    """By how much an invariant may change in a step whose error is just tolerated, or by rounding."""
+    assert run.stand is not None
+    pace, longest, system = run.stand.pace, _longest(run), run.system
+    groups = len(longest)
+    relative, absolute = pace[RELATIVE], pace[ABSOLUTE]
+    if len(pace) >= PACE_NUMBERS + 3 * groups:  # each group has tolerances of its own
+        relative, absolute = pace[PACE_NUMBERS + groups : PACE_NUMBERS + 2 * groups], pace[PACE_NUMBERS + 2 * groups :][:groups]
+    errors = _sizes(run, absolute + np.maximum(relative, ROUNDING) * longest)
+    parts = zip(slopes, errors, (system.v_shape, system.y_shape), strict=True)
+    return np.asarray(sum((np.abs(slope) * error).sum(axis=tuple(range(len(shape)))) for slope, error, shape in parts))
+
+
+class Barrier(NamedTuple):
+    """The place within each member's motion at which it takes the most energy to be, and how much; −∞ where there is none."""
+
+    place: Array
+    height: Array
+
+
+def _of_a_barrier(run: Run, name: str, first: Array, barrier: Barrier) -> str | None:
+    """A motion along a line that passed a place where even at rest it would have more energy than it has."""
+    passed = (barrier.height > first + ROUNDING * np.abs(first)) & (barrier.height < np.inf) & (run.status == 0)
+    if not passed.any():
+        return None
+    index, some = tuple(np.argwhere(passed)[0].tolist()), int(np.count_nonzero(passed))
+    who = f"{in_words(index)} passed" if passed.size > 1 else "it passed"
+    place, height, had = (float(np.broadcast_to(each, passed.shape)[index]) for each in (*barrier, first))
+    return (
+        f"{share(some, passed.shape, passed.size)} did not follow the motion, by {run.method.name}: {who} y = {place:.4g}, where "
+        f"even at rest the {name} is {height:.10g}, with {had:.10g} at the start; take "
+        f"{'shorter steps' if run.paces is None else 'a smaller tolerance'}"
+    )
+
+
+def _saved(run: Run, start: State) -> State:
+    """Between which y each member is known to have been, by its saved states."""
+    ys = np.concatenate([start[1][np.newaxis], run.y])
+    return np.asarray(np.fmin.reduce(ys, axis=0)), np.asarray(np.fmax.reduce(ys, axis=0))
+
+
+def _farthest(run: Run) -> State:
+    """Between which y each member may have been, by how far from 0 it was at the ends of its adaptive steps."""
+    _, farthest = _sizes(run, _longest(run))
+    farthest = np.fmax(farthest, np.abs(run.y[-1]))  # within the last step
+    return -farthest, farthest
+
+
+def _stepped(run: Run, name: str, start: State, above: Array, visited: Visited | None) -> State | None:
+    """Between which y each member has been at the ends of its adaptive steps, which do not depend on the states that are saved.
+
+    That is looked for where a barrier is so little above the energy that errors of all its steps, each as large as is tolerated,
+    would lift it over. None where no member has such a barrier.
+    """
+    assert run.paces is not None
+    fastest, _ = _sizes(run, _longest(run))
+    states = (start, _end(run), (np.broadcast_to(fastest, run.status.shape), start[1]))
+    of_a_step = np.maximum.reduce([_of_a_step(run, _slopes(run.system, name, state)) for state in states])
+    may = (above < np.inf) & ~(above > run.paces.accepted * of_a_step) & (run.status == 0)
+    if visited is None or not may.any():
+        return None
+    least, most, rejected = visited(np.flatnonzero(may))
+    # Where a saved state made a step be rejected, the steps were others; what is known of them are the saved states.
+    known = np.where(rejected == run.paces.rejected[may], run.y[-1:][:, may], run.y[:, may])
+    between = [np.array(np.broadcast_to(start[1], run.status.shape)) for _ in range(2)]
+    between[0][may] = np.fmin(least, np.fmin.reduce(known, axis=0))
+    between[1][may] = np.fmax(most, np.fmax.reduce(known, axis=0))
+    return between[0], between[1]
+
+
+def _upright(run: Run, between: State) -> Barrier:
+    """A pendulum that stands on its head."""
+    assert isinstance(run.system, Pendulum)
+    least, most = between
+    place = pi * (2.0 * np.ceil(0.5 * (least / pi - 1.0)) + 1.0)
+    return Barrier(place, np.where((least < place) & (place < most), 2.0 * run.system.omega * run.system.omega, -np.inf))
+
+
+def _searched(run: Run, name: str, start: State, first: Array, between: State, places: int) -> Barrier:
+    """The barrier of an invariant: the highest of many places, and of more and more around it.
+
+    It is higher than what is beside it, since a motion may err beyond where it turns; and rest takes the least energy there.
+    """
+    system = run.system
+    y = _between(*between, places)
+    height = _values(system, name, (0.0 * y, y))
+    height = np.where(np.isfinite(height), height, -np.inf)
+    is_peak = (height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])
+    best = 1 + np.where(is_peak, height[1:-1], -np.inf).argmax(axis=0)[np.newaxis]
+    has_peak = is_peak.any(axis=0)
+    for _ in range(TIMES):
+        place, low, high = (np.take_along_axis(y, best + side, axis=0)[0] for side in (0, -1, 1))
+        top, *lower = (np.take_along_axis(height, best + side, axis=0)[0] for side in (0, -1, 1))
+        # Between them it is higher by no more than it falls beside, but for a peak that is narrower than they are apart.
+        if not (has_peak & (2.0 * top - np.minimum(*lower) > first)).any():
+            return Barrier(place, np.full(place.shape, -np.inf))
+        y = _between(low, high, FINER)
+        height = _values(system, name, (0.0 * y, y))
+        best = np.clip(height.argmax(axis=0), 1, FINER - 2)[np.newaxis]
+    fastest = np.maximum(np.abs(start[0]), np.fmax.reduce(np.abs(run.v), axis=0))
+    speeds = _between(-fastest, fastest, 5)
+    least_at_rest = (_values(system, name, (speeds, place + 0.0 * speeds)) >= top).all(axis=0)
+    return Barrier(place, np.where(has_peak & least_at_rest, top, -np.inf))
+
+
+def _between(low: Array, high: Array, places: int) -> Array:
+    """So many places from one to the other, shape (places, *batch)."""
+    return np.asarray(low + np.linspace(0.0, 1.0, places).reshape(-1, *(1,) * np.ndim(low)) * (high - low))

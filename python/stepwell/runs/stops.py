@@ -1,0 +1,176 @@
+"""Why members of a run with a tolerance stopped before its end, in words with numbers."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+
+from ..base import checks, registry
+from ..base.arrays import Array, Shape
+from ..base.reprs import counted, first_of, share
+from ..errors import ToleranceWarning
+from ..model.systems import System
+from . import engine
+from .positive import name_of, places_of
+from .result import Run, Status
+
+#: Why a member stopped, in words.
+WHY_STOPPED = {
+    Status.BUDGET: "out of max_steps",
+    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time",
+    Status.NOT_FINITE: "no step, however small, gives finite numbers",
+}
+#: Why steps shrink without an end where rates are finite and the time has digits enough.
+BLOWS_UP = (
+    "the solution blows up there (a collision, a pole), or does so by the errors that the tolerance allows: try a smaller one, "
+    "or a pair (relative, absolute)"
+)
+
+#: Roundings of the time by which rates are looked at beyond where a member stopped.
+BEYOND = 8.0
+#: The time has too few digits where a member stops at its start, or if a step of this share of the mean one is within roundings.
+USUAL = 2.0**-10
+
+State = tuple[Array, Array]
+
+
+def warn_of_stops(run: Run) -> None:
+    """Warn of the members that stopped by themselves: how many, which first, when, and what is known of its cause."""
+    assert run.paces is not None
+    stopped = run.status != 0
+    elapsed = np.where(stopped, np.abs(run.paces.t - run.t0), np.inf)
+    first = tuple(np.argwhere(elapsed == elapsed.min())[0].tolist())
+    time, end = float(run.paces.t[first]), float(_of_member(run, run.t[-1], first))
+    some = int(np.count_nonzero(stopped))
+    warnings.warn(
+        f"{share(some, stopped.shape, stopped.size)} stopped before t = {end:g}"
+        f"{first_of(some, first, stopped.size) or ','} at t = {time:g}; {_why(run, first)}",
+        ToleranceWarning,
+        stacklevel=4,
+    )
+
+
+def _why(run: Run, index: Shape) -> str:
+    """What stopped a member, and the numbers that show it."""
+    assert run.paces is not None
+    status = Status(int(run.status[index]))
+    if status == Status.BUDGET:
+        accepted, rejected = int(run.paces.accepted[index]), int(run.paces.rejected[index])
+        mean = f", steps of {abs(float(run.paces.t[index]) - start_of(run, index)) / accepted:.2g} on average" if accepted else ""
+        held = registry.task("held_by_stability")(run, index, accepted + rejected)
+        tried = f"{counted(accepted + rejected, 'attempt')}, {rejected} of them rejected{mean}"
+        return f"{WHY_STOPPED[status]}: {tried}{held}; max_steps= allows more"
+    if status == Status.UNDERFLOW and (beyond := _of_rates_beyond(run, index)):
+        return f"{WHY_STOPPED[Status.NOT_FINITE]}: {beyond} beyond"
+    if wrong := _of_rates_there(run, index):
+        return f"{WHY_STOPPED[status]}: {wrong}"
+    if status == Status.NOT_FINITE:
+        assert run.stand is not None
+        longest = max(float(np.abs(checks.member(block, index)).max(initial=0.0)) for block in (run.stand.v, run.stand.y))
+        return f"{WHY_STOPPED[status]}: the state reached {longest:.3g}"
+    if left := _left_for_below_zero(run, index):
+        return f"{left} becomes negative in every step, however short, which positive= does not allow"
+    if spacing := _roundings_of_the_time(run, index):
+        return (
+            f"{WHY_STOPPED[status]}, whose roundings there are {spacing:.2g}: count times from a nearer origin, "
+            f"or give a larger tolerance"
+        )
+    return f"{WHY_STOPPED[status]}: {BLOWS_UP}; {_largest_rate(run, index)}"
+
+
+def _of_member(run: Run, times: Any, index: Shape) -> Any:
+    """A time of a member, which may be that of all."""
+    return np.broadcast_to(times, run.status.shape)[index]
+
+
+def start_of(run: Run, index: Shape) -> float:
+    """The time at which a member began."""
+    return float(_of_member(run, run.t0, index))
+
+
+def _of_rates_beyond(run: Run, index: Shape) -> str:
+    """Which rate is not finite some roundings of the time behind where a member stopped; empty if all are."""
+    assert run.paces is not None
+    assert run.stand is not None
+    t, (v, y) = run.paces.t, (run.stand.v, run.stand.y)
+    ahead = BEYOND * np.where(run.paces.h < 0.0, -1.0, 1.0) * np.spacing(np.abs(t))
+    dv, dy = rates_of(run.system, run.status.shape, t, (v, y))
+    return _not_finite(rates_of(run.system, run.status.shape, t + ahead, (v + ahead * dv, y + ahead * dy)), index)
+
+
+def _rates_there(run: Run) -> State:
+    """v̇ and ẏ where members stopped."""
+    assert run.paces is not None
+    assert run.stand is not None
+    return rates_of(run.system, run.status.shape, run.paces.t, (run.stand.v, run.stand.y))
+
+
+def _of_rates_there(run: Run, index: Shape) -> str:
+    """Which rate is not finite where a member stopped; empty if all are."""
+    assert run.paces is not None
+    wrong = _not_finite(_rates_there(run), index)
+    return wrong and f"{wrong} {'at the start' if float(run.paces.t[index]) == start_of(run, index) else 'there'}"
+
+
+def _largest_rate(run: Run, index: Shape) -> str:
+    """Which rate is the largest where a member stopped."""
+    each = ((checks.member(block, index), name) for block, name in zip(_rates_there(run), "vy", strict=True) if block.size)
+    block, name = max(each, key=lambda each: float(np.abs(each[0]).max()))
+    place = np.unravel_index(int(np.abs(block).argmax()), block.shape)
+    return f"the largest rate there is that of {_component(name, tuple(map(int, place)))}, {float(block[place]):.3g}"
+
+
+def _left_for_below_zero(run: Run, index: Shape) -> str:
+    """Which component that ``positive=`` keeps from there every step leads below zero; empty if none does.
+
+    Several may be kept: it is the one that would be at zero first.
+    """
+    from ..reference.adaptive import OUTSIDE
+
+    assert run.stand is not None
+    if run.stand.pace[engine.ERROR][index] != OUTSIDE:
+        return ""
+    blocks, rates = (run.stand.v, run.stand.y), _rates_there(run)
+    state, rate = (np.concatenate([checks.member(block, index).reshape(-1) for block in each]) for each in (blocks, rates))
+    kept = np.array(places_of(run.system, run.stand.options["positive"]))
+    with np.errstate(all="ignore"):
+        left = np.where(rate[kept] < 0.0, state[kept] / -rate[kept], np.inf)
+    return name_of(run.system, int(kept[left.argmin()]))
+
+
+def _roundings_of_the_time(run: Run, index: Shape) -> float:
+    """The distance between floats at the time at which a member stopped, if usual steps are no longer than that; else 0."""
+    assert run.paces is not None
+    t, accepted = float(run.paces.t[index]), int(run.paces.accepted[index])
+    spacing, elapsed = float(np.spacing(abs(t))), abs(t - start_of(run, index))
+    few = t != 0.0 if not accepted else spacing > USUAL * elapsed / accepted
+    return spacing if few else 0.0
+
+
+def of_the_start(system: System, batch: Shape, t: Any, state: State, index: Shape) -> str:
+    """Which rate of a member is not finite at the start, as "the rate of y[1] is NaN"; empty if all are finite."""
+    return _not_finite(rates_of(system, batch, t, state), index)
+
+
+def _not_finite(rates: State, index: Shape) -> str:
+    for name, block in zip("vy", rates, strict=True):
+        rate = checks.member(block, index)
+        if not (finite := np.isfinite(rate)).all():
+            place = tuple(np.argwhere(~finite)[0].tolist())
+            return f"the rate of {_component(name, place)} is {'NaN' if np.isnan(rate[place]) else 'infinite'}"
+    return ""
+
+
+def _component(block: str, index: Shape) -> str:
+    return f"{block}[{', '.join(map(str, index))}]" if index else block
+
+
+def rates_of(system: System, batch: Shape, t: Any, state: State) -> State:
+    """v̇ and ẏ of states of all members, each at its own time."""
+    v, y = state
+    with np.errstate(all="ignore"):
+        alone = system.alone(1.0, batch)
+        dv, dy = alone.dv(t, v, y), alone.dy(t, v, y)
+    return np.broadcast_to(dv, v.shape), np.broadcast_to(dy, y.shape)

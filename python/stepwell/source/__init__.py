@@ -1,0 +1,1 @@
+"""A step as text: what it computes, and its export to other languages."""

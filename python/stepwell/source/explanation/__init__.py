@@ -1,0 +1,179 @@
+"""Explains a step: every operation by name, how often it is computed, and the machine code.
+
+``formula`` writes operations as text, ``listing`` makes lines of a tape, ``beside`` of what is made beside the steps,
+``result`` holds and tells what was found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+from ... import _core
+from ...base import checks
+from ...errors import ArgumentError, UnsupportedError
+from ...model.compatibility import fits_together, not_of_a_step
+from ...model.controls import AnyControl, a_control
+from ...model.methods import Method
+from ...model.methods import method as find_method
+from ...model.methods import methods as every_method
+from ...model.systems import System
+from ...model.systems.base import a_system
+from ...runs import engine, float32
+from ...runs.engine.counted import written
+from ...runs.engine.linear import matrix_model
+from .beside import lines_beside
+from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape, matrix_of
+from .result import Explanation, MachineCode, Packing
+
+if TYPE_CHECKING:
+    from ...base.literals import StepForm
+
+__all__ = ["Explanation", "Line", "MachineCode", "Packing", "Section", "explain"]
+
+
+def explain(
+    system: System,
+    method: str | Method,
+    *,
+    members: int | None = None,
+    control: AnyControl | None = None,
+    fused: bool = False,
+    attempt: bool = False,
+    form: StepForm = "direct",
+    start: str | None = None,
+    record: str | Sequence[str] | None = (),
+    dtype: Any = "float64",
+) -> Explanation:
+    """Explain what a step of a system by a method computes, and its machine code on this machine.
+
+    ``print`` the result for a listing: each value with its formula, grouped by how often it is computed; the numbers of
+    operations; the machine code, or why the step is interpreted. In a notebook it is a table. The values of parameters and the
+    length of the step do not matter, only which parameters all members share: those are used once a run instead of once a member.
+
+    Args:
+        system: the system to step. Arguments that are arrays over its batch differ from member to member.
+        method: its name, or what ``stepwell.method`` returns.
+        members: number of trajectories in the batch, a multiple of the system's batch; if None that of the batch, or one. The
+            machine code for many differs from that for one.
+        control: an ``EnergyControl`` or a ``Projection``, as ``integrate`` takes it.
+        fused: with fused multiply-adds, fma(a, b, c) = a·b + c rounded once, as ``integrate`` takes it.
+        attempt: an attempt at an adaptive step, as ``integrate`` makes with ``tolerance=``, with what decides on the next
+            one.
+        form: ``"direct"``, or ``"matrix"`` for a step by the transition matrix of a linear system: P, and Q for the inputs at
+            each node of the method.
+        start: how a method with a choice starts, as ``integrate`` takes it.
+        record: quantities that the core can record, whose computation is listed, too: "energy", and what else the system names
+            in its ``quantities``.
+        dtype: ``"float64"`` or ``"float32"``, as ``integrate`` takes it.
+
+    Returns:
+        An ``Explanation``.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: if the method cannot step the system.
+
+    Example:
+        >>> print(sw.explain(sw.Oscillator(), "false_euler").listing)
+        once a run
+          Φ = h·omega
+        in each step
+          v' = v − Φ·y
+          y' = y + Φ·v'
+    """
+    how, system = find_method(method), a_system(system).sized()
+    fits_together(system, how)
+    fused, attempt = checks.flag("fused", fused), checks.flag("attempt", attempt)
+    single = checks.is_single(dtype)
+    control = a_control(control)
+    if single and attempt:
+        raise UnsupportedError("attempt: float32 goes with fixed steps only; explain the attempt in float64")
+    if attempt and how.error_order is None:
+        able = ", ".join(m.name for m in every_method() if m.error_order is not None)
+        raise UnsupportedError(f"attempt: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
+    if attempt and system.rubbing is not None:
+        raise UnsupportedError(f"attempt: adaptive steps do not go with friction that sticks, which {system!r} has")
+    if attempt:
+        not_of_a_step(system.keeper if control is None else control)
+    own = prod(system.batch)
+    form = checks.known("form", form, ("direct", "matrix"))
+    if form != "direct" and (fused or attempt or control is not None):
+        raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
+    if form != "direct" and not system.linear:
+        raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    if single:
+        float32.step(system, how, form, 1.0)
+        float32.check_inputs(system, 0.0)
+    choice = how.start_choice(start)
+    given = [record] if isinstance(record, str) else [] if record is None else checks.several("record", record, "quantities")
+    if given and not system.quantities:
+        raise UnsupportedError(f"record: the core records nothing of {system!r}; its energy is NumPy's, from the saved states")
+    if given and single:
+        raise UnsupportedError("record: float32 runs compute it of the saved states, in float64; explain it without dtype=")
+    quantities = list(dict.fromkeys(checks.known("record", name, list(system.quantities)) for name in given))
+    count = own if members is None else checks.count("members", members, 1)
+    if count % own:
+        raise ArgumentError(f"members: expected a multiple of the system's batch of {own}, got {count}")
+    batch = system.batch if count == own else (count // own, *system.batch)
+    checks.batch_shape({"system": batch, "control": () if control is None else control.batch})
+    if control is not None:
+        checks.fits("members: the numbers of a control", 8, batch, "explain fewer")
+        system = system.under(control, batch)
+        fits_together(system, how)
+        system = system.stepped_by(how)
+        if single:
+            float32.check_control(system)
+    plan = engine.Plan(system, how, batch, 1.0, fused=fused, form=form, choice=choice, single=single)
+    explained = _explained(plan, attempt)
+    if explained.parts is not None or attempt:
+        return explained
+    return replace(explained, beside=lines_beside(plan, choice, quantities))
+
+
+def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
+    model = matrix_model(plan, **matrix_of(plan)) if plan.form == "matrix" else engine.model(plan)
+    what: dict[str, Any] = {"system": plan.system, "method": plan.method, "members": plan.members}
+    what |= {"fused": plan.fused, "attempt": attempt, "form": plan.form, "dtype": "float32" if plan.single else "float64"}
+    parts = _core.in_parts(model, plan.members, attempts=attempt)
+    told = None if parts else _core.compiled(model, plan.members, attempts=attempt)
+    if told is None:
+        kind, about, lanes = parts or ("rates", 0, 1)
+        sections = line_of_matrices(plan) if plan.form == "matrix" else lines_of_program(plan, attempt)
+        return Explanation(**what, sections=sections, level=_core.isa(), lanes=lanes, parts=kind, about=about)
+    sections = lines_of_tape(plan, told["split"], attempt)
+    code = why = None
+    if told["interpreted"] is None:
+        names = {"vectors": "block_vectors", "turns": "blocks"} | {each: each for each in ("width", "resident", "registers")}
+        packing = None if told["packing"] is None else Packing(**told["packing"])
+        code = MachineCode(
+            size=told["bytes"], spills=told["spills"], packing=packing, **{name: told[key] for name, key in names.items()}
+        )
+    else:
+        why = _why(told["interpreted"])
+    return Explanation(
+        **what,
+        sections=sections,
+        level=told["level"],
+        lanes=told["lanes"],
+        written=written(plan, attempt),
+        computed=told["computed"],
+        hoisted={section.when: sum(sum(line.operations.values()) for line in section.lines) for section in sections[:-1]},
+        code=code,
+        interpreted_because=why,
+    )
+
+
+def _why(word: str) -> str:
+    """Why a step is interpreted, in words."""
+    if word == "level":
+        better = _core.isa_levels()[1:]
+        asked = "STEPWELL_KERNELS or STEPWELL_ISA asks for it"
+        return (
+            asked if better else "there is no machine code for this CPU, which has neither AVX2 nor AVX-512, nor NEON under Linux"
+        )
+    if word == "pages":
+        return "this system does not let a program execute code that it has written"
+    return "there is no machine code for this step"

@@ -1,0 +1,61 @@
+"""What is made beside the steps of a run, as lines: both ends of what a method carries, and what is recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...reference.traced import Tracer
+from ...runs.engine import Plan
+from .formula import Formula, Notation
+from .listing import Leaf, Section, Writer, indexed, parameters
+
+
+def lines_beside(plan: Plan, choice: int, record: Sequence[str]) -> tuple[Section, ...]:
+    """What is made at both ends of the steps of a method that carries something, and what is recorded of a state."""
+    sections = []
+    if plan.method.carry is not None:
+        for which in ("start", "finish"):
+            sections.append(_lines(plan, which, partial(Tracer.slot, method=plan.method, which=which, choice=choice)))
+    for name in record:
+        sections.append(_lines(plan, f"record {name}", partial(Tracer.record, names=[name])))
+    return tuple(sections)
+
+
+def _lines(plan: Plan, when: str, traced: Callable[[Tracer], list[Any]]) -> Section:
+    """A part that is made now and then, as a section that is not cut."""
+    tape = _core.Tape(single=plan.single)
+    tracer = Tracer(plan.system, tape)
+    symbols = traced(tracer)
+    numbers, tables = parameters(plan._replace(form="direct"))
+    system, carry = plan.system, plan.method.carry or "v"
+    is_end = when in ("start", "finish")
+    reads = carry if when == "finish" else "v"
+    makes = {"start": carry, "finish": "v"}.get(when, when.removeprefix("record "))
+    blocks = [(reads, system.v_shape), ("y", system.y_shape)]
+    of_state = [indexed(name, index) for name, shape in blocks for index in np.ndindex(shape)]
+    results = [indexed(makes, index) for index in np.ndindex(system.v_shape if is_end else system.quantities[makes])]
+    wanted = symbols[: len(results)]
+    # What is recorded is computed without fused multiply-adds.
+    on, wanted = tape.fused(wanted) if plan.fused and is_end else (tape, wanted)
+    params = [tape.param(i) for i in range(len(numbers))]
+
+    def leaf(name: str, i: int) -> Leaf:
+        match name:
+            case "state":
+                return Leaf(Formula(of_state[i]), tape.state(i), 4)
+            case "parameter":
+                return Leaf(Formula(numbers[i]), params[i], 1)
+            case "step":
+                return Leaf(Formula("h"), tape.step(), 1)
+            case _:
+                return Leaf(Formula("t"), tape.time(), 3)
+
+    omegas = {(tape.step() * symbol).id: "Φ" for each, symbol in zip(numbers, params, strict=True) if each == "omega"}
+    return Writer(tape, omegas, Notation(plan.single), tables=tables).section(when, on.operations(wanted), leaf, 4, "a", results)[
+        0
+    ]

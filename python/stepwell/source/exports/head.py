@@ -1,0 +1,70 @@
+"""The comment at the head of a file: what it is, how to call it, an example."""
+
+from __future__ import annotations
+
+from ... import _core
+from ...base.arrays import Shape
+from ...base.checks import short
+from ...runs import engine
+from .language import indented
+from .written import Written
+
+#: Steps of the example.
+STEPS = 1000
+
+#: Characters of the system's repr.
+MAX_SYSTEM = 400
+
+#: The first line of the example, by which it is found in the comment.
+EXAMPLE = "Example:"
+
+
+def head(w: Written, v: list[float], y: list[float]) -> list[str]:
+    """The lines of the comment, without its marks."""
+    plan, language = w.traced.plan, w.language
+    method, system = plan.method, plan.system
+    limit = f"undamped oscillators for omega*dt < {method.limit:.10g}" if method.limit else "no undamped oscillator, whatever dt"
+    count = engine.evaluations(method, system)
+    evaluations = f"{count} rate evaluation{'s' * (count > 1)} per step"
+    blocks = [("v", system.v_shape), ("y", system.y_shape)]
+    layout = "; ".join(_layout(name if name == "y" else w.slot, shape) for name, shape in blocks)
+    return [
+        f"{w.language.prefix}: one step by {method.title}.",
+        "",
+        f"System:  {short(system, MAX_SYSTEM)}",
+        f"Method:  {method.title} ({method.name}), order {method.order}, {evaluations}",
+        f"Stable:  {limit}",
+        f"Source:  {method.reference}",
+        f"State:   {layout}",
+        "Time:    t0 + k*dt at step k, which the state counts",
+        f"Written by stepwell {_core.__version__}. The numbers are those of stepwell.integrate"
+        f"{_options(plan.fused, plan.single)}, to the last bit.",
+        "",
+        *language.how(w),
+        "",
+        EXAMPLE,
+        "",
+        *indented(language.example(w, v, y, STEPS)),
+    ]
+
+
+def _options(fused: bool, single: bool) -> str:
+    """The arguments of integrate that decide on the bits."""
+    options = [text for text, given in (("fused=True", fused), ('dtype="float32"', single)) if given]
+    return f"(..., {', '.join(options)})" if options else ""
+
+
+def _layout(name: str, shape: Shape) -> str:
+    """The order of the numbers of a block."""
+    if not shape:
+        return f"{name}[1]"
+    size = 1
+    for n in shape:
+        size *= n
+    if len(shape) == 1:
+        return f"{name}[{size}]" if size else f"no {name}"
+    letters = "ijkl"[: len(shape)]
+    place = letters[0]
+    for letter, n in zip(letters[1:], shape[1:], strict=True):
+        place = f"{n}*{place if place.isalpha() else f'({place})'} + {letter}"
+    return f"{name}[{size}], number {', '.join(letters)} of the block of shape {shape} at {name}[{place}]"

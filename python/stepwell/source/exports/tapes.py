@@ -1,0 +1,230 @@
+"""The operations of a step, and of a method's start and finish, split by how often their values change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ...base import checks
+from ...base.arrays import Shape
+from ...errors import UnsupportedError
+from ...model.systems.base import aligned
+from ...reference.signal import Held
+from ...runs import engine
+from ..explanation.listing import Body, Named, increments_last, indexed, parameters
+from .functions import named
+
+#: The most operations that are written out one by one; a longer text is too long for compilers and for people.
+MAX_OPERATIONS = 20_000
+
+#: The most that are written as loops: a few arrays of some megabytes.
+MAX_IN_LOOPS = 400_000
+
+#: How often a value changes: never, once a run, once a step by the time alone, with the state.
+NEVER, RUN, STEP, STATE = range(4)
+
+#: Operations whose value is bits or a truth and not a number, so that it cannot be part of a state or a field.
+NO_NUMBER = ("less", "at most", "equal", "and", "or", "exclusive or", "add bits", "shift up", "shift down")
+
+
+class Part(NamedTuple):
+    """A function of the state: the step, or a method's start or finish.
+
+    Attributes:
+        tape: the tape on which it was traced.
+        names: names of values on that tape, by their numbers there.
+        roots: the values that it computes, by their numbers among all operations.
+        inputs: names of the numbers of the state before.
+        results: names of the values that it computes.
+    """
+
+    tape: Any
+    names: dict[int, str]
+    roots: list[int]
+    inputs: list[str]
+    results: list[str]
+
+
+class Table(NamedTuple):
+    """A sampled input of one member."""
+
+    name: str
+    values: list[float]
+    interval: float
+    start: float
+
+
+class Operations:
+    """Operations of several functions in one list, each once.
+
+    From some parameter on they are the force, which may change with every step.
+
+    Attributes:
+        all: name, operands and other arguments of each; operands come before the operations that use them.
+        rank: how often the value of each changes.
+    """
+
+    def __init__(self) -> None:
+        self.first_of_force: int | None = None
+        self.all: list[tuple[str, tuple[int, ...], int]] = []
+        self.rank: list[int] = []
+        self._places: dict[tuple[str, tuple[int, ...], int], int] = {}
+
+    def add(self, operations: Sequence[tuple[str, Sequence[int], int]], roots: Sequence[int]) -> list[int]:
+        """Add operations; returns the numbers of the roots here."""
+        place: list[int] = []
+        for name, of, given in operations:
+            if name == "parameter" and self.first_of_force is not None and given >= self.first_of_force:
+                name = "force"
+            key = name, tuple(place[each] for each in of), given
+            if key not in self._places:
+                self._places[key] = len(self.all)
+                self.all.append(key)
+                own = {
+                    "constant": NEVER,
+                    "step": RUN,
+                    "parameter": RUN,
+                    "sample": STEP,
+                    "time": STEP,
+                    "state": STATE,
+                    "force": STATE,
+                }
+                self.rank.append(max([own.get(name, NEVER), *(self.rank[each] for each in key[1])]))
+            place.append(self._places[key])
+        return [place[each] for each in roots]
+
+    def needed(self, roots: Sequence[int], stop: Callable[[int], bool]) -> list[int]:
+        """The operations of which these values are computed, in order, back to and including those at which to stop."""
+        found: set[int] = set()
+        waiting = list(roots)
+        while waiting:
+            line = waiting.pop()
+            if line not in found:
+                found.add(line)
+                if not stop(line):
+                    waiting += self.all[line][1]
+        return sorted(found)
+
+    def kept(self, parts: Sequence[Part]) -> list[int]:
+        """Values that are computed before the steps and read in them."""
+        roots = [each for part in parts for each in part.roots]
+        above = [each for each in self.needed(roots, lambda line: self.rank[line] <= RUN) if self.rank[each] > RUN]
+        read = {each for line in above for each in self.all[line][1]} | set(roots)
+        return sorted(each for each in read if self.rank[each] == RUN and self.all[each][1])
+
+    def body(self, roots: Sequence[int], leaves: dict[int, tuple[str, int]], *, separate: bool) -> Body:
+        """The body that computes these values from given leaves, by line.
+
+        If ``separate``, each value has a place of its own, which holds a number.
+        """
+        needed = self.needed(roots, leaves.__contains__)
+        place = {line: i for i, line in enumerate(needed)}
+        made: list[tuple[str, list[int], int]] = []
+        for line in needed:
+            name, of, given = self.all[line]
+            leaf = leaves.get(line)
+            made.append((leaf[0], [], leaf[1]) if leaf else (name, [place[each] for each in of], given))
+        places: list[int] = []
+        for root in roots:
+            at = place[root]
+            if separate and (at in places or not made[at][1] or made[at][0] in NO_NUMBER):
+                made.append(("copy", [at], 0))
+                at = len(made) - 1
+            places.append(at)
+        return made, places
+
+
+class Traced:
+    """A step by a method, for one member of a batch.
+
+    Attributes:
+        operations: those of all its functions.
+        parts: its functions, by name: "step", and "start" and "finish" for a method that carries something other than v.
+        numbers: name and value of each parameter, in the tape's order.
+        tables: the sampled inputs.
+        force: the numbers of a force from outside; none without one.
+        count: the number of arithmetic operations of a step, including those before the steps.
+    """
+
+    def __init__(self, plan: engine.Plan, member: Shape) -> None:
+        self.plan = plan
+        model = engine.model(plan)
+        _core.check(model)
+        parts = _core.in_parts(engine.model(plan._replace(fused=False)), 1)
+        if parts is not None and parts[1] > 4 * MAX_IN_LOOPS:  # an estimate, too high for short methods
+            raise too_long(plan, f"about {parts[1]}")
+        names, tables = parameters(plan)
+        self.operations = Operations()
+        self.operations.first_of_force = None if plan.force is None else len(names)
+        self.parts: dict[str, Part] = {}
+        for which in ("step", "start", "finish") if plan.method.carry else ("step",):
+            self.parts[which], tracer = self._part(which)
+            if which == "step":
+                of_step = tracer
+        self.count = sum(bool(of) for _, of, _ in self.operations.all)
+        if self.count > MAX_IN_LOOPS:
+            raise too_long(plan, str(self.count))
+        if not plan.fused:  # else their products would be fused with the sums around them
+            named(self.operations.all, plan.single)
+
+        def own(values: Any, before: int = 0) -> Any:
+            values = np.asarray(values)
+            wide = aligned(values, before, plan.batch)
+            return np.broadcast_to(wide, (*values.shape[:before], *plan.batch))[(slice(None),) * before + member]
+
+        kind = np.float32 if plan.single else np.float64
+        numbers = [float(kind(own(value))) for value in of_step.numbers]
+        self.numbers = list(zip(names, numbers, strict=False))
+        self.force = numbers[len(names) :]
+        held: list[Held] = of_step.tables
+        self.tables = [
+            Table(name, [float(each) for each in own(table.values, 1)], float(table.interval), float(table.start))
+            for name, table in zip(tables, held, strict=True)
+        ]
+
+    def _part(self, which: str) -> tuple[Part, Named]:
+        plan, tape = self.plan, _core.Tape(single=self.plan.single)
+        tracer = Named(plan.system, tape, plan.force)
+        method, v_shape = plan.method, plan.system.v_shape
+        symbols = (
+            tracer.step(method, plan.choice) if which == "step" else tracer.slot(method, which, plan.choice)[: prod(v_shape)]
+        )
+        told, roots = _fused(tape, symbols) if plan.fused else tape.operations(symbols)
+        names = tracer.names
+        if plan.fused:
+            tape, names, _ = increments_last(tracer, symbols, plan.single)
+        slot = method.carry or "v"
+        before, after = {"step": (slot, slot), "start": ("v", slot), "finish": (slot, "v")}[which]
+        inputs = elements(before, v_shape) + elements("y", plan.system.y_shape)
+        results = elements(f"{after}'", v_shape)
+        if which == "step":
+            results += elements("y'", plan.system.y_shape)
+            if plan.system.control is not None:
+                inputs, results = [*inputs, TALLY], [*results, f"{TALLY}'"]
+        return Part(tape, names, self.operations.add(told, roots), inputs, results), tracer
+
+
+#: The sum that a control or a projection accumulates.
+TALLY = "tally"
+
+
+def elements(name: str, shape: Shape) -> list[str]:
+    """The names of a block's numbers, in the order of C."""
+    return [indexed(name, index) for index in np.ndindex(shape)]
+
+
+def _fused(tape: Any, symbols: list[Any]) -> Any:
+    fused, roots = tape.fused(symbols)
+    return fused.operations(roots)
+
+
+def too_long(plan: engine.Plan, count: str, most: int = MAX_IN_LOOPS) -> UnsupportedError:
+    """The error for a step that is not written out."""
+    return UnsupportedError(
+        f"system: a step of {checks.short(plan.system)} by {plan.method.name} has {count} operations, and at most "
+        f"{most} are written{' out one by one' * (most < MAX_IN_LOOPS)}; export a smaller system"
+    )

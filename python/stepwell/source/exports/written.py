@@ -1,0 +1,316 @@
+"""The contents of a file in its language, not yet in its order: fields, values computed before the steps, functions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import partial
+from math import prod
+from typing import NamedTuple
+
+import numpy as np
+
+from ...runs.engine import pushes
+from ..explanation.formula import Formula
+from ..explanation.listing import Leaf, Line, Writer
+from .branches import Branched
+from .language import FORCE, Assignment, Function, Language, Loop, Place, Statement, texts
+from .loops import MADE, WORK, NoLoopError
+from .loops import Place as LoopPlace
+from .loops import Writer as LoopWriter
+from .names import Field, Names, fields
+from .statements import Statements
+from .tapes import MAX_OPERATIONS, STATE, STEP, TALLY, Operations, Part, Traced, elements, too_long
+
+#: Names in use in a function: its arguments and the time.
+LOCALS = ("m", "s", "t", "self", "coordinates", "velocities", FORCE)
+
+#: Names that fields may not have, because something else of the object has them.
+MEMBERS = ("defaults", "finish", "new", "prepare", "start", "step", "work", "constructor", "prototype")
+
+
+class Table(NamedTuple):
+    """A table of a sampled input: the name of its samples, the time of the first, and the interval to the next.
+
+    If it is one of ``times``, it has the numbers of the samples, from which their times follow.
+    """
+
+    name: str
+    about: str
+    values: list[float]
+    start: str
+    interval: str
+    times: bool = False
+
+    def time(self, me: str, number: str) -> str:
+        """When the sample of a number is."""
+        return f"{me}{self.start} + {me}{self.interval} * {number}" if self.times else number
+
+
+class Written:
+    """The contents of a file.
+
+    Attributes:
+        parameters: the fields that users may change, dt and t0 first.
+        made: values computed from them before the steps.
+        functions: "step", and "start" and "finish" for a method that carries something other than v.
+        tables: the sampled inputs.
+        slot: the name of the first block of a state.
+        n_v: the number of numbers in it.
+        n_y: the number of numbers in the second.
+        evaluations: how many times a step adds to the sum of a control; 0 without one.
+    """
+
+    def __init__(self, traced: Traced, language: Language) -> None:
+        plan, self.traced, self.language = traced.plan, traced, language
+        self.slot = plan.method.carry or "v"
+        self.n_v, self.n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
+        control = plan.system.control
+        self.evaluations = 0 if control is None else pushes(control, plan.method.evaluations)
+        names = language.fields
+        operations = traced.operations
+        used = {given for name, _, given in operations.all if name == "parameter"}
+        self.parameters = [
+            Field(names("dt"), "the step", [plan.dt]),
+            Field(names("t0"), "the time of step 0", [plan.t0], wide=True),
+        ]
+        own, self._where = fields(traced.numbers, used, names)
+        self.parameters += own
+        self._shapes = {each.name: each.shape for each in self.parameters}
+        self.tables: list[Table] = []
+        tables = Names()
+        of_time: dict[str, list[Field]] = {}
+        for table in traced.tables:
+            called, _, part = table.name.rpartition(".")
+            is_part = part == "times" or part.isdigit()
+            called = called if is_part else table.name
+            if called not in of_time:
+                first = "one interval before the first sample" if is_part else "the time of the first sample"
+                of_time[called] = [
+                    Field(names(f"{called}.start"), f"{called}: {first}", [table.start]),
+                    Field(names(f"{called}.interval"), f"{called}: the time to the next sample", [table.interval]),
+                ]
+                self.parameters += of_time[called]
+            values = list(map(float, range(len(table.values)))) if part == "times" else table.values
+            start, interval = (each.name for each in of_time[called])
+            self.tables.append(Table(tables(table.name), table.name, values, start, interval, part == "times"))
+        language.tables = self.tables
+        kept = operations.kept(list(traced.parts.values()))
+        #: Values computed before the steps by loops, the array that holds them, its length, and tables of places.
+        self.loops: list[Loop] = []
+        self.array, self.made_size = language.fields(MADE, "made by loops"), 0
+        self.places: dict[str, tuple[int, ...]] = {}
+        if traced.count > MAX_OPERATIONS:
+            self.parameters = [each._replace(shape=each.shape and (prod(each.shape),)) for each in self.parameters]
+            self.made: list[Assignment] = []
+            self.functions = self._looped(operations, kept)
+            return
+        made, known = self._prepared(operations, kept)
+        self.made = made
+        self.functions = {name: self._function(part, operations, kept, known) for name, part in traced.parts.items()}
+
+    @property
+    def carries(self) -> bool:
+        """Whether the method carries something other than v."""
+        return self.slot != "v"
+
+    @property
+    def blocks(self) -> list[tuple[str, str, int]]:
+        """For each block that is not empty: its name, the name of its velocities or coordinates, its length."""
+        both = [(self.slot, "velocities", self.n_v), ("y", "coordinates", self.n_y)]
+        return [each for each in both if each[2]]
+
+    def forced(self, function: str) -> bool:
+        """Whether a function has a force from outside for an argument: a step has if there is one, others if they read it."""
+        if function not in self.functions:
+            return False
+        of = self.functions[function]
+        reads = any(each.block == FORCE for each in of.reads) or any(f"@{FORCE}" in text for text in texts(of.lines))
+        return reads or (function == "step" and bool(self.traced.force))
+
+    @property
+    def given(self) -> list[tuple[str, int]]:
+        """What the state at the start is made of: the arguments and their lengths."""
+        return [(of, n) for _, of, n in self.blocks] + [(FORCE, self.n_v)] * self.forced("start")
+
+    @property
+    def shown(self) -> str:
+        """The block of which an example prints the first number."""
+        return "y" if self.n_y else self.slot
+
+    # ---- leaves
+
+    def _parameter(self, tape: object, i: int) -> Leaf:
+        name, place = self._where[i]
+        text = f"{self.language.me}{name}{''.join(f'[{each}]' for each in place)}"
+        return Leaf(Formula(text), tape.param(i), 1)  # type: ignore[attr-defined]
+
+    def _length(self, tape: object) -> Leaf:
+        return Leaf(Formula(f"{self.language.me}{self.language.fields('dt')}"), tape.step(), 1)  # type: ignore[attr-defined]
+
+    # ---- parts
+
+    def _prepared(self, operations: Operations, kept: list[int]) -> tuple[list[Assignment], list[Leaf]]:
+        """The values computed before the steps, and how each is read in them."""
+        tape, names = next((part.tape, dict(part.names)) for part in self.traced.parts.values())
+        numbers = [name for name, _ in self.traced.numbers]
+        for i, name in enumerate(numbers):
+            if name == "omega":
+                names[(tape.step() * tape.param(i)).id] = "Φ"
+        self.language.before = True
+        writer = Writer(tape, names, self.language)
+
+        def leaf(name: str, given: int) -> Leaf:
+            return self._length(tape) if name == "step" else self._parameter(tape, given)
+
+        section, known = writer.section("run", operations.body(kept, {}, separate=False), leaf, 1, "c")
+        made = [self._assignment(line) for line in section.lines]
+        self.language.before = False
+        return made, known
+
+    def _looped(self, operations: Operations, kept: list[int]) -> dict[str, Function]:
+        """The functions as loops."""
+        language = self.language
+        shapes = {each.name: each.shape for each in self.parameters}
+        loops = LoopWriter(operations, language)
+        made: dict[int, LoopPlace] = {}
+
+        def before(line: int) -> LoopPlace:
+            name, _, given = operations.all[line]
+            if name == "step":
+                return f"{language.me}{language.fields('dt')}", -1
+            field, place = self._where[given]
+            at = int(np.ravel_multi_index(place, self._shapes[field])) if shapes[field] else -1
+            return f"{language.me}{field}", at
+
+        def source(part: Part, line: int) -> LoopPlace:
+            name, _, given = operations.all[line]
+            if line in made:
+                return made[line]
+            if name == "constant":
+                return language.text(language.number(given).text), -1
+            if name == "time":
+                return "t", -1
+            if name == "force":
+                return f"@{FORCE}", given - len(self.traced.numbers)
+            if name != "state":
+                return before(line)
+            block = part.inputs[given].partition("[")[0]
+            return f"@{block}", -1 if block == TALLY else given if given < self.n_v else given - self.n_v
+
+        inner = [line for line in operations.needed(kept, lambda line: False) if operations.all[line][1]]
+        try:
+            first = loops.looped(inner, kept, before, keep=True)
+            made |= dict(zip(kept, [(f"{language.me}{self.array}", at) for _, at in first.places], strict=True))
+            self.loops = [
+                each._replace(
+                    target=language.me + each.target.replace(MADE, self.array, 1),
+                    text=re.sub(rf"\b{MADE}\[", f"{language.me}{self.array}[", each.text),
+                )
+                for each in first.loops
+            ]
+            self.made_size = first.size
+            functions = {
+                name: self._loops(part, operations, loops, made, partial(source, part))
+                for name, part in self.traced.parts.items()
+            }
+        except NoLoopError:
+            raise too_long(self.traced.plan, str(self.traced.count), MAX_OPERATIONS) from None
+        self.places = {name: places for places, name in loops.tables.items()}
+        return functions
+
+    def _loops(
+        self,
+        part: Part,
+        operations: Operations,
+        loops: LoopWriter,
+        made: dict[int, LoopPlace],
+        source: Callable[[int], LoopPlace],
+    ) -> Function:
+        needed = [
+            line for line in operations.needed(part.roots, made.__contains__) if operations.all[line][1] and line not in made
+        ]
+        found = loops.looped(needed, part.roots, source, keep=False)
+        # What stays as it was is read before anything is written.
+        own = [i for i, (array, _) in enumerate(found.places) if array != WORK]
+        aside = [(WORK, found.size + k) for k in range(len(own))]
+        values = list(found.places)
+        for i, place in zip(own, aside, strict=True):
+            values[i] = place
+        to: list[LoopPlace] = []
+        for i, name in enumerate(part.results):
+            block = name.partition("'")[0]
+            to.append((f"#{block}", -1 if block == TALLY else i if i < self.n_v else i - self.n_v))
+        lines = [*found.loops, *loops.moved([found.places[i] for i in own], aside), *loops.moved(values, to)]
+        needs_time = any(re.search(r"\bt\b", text) for text in texts(lines))
+        return Function([], needs_time, True, [], list(lines), [], found.size + len(own))
+
+    def _function(self, part: Part, operations: Operations, kept: list[int], known: list[Leaf]) -> Function:
+        language, tape = self.language, part.tape
+        language.names = Names(LOCALS)
+        reads: dict[int, Place] = {}
+        asked: set[str] = set()
+
+        def place(names: list[str], i: int) -> Place:
+            """The place of a number of the state; the sum of a control comes last."""
+            block = names[i].partition("[")[0].rstrip("'")
+            at = -1 if block == TALLY else i if i < self.n_v else i - self.n_v
+            return Place(block, at, language.names(names[i]))
+
+        def state(i: int) -> Leaf:
+            reads[i] = place(part.inputs, i)
+            return Leaf(Formula(reads[i].name), tape.state(i), 4)
+
+        entries: list[Leaf] = []
+
+        def leaf(name: str, given: int) -> Leaf:
+            asked.add(name)
+            match name:
+                case "made":  # names are by numbers on a tape, here that of the step
+                    return known[given] if tape is self.traced.parts["step"].tape else known[given]._replace(symbol=None)
+                case "entry":
+                    return entries[given]
+                case "step":
+                    return self._length(tape)
+                case "parameter":
+                    return self._parameter(tape, given)
+                case "time":
+                    return Leaf(Formula("t"), tape.time(), 3)
+                case "force":
+                    at = given - len(self.traced.numbers)
+                    called = elements(FORCE, self.traced.plan.system.v_shape)[at]
+                    reads[len(part.inputs) + at] = Place(FORCE, at, language.names(called, f"given {called}"))
+                    return Leaf(Formula(reads[len(part.inputs) + at].name), tape.param(given), 4)
+                case _:
+                    return state(given)
+
+        made = {line: ("made", i) for i, line in enumerate(kept)}
+        rank = operations.rank
+        needed = operations.needed(part.roots, lambda line: rank[line] <= STEP)
+        read = {each for line in needed if rank[line] == STATE for each in operations.all[line][1]} | set(part.roots)
+        of_time = sorted(each for each in read if rank[each] == STEP and operations.all[each][1])
+        writer = Writer(tape, part.names, language)
+        before, entries = writer.section("step", operations.body(of_time, made, separate=False), leaf, 3, "s")
+        of_time_lines = [self._assignment(line) for line in before.lines]
+        leaves = made | {line: ("entry", i) for i, line in enumerate(of_time)}
+        branched = Branched(operations.all, part.roots, leaves, language.all_bits)
+        lines: list[Statement]
+        if branched.is_straight:
+            body = operations.body(part.roots, leaves, separate=True)
+            after, _ = writer.section("member step", body, leaf, 4, "a", part.results)
+            lines = [self._assignment(line) for line in after.lines]
+        else:
+            lines = Statements(branched, writer, leaf, leaves, part.roots, part.results).lines
+        writes = [place(part.results, i) for i in range(len(part.results))]
+        text = " ".join(texts([*of_time_lines, *lines]))
+        return Function(
+            [reads[i] for i in sorted(reads)],
+            "time" in asked,
+            "time" in asked or language.me in text,
+            of_time_lines,
+            lines,
+            writes,
+        )
+
+    def _assignment(self, line: Line) -> Assignment:
+        return self.language.assignment(line)

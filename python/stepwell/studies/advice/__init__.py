@@ -1,0 +1,421 @@
+"""Advice: the cheapest method and step that are accurate enough for a scene, and how far they are from instability.
+
+``motion`` holds the reference solution, ``trials`` and ``adaptive`` run the scene with fixed and with adaptive steps,
+``candidates`` gives both the same interface for ``search``, which finds the fewest steps that are accurate enough; ``predict``
+uses eigenvalues, ``result`` presents what was found.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, TypeVar
+
+from ...base import checks
+from ...errors import ArgumentError, TooLargeError, UnsupportedError
+from ...model.methods import Method, choice
+from ...runs import float32
+from ...runs.integration import integrate
+from ...scenes import Scene
+from ...scenes import scene as find_scene
+from ..measuring.measure import TIMED_STEP
+from . import predict
+from .adaptive import AdaptiveTrials
+from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed, Single
+from .motion import SINGLE_STEP_ROUNDING, Grid, Motion, motion_of
+from .result import Advice, Rejected, Row, Shortfall
+from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
+from .trials import ASYMPTOTIC_ERROR, Times, Trial, Trials, step_times, tried_times
+
+if TYPE_CHECKING:
+    from ...base.literals import Cost, Dtypes
+
+Kind = TypeVar("Kind")
+
+__all__ = ["Advice", "Rejected", "Row", "Shortfall", "advise"]
+
+COSTS: tuple[Cost, ...] = ("time", "evaluations")
+DTYPES: tuple[Dtypes, ...] = ("float64", "float32", "both")
+
+#: A larger budget in seconds is refused: the age of the universe is half of it.
+MOST_SECONDS = 1e18
+
+#: A step in float32 takes about this share of the time of one in float64, so its runs count so much in the work of a search.
+SINGLE_WORK = 0.5
+
+#: The longest frame, in horizons: a run must reach its end.
+LONGEST_FRAME = 100.0
+
+#: The most frames in a horizon: the state is known at the end of each, and each takes a step or more.
+MAX_FRAMES = 1_000_000
+
+#: The most numbers of a state: with more, no useful run would be short enough to be tried.
+MAX_NUMBERS = 100_000
+
+#: Errors for which advice would name what is good enough by luck: this, a tenth of it and so on.
+LARGEST_HINTED = 0.1
+
+#: A scene by its name, made once: some take long to compute their true motion.
+_named = cache(find_scene)
+
+
+def advise(
+    scene: Scene | str,
+    frame: float | None = 1 / 60,
+    tolerance: float = 1e-2,
+    budget: float | None = None,
+    methods: Iterable[Method | str] | None = None,
+    *,
+    cost: Cost = "time",
+    fixed: bool = False,
+    dtype: Dtypes = "float64",
+) -> Advice:
+    """Find the cheapest method and step that are accurate enough for a scene.
+
+    For each method the search finds the fewest steps with which the state error stays below the tolerance over the scene's
+    horizon, from coarse to fine. For each method that estimates its error, it also finds the largest tolerance for adaptive
+    steps. Every advised step was run, and its error is that of the run. A scene without an exact solution is judged as long
+    as a reference solution can be trusted.
+
+    Args:
+        scene: a ``Scene``, or the name of one.
+        frame: the frame, in the scene's units of time, into which a whole number of steps must fit; None if the step is free.
+        tolerance: the largest allowed ``Scene.state_error``, above zero; at 1 the error is as large as the solution.
+        budget: computing time in seconds that a frame may use; if None, the frame itself, with the second as the unit of time.
+            Without a frame, seconds per unit of time, or no bound. If the cost of frames differs, the most expensive must fit.
+        methods: names, or what ``stepwell.method`` returns; all if None.
+        cost: ``"time"`` ranks by measured time, ``"evaluations"`` by function (rate) evaluations, which are repeatable. If the
+            cost of frames differs, their mean counts. Of methods whose costs differ by less than the noise of the measurement the
+            one with the smallest error comes first.
+        fixed: leave out adaptive steps, which a ``World`` cannot take.
+        dtype: ``"float64"``, ``"float32"``, or ``"both"``, which also tries each method with fixed steps in float32. There a
+            step takes about half the time, and rounding bounds what is accurate enough. Of equal costs, as evaluations are,
+            float64 comes first. With ``"float32"`` there are no adaptive steps, which it does not go with.
+
+    Returns:
+        An ``Advice``; print it.
+
+    Raises:
+        ArgumentError: what was given and what was expected, or that the true motion of the scene is not known for any time.
+
+    Example:
+        >>> advice = sw.advise("figure_eight", methods=["leapfrog", "rk4"], cost="evaluations")
+        >>> advice
+        <advice for figure_eight: leapfrog, dt = 0.00833333, error 0.0039>
+    """
+    scene, chosen = _named(scene) if isinstance(scene, str) else find_scene(scene), choice(methods)
+    tolerance = checks.number("tolerance", tolerance, positive=True)
+    cost = checks.known("cost", cost, COSTS)
+    fixed = checks.flag("fixed", fixed)
+    dtype = checks.known("dtype", dtype, DTYPES)
+    frame = None if frame is None else checks.number("frame", frame, positive=True, unit="units of time")
+    budget = frame if budget is None else checks.number("budget", budget, positive=True, unit="seconds")
+    if budget is not None and budget > MOST_SECONDS:
+        raise ArgumentError(f"budget: expected at most {MOST_SECONDS:g} seconds, got {budget:g}")
+    if scene.system.batch:
+        raise ArgumentError(f"scene: expected a system of one member, got parameters of shape {scene.system.batch}")
+    if (numbers := scene.v.size + scene.y.size) > MAX_NUMBERS:
+        raise TooLargeError(f"scene: expected a state of at most {MAX_NUMBERS} numbers, got one of {numbers}")
+
+    if frame is not None and frame > LONGEST_FRAME * scene.horizon:
+        raise ArgumentError(
+            f"frame: expected at most {LONGEST_FRAME:g} times the horizon of {scene.horizon:g} units of time, got {frame:g}"
+        )
+
+    most = MAX_EVALUATIONS / max(1.0, (scene.v.size + scene.y.size) / 8) ** SIZE_EXPONENT
+    if frame is not None and scene.horizon / frame > (frames := min(MAX_FRAMES, int(most))):
+        raise TooLargeError(
+            f"frame: expected at most {frames} frames in the horizon, each of which takes a step or more in every run; got "
+            f"{scene.horizon / frame:.3g} of {frame:g} in {scene.horizon:g} units of time; give a longer frame, or a scene "
+            f"with a shorter horizon"
+        )
+
+    known = motion_of(scene, frame, tolerance, single=dtype != "float64")
+    trials = Trials(known, tolerance, LONG_RUN_SHARE * most)
+    narrow = Trials(known, tolerance, LONG_RUN_SHARE * most, "float32")
+    adaptive = AdaptiveTrials(known, ERROR_SHARE * tolerance, most)
+    candidates: list[Candidate] = []
+    rejected = []
+    for method in chosen:
+        ways: list[Candidate] = []
+        if dtype != "float32":
+            ways += [Fixed(method, trials, known.grid, known.share)]
+            ways += [Adaptive(method, adaptive)] if method.error_order is not None and not (fixed or method.has_series) else []
+        if dtype != "float64":
+            ways += [Single(method, narrow, known.grid, known.share, trials, known.share * tolerance)]
+        for candidate in ways:
+            why = _refusal(scene, candidate, known.grid)
+            if why is None:
+                candidates.append(candidate)
+            else:
+                rejected.append(Rejected(method.name, "refused", why, candidate.by, candidate.dtype))
+
+    times, noise = _times(scene, candidates)
+    noise = noise if cost == "time" else 0.0
+    prices = times if cost == "time" else {each.name: float(each.evaluations) for each in candidates}
+    hints = _hints(known, trials, [each for each in candidates if each.dtype == "float64"], prices, tolerance, most)
+    search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + SINGLE_WORK * narrow.work + adaptive.work)
+    found, missed = search.run(candidates, hints=hints)
+
+    spent = _Spending(known.grid, adaptive, times)
+    broken = [each for each in candidates if each.name in found and not spent.fits(each, found[each.name].k, budget)]
+    if budget is not None and any(each.by == "tolerance" for each in broken):
+        # What is cheap on average but not in its worst frame must not exclude what costs more on average, and the same in all.
+        rest = [each for each in candidates if each not in broken]
+        useful = max(2.0 * budget, min(spent.longest(each, found[each.name].k) for each in broken))
+        again, _ = search.run(rest, {each.name: spent.steps(each, useful) for each in rest})
+        found |= again
+        missed = {name: why for name, why in missed.items() if name not in again}
+    enough = [each for each in candidates if each.name in found]
+    fits = [each for each in enough if spent.fits(each, found[each.name].k, budget)]
+    costs = [search.cost(each, found[each.name].k) for each in fits]
+    fits = by_cost_and_error(fits, costs, [_judged(each, found[each.name].trial) for each in fits], noise)
+    for each in candidates:
+        if each.name in missed:
+            rejected.append(_missed(each, missed[each.name], search))
+        elif each not in fits:
+            worst = " in its worst frame" if each.by == "tolerance" and frame is not None else ""
+            need = spent.longest(each, found[each.name].k)
+            reason = f"good enough, but takes {need:.3g} s{worst} of the {budget:.3g} s"
+            rejected.append(Rejected(each.method.name, "budget", reason, each.by, each.dtype))
+    fastest = predict.fastest_oscillation(trials) if fits else None
+    ranked = tuple(_row(trials, each, found[each.name], spent, budget, fastest) for each in fits)
+    shortfall = None if ranked else _shortfall(candidates, found, spent, budget)
+    made = trials.made + narrow.made + adaptive.made
+    found_of = (trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, made, known.cut, noise)
+    return Advice(*found_of, dtype=dtype)
+
+
+def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
+    """Why the method cannot step the scene with its control, or None; found by trying a step."""
+    if candidate.by == "tolerance" and scene.control is not None:
+        return "adaptive steps are tried for scenes without a control only"
+    if candidate.by == "tolerance" and scene.system.contacts:
+        return "adaptive steps do not go with surfaces"
+    dt = TIMED_STEP * scene.dt
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            if candidate.dtype == "float32":
+                float32.step(scene.system, candidate.method, "direct", grid.dt(candidate.first))
+                float32.check_inputs(scene.system, (1.0 + SINGLE_STEP_ROUNDING) * grid.end)
+                scene.run(candidate.method, dt, steps=1, dtype="float32")
+            elif candidate.by == "step":
+                scene.run(candidate.method, dt, steps=1)
+            else:
+                integrate(
+                    scene.system,
+                    candidate.method,
+                    v=scene.v,
+                    y=scene.y,
+                    tolerance=1.0,
+                    at=[dt],
+                    max_steps=1,
+                    **scene.adaptive_options,
+                )
+        except UnsupportedError as error:
+            return str(error).removeprefix(f"{candidate.method.name} ").removeprefix("dtype: ")
+        except ArgumentError as error:
+            # Such a scene was made, so nothing is wrong with it but numbers that float32 does not have.
+            if candidate.dtype == "float64":
+                raise
+            return str(error)
+    return None
+
+
+def _hints(
+    known: Motion, trials: Trials, candidates: Sequence[Candidate], prices: Mapping[str, float], tolerance: float, most: float
+) -> dict[str, set[int]]:
+    """What searches for larger errors find in short runs, by the candidate's name.
+
+    Where errors do not fall with the step, what is good enough by luck lies between what a search for a small error tries. Advice
+    for a larger error would name it, though it is good enough for both.
+    """
+    hints: dict[str, set[int]] = {}
+    allowed = LARGEST_HINTED
+    while allowed > tolerance:
+        adaptive = AdaptiveTrials(known, ERROR_SHARE * allowed, trials.long)
+        again = [Adaptive(each.method, adaptive) if isinstance(each, Adaptive) else each for each in candidates]
+        search = Search(allowed, known.grid.spans, prices, most, short=trials.long)
+        for name, each in search.run(again)[0].items():
+            hints.setdefault(name, set()).add(each.k)
+        allowed *= 0.1
+    return hints
+
+
+def _times(scene: Scene, candidates: Sequence[Candidate]) -> tuple[dict[str, float], float]:
+    """Nanoseconds per step, by the candidate's name, and by which share they may differ without a meaning."""
+    # What is advised in float32 is shown beside float64, so all are measured in that, too.
+    both = list({each.method.name: each.method for each in candidates if each.by == "step"}.values())
+    steps = step_times(scene, both, [each.method for each in candidates if each.dtype == "float32"])
+    tried = tried_times(scene, [each.method for each in candidates if each.by == "tolerance"])
+    noise = max((each.noise for each in (steps, tried) if isinstance(each, Times)), default=0.0)
+    adaptive = {each.name: tried[each.method.name] for each in candidates if each.by == "tolerance"}
+    return {**steps, **adaptive}, noise
+
+
+def by_cost_and_error(candidates: Sequence[Kind], costs: Sequence[float], errors: Sequence[float], noise: float) -> list[Kind]:
+    """Candidates in the order of their costs; of those that cost the same but for the noise, the smaller error first.
+
+    The first group is the cheapest and all that cost at most that share more; the next begins with the cheapest of the others.
+    Errors that are equal in two digits are taken to be equal: those of one motion in two ways differ by roundings.
+    """
+    errors = [float(f"{error:.1e}") for error in errors]
+    order = sorted(range(len(candidates)), key=lambda i: (costs[i], errors[i]))
+    ranked: list[int] = []
+    while order:
+        most = costs[order[0]] * (1.0 + noise)
+        group = [i for i in order if costs[i] <= most]
+        ranked += sorted(group, key=lambda i: (errors[i], costs[i]))
+        order = order[len(group) :]
+    return [candidates[i] for i in ranked]
+
+
+def _judged(candidate: Candidate, trial: Trial) -> float:
+    """The error by which what costs the same is ordered; that rounding made an error smaller is luck, and counts for nothing."""
+    return max(trial.error, candidate.in_float64(trial)) if isinstance(candidate, Single) else trial.error
+
+
+class _Spending:
+    """Measured seconds of a run, in a frame, or in a unit of time without one."""
+
+    def __init__(self, grid: Grid, adaptive: AdaptiveTrials, times: Mapping[str, float]) -> None:
+        self.grid, self.adaptive, self.times = grid, adaptive, times
+
+    def mean(self, candidate: Candidate, trial: Trial) -> float:
+        """On the whole."""
+        return 1e-9 * self.times[candidate.name] * trial.steps / (self.grid.spans if self.grid.framed else self.grid.end)
+
+    def longest(self, candidate: Candidate, k: int) -> float:
+        """In the frame that takes longest."""
+        return (
+            1e-9 * self.times[candidate.name] * self.most(candidate, k)
+            if self.grid.framed
+            else self.mean(candidate, candidate.look(k))
+        )
+
+    def fits(self, candidate: Candidate, k: int, budget: float | None) -> bool:
+        """Whether it keeps the budget."""
+        return budget is None or self.longest(candidate, k) <= budget
+
+    def steps(self, candidate: Candidate, budget: float | None) -> float:
+        """The steps in a span for which the budget suffices."""
+        if budget is None:
+            return math.inf
+        return budget / (1e-9 * self.times[candidate.name]) * (1.0 if self.grid.framed else self.grid.end)
+
+    def most(self, candidate: Candidate, k: int) -> int:
+        """The most steps in a frame."""
+        return self.adaptive.worst(candidate.method, candidate.tolerance(k)) if isinstance(candidate, Adaptive) else k
+
+
+def _row(
+    trials: Trials, candidate: Candidate, found: Found, spent: _Spending, budget: float | None, fastest: float | None
+) -> Row:
+    method, trial, grid = candidate.method, found.trial, trials.grid
+    ns, mean, longest = spent.times[candidate.name], spent.mean(candidate, trial), spent.longest(candidate, found.k)
+    per_frame = candidate.evaluations * trial.steps / grid.spans
+    by_modes, limit = None, predict.Limit(None, "none", None, None)
+    wide_error = wide_ns = None
+    if isinstance(candidate, Single):
+        wide_error, wide_ns = candidate.in_float64(trial), spent.times[method.name]
+        trials = candidate.trials
+    observed = math.inf
+    if candidate.by == "step":
+        by_modes = predict.predicted(trials.scene, method, trial.dt, trial.steps)
+        limit = predict.limit(trials, method, fastest)
+        observed = predict.observed_limit(trials, method, trial.steps)
+    robust: float | None = found.robust
+    if isinstance(candidate, Adaptive) and found.robust is not None:
+        robust = candidate.tolerance(found.robust)
+    return Row(
+        method=method,
+        substeps=found.k if grid.framed and candidate.by == "step" else None,
+        steps=trial.steps,
+        dt=trial.dt,
+        error=trial.error,
+        predicted=by_modes.error if by_modes else found.expected,
+        predicted_by="modes" if by_modes else ("order" if found.expected is not None else None),
+        frequency_error=by_modes.frequency if by_modes else None,
+        damping_error=by_modes.damping if by_modes else None,
+        evaluations_per_frame=per_frame if grid.framed else None,
+        evaluations_per_time=candidate.evaluations / trial.dt,
+        ns_per_step=ns,
+        seconds_per_frame=mean if grid.framed else None,
+        seconds_per_time=1e-9 * ns / trial.dt,
+        objects=None if budget is None else int(budget / longest),
+        limit=limit.dt,
+        limit_by=limit.how,
+        mode=limit.mode,
+        mode_frequency=limit.frequency,
+        observed_limit=observed,
+        robust=robust,
+        tolerance=candidate.tolerance(found.k) if isinstance(candidate, Adaptive) else None,
+        rejected_steps=trial.rejected,
+        worst_evaluations=candidate.evaluations * spent.most(candidate, found.k) if grid.framed else None,
+        dtype=candidate.dtype,
+        float64_error=wide_error,
+        float64_ns_per_step=wide_ns,
+    )
+
+
+def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
+    trial = missed.trial
+    if search.allowed(candidate) < trial.error < ASYMPTOTIC_ERROR:
+        trial = candidate.measured(missed.k)
+    detail = f"dt = {trial.dt:.3g}" if candidate.by == "step" else f"{trial.steps} steps"
+    tried = f"with {candidate.said(missed.k)} ({detail})"
+    too_expensive = f"costs over {MAX_COST_RATIO:g} times the least"
+    needs = f"; by its order it needs about {candidate.said(missed.expected)}" if missed.expected else ""
+    unstable = "still unstable" if candidate.by == "step" else "stops early"
+    if trial.error <= search.allowed(candidate):
+        reason = f"good enough {tried}, which {too_expensive}"
+    elif missed.kind == "unstable":
+        reason = (
+            f"{unstable} {tried}, and more of them {too_expensive.replace('costs', 'cost')}"
+            if missed.expensive
+            else f"{unstable} {tried}, the most tried"
+        )
+    elif missed.expensive:
+        reason = f"error {trial.error:.2g} {tried}, and what is enough {too_expensive}{needs}"
+    else:
+        reason = f"error {trial.error:.2g} {tried}, the most tried{needs}"
+    if isinstance(candidate, Single) and candidate.is_rounding(missed.k):
+        reason = f"error {trial.error:.2g} {tried}, most of it rounding: in float64 it is {candidate.in_float64(trial):.2g}"
+    return Rejected(candidate.method.name, missed.kind, reason, candidate.by, candidate.dtype)
+
+
+def _shortfall(candidates: Sequence[Candidate], found: Mapping[str, Found], spent: _Spending, budget: float | None) -> Shortfall:
+    """What would have to give: the least error within the budget of all that was tried, and the budget for the tolerance."""
+    least, best = _least(candidates, spent, budget)
+    needs = [(spent.longest(each, found[each.name].k), each.name) for each in candidates if each.name in found]
+    needed, by = min(needs) if needs else (None, None)
+    if best is None:
+        return Shortfall(least, None, None, needed, by)
+    chosen, k = best
+    tolerance = chosen.tolerance(k) if isinstance(chosen, Adaptive) else None
+    return Shortfall(least, chosen.method.name, k if tolerance is None else None, needed, by, tolerance, chosen.dtype)
+
+
+def _least(candidates: Sequence[Candidate], spent: _Spending, budget: float | None) -> tuple[float, tuple[Candidate, int] | None]:
+    """The least error within the budget, and whose it is.
+
+    Of a run that was not good enough only a part of its errors is known, which is less than the largest: so the least of them is
+    measured until one that was measured is the least.
+    """
+    waiting = [
+        (trial.error, i, k, False)
+        for i, each in enumerate(candidates)
+        for k, trial in each.seen.items()
+        if trial.error < math.inf and spent.fits(each, k, budget)
+    ]
+    heapq.heapify(waiting)
+    while waiting:
+        error, i, k, measured = heapq.heappop(waiting)
+        if measured:
+            return error, (candidates[i], k)
+        heapq.heappush(waiting, (candidates[i].measured(k).error, i, k, True))
+    return math.inf, None

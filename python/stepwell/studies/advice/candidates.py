@@ -1,0 +1,220 @@
+"""The candidates of the search: each method with fixed steps, and each that can estimate its error with adaptive steps.
+
+Both have a k that is the number of steps, or grows like it: it doubles where steps are halved, and the error falls with its power
+that is the method's order. The search knows no more of them.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Protocol
+
+from ...model.methods import Method
+from .adaptive import AdaptiveTrials
+from .motion import Grid
+from .predict import keeps_margin, longest_step
+from .trials import ASYMPTOTIC_ERROR, Trial, Trials, single_name
+
+#: The k that stands for a tolerance of 1; one more makes steps 1.5 % shorter there.
+UNIT_TOLERANCE_K = 64
+
+#: No tolerance is smaller than this: below it rounding is all.
+LEAST_TOLERANCE = 1e-16
+
+#: Steps below the normal numbers of float32 have fewer digits.
+LEAST_SINGLE_STEP = 2.0**-126
+
+#: The first run with a tolerance may make this share of the evaluations of a run: where stability bounds the steps, a loose
+#: tolerance costs as much as a tight one, and a search that began with such runs of every method would have nothing left.
+FIRST_RUN_SHARE = 1 / 16
+
+#: The error of a run with a tolerance is measured at many times, but not at every one: it may be at most this share of
+#: what is allowed.
+ERROR_SHARE = 0.95
+
+
+class Candidate(Protocol):
+    """A method, and how its steps are chosen.
+
+    Attributes:
+        method: the method.
+        by: ``"step"`` or ``"tolerance"``.
+        name: the method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``; or by "float32".
+        dtype: in which its steps are computed.
+        first: the least k.
+        share: of the error that is allowed, what the run may have.
+        seen: the runs that were made, by k.
+    """
+
+    method: Method
+    by: str
+    name: str
+    dtype: str
+    first: int
+    share: float
+    seen: dict[int, Trial]
+
+    @property
+    def evaluations(self) -> int:
+        """Function evaluations of a step, or of an attempt at one."""
+
+    def look(self, k: int) -> Trial:
+        """The run with that k."""
+
+    def confirm(self, k: int) -> Trial:
+        """The same, measured more closely."""
+
+    def measured(self, k: int) -> Trial:
+        """The same of a run that need not be good enough."""
+
+    def within_limit(self, k: int) -> int:
+        """This k, or the least larger one with which a linear system does not blow up, nor with somewhat longer steps."""
+
+    def keeps_margin(self, k: int) -> bool:
+        """Whether runs with somewhat longer steps do not blow up."""
+
+    def possible(self, k: int) -> bool:
+        """Whether there is such a run."""
+
+    def said(self, k: int) -> str:
+        """What k stands for, in words."""
+
+
+class Fixed:
+    """Steps of one length: k of them in a span of the grid."""
+
+    by = "step"
+    dtype = "float64"
+
+    def __init__(self, method: Method, trials: Trials, grid: Grid, share: float) -> None:
+        self.method, self.name, self.share = method, method.name, share
+        self.trials, self.grid, self.first = trials, grid, grid.first
+        self.seen: dict[int, Trial] = {}
+
+    @cached_property
+    def evaluations(self) -> int:
+        """Function evaluations of a step."""
+        return self.trials.evaluations(self.method)
+
+    def look(self, k: int) -> Trial:
+        """The run with that k."""
+        self.seen[k] = trial = self.trials.look(self.method, self.grid.dt(k), self.grid.steps(k))
+        return trial
+
+    def confirm(self, k: int) -> Trial:
+        """The same run, at every step."""
+        return self.trials.confirm(self.method, self.grid.dt(k), self.grid.steps(k))
+
+    measured = confirm
+
+    def within_limit(self, k: int) -> int:
+        """This k, or the least larger one with which a linear system does not blow up, nor with somewhat longer steps."""
+        return max(k, math.ceil(self.grid.span / longest_step(self.trials, self.method)))
+
+    def keeps_margin(self, k: int) -> bool:
+        """Whether runs with somewhat longer steps do not blow up."""
+        return keeps_margin(self.trials, self.method, self.grid.dt(k))
+
+    def possible(self, k: int) -> bool:
+        """Whether a step still moves the time."""
+        return self.grid.steps(k) < 2**52
+
+    def said(self, k: int) -> str:
+        """How many steps."""
+        return f"{k} step{'s' * (k != 1)}{' a frame' * self.grid.framed}"
+
+
+class Single(Fixed):
+    """Steps of one length in float32.
+
+    Shorter steps do not help where rounding alone is more than what is allowed, so the search ends there.
+
+    Args:
+        method: the method.
+        trials: runs in float32.
+        grid: the steps that can be chosen.
+        share: of the error that is allowed, what the run may have.
+        wide: the same runs in float64.
+        allowed: the state error that its runs may have.
+    """
+
+    dtype = "float32"
+
+    def __init__(self, method: Method, trials: Trials, grid: Grid, share: float, wide: Trials, allowed: float) -> None:
+        super().__init__(method, trials, grid, share)
+        self.name, self.wide, self.allowed = single_name(method), wide, allowed
+
+    def possible(self, k: int) -> bool:
+        """Whether the step is a normal number of float32, and fewer steps leave hope for so many."""
+        before = max((n for n in self.seen if n < k), default=None)
+        return super().possible(k) and self.grid.dt(k) >= LEAST_SINGLE_STEP and (before is None or not self.is_rounding(before))
+
+    def is_rounding(self, k: int) -> bool:
+        """Whether rounding alone makes the error of a run that was made too large.
+
+        The states of the two precisions differ by at least as much as their errors do, and rounding is all that they differ by.
+        """
+        error = self.seen[k].error
+        if not self.allowed < error < ASYMPTOTIC_ERROR:
+            return False
+        return error - self.in_float64(self.seen[k]) > self.allowed
+
+    def in_float64(self, trial: Trial) -> float:
+        """The error of the same steps in float64."""
+        return self.wide.confirm(self.method, trial.dt, trial.steps).error
+
+
+class Adaptive:
+    """Steps chosen to a tolerance: it is the power of 1/k with which the method estimates its error."""
+
+    by = "tolerance"
+    dtype = "float64"
+    share = ERROR_SHARE
+
+    def __init__(self, method: Method, trials: AdaptiveTrials) -> None:
+        assert method.error_order is not None
+        self.method, self.name = method, f"{method.name}, tolerance"
+        self.trials, self.power = trials, method.error_order
+        self.seen: dict[int, Trial] = {}
+        # A single step may be wrong by the tolerance; more than what is allowed is luck.
+        self.first = math.ceil(UNIT_TOLERANCE_K * min(1.0, trials.allowed) ** (-1.0 / self.power))
+
+    @property
+    def evaluations(self) -> int:
+        """Function evaluations of an attempt at a step."""
+        return self.method.attempt_evaluations
+
+    def tolerance(self, k: int) -> float:
+        """The tolerance of that k, in two digits, so that the tolerance shown is the one that was run."""
+        return float(f"{(UNIT_TOLERANCE_K / k) ** self.power:.1e}")
+
+    def look(self, k: int) -> Trial:
+        """The run with that k."""
+        share = FIRST_RUN_SHARE if k == self.first else 1.0
+        self.seen[k] = trial = self.trials.look(self.method, self.tolerance(k), share)
+        return trial
+
+    def confirm(self, k: int) -> Trial:
+        """The same, at many more times."""
+        return self.trials.confirm(self.method, self.tolerance(k))
+
+    def measured(self, k: int) -> Trial:
+        """The same of a run that need not be good enough."""
+        return self.trials.measured(self.method, self.tolerance(k))
+
+    def within_limit(self, k: int) -> int:
+        """Steps that blow up are rejected."""
+        return k
+
+    def keeps_margin(self, k: int) -> bool:
+        """Steps that blow up are rejected."""
+        return True
+
+    def possible(self, k: int) -> bool:
+        """Whether the tolerance is above the rounding."""
+        return self.tolerance(k) >= LEAST_TOLERANCE
+
+    def said(self, k: int) -> str:
+        """The tolerance."""
+        return f"a tolerance of {self.tolerance(k):g}"

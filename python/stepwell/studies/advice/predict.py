@@ -1,0 +1,191 @@
+"""Predictions from the eigenvalues of a step, without a run: the error over the horizon, and the stability limit."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...analysis.stability import Mode, analyse, maps
+from ...analysis.stability.limit import limit_of
+from ...errors import UnsupportedError
+from ...model.methods import Method
+from ...scenes import Scene
+from .trials import Trials
+
+#: Times at which a prediction is compared with the exact modes.
+SAMPLES = 10_000
+
+#: Modes that are too close to each other to be distinguished by this give no prediction.
+MAX_CONDITION = 1e8
+
+#: States of the true motion at which a system that is not linear is taken for one; not one with more numbers than this, for
+#: eigenvalues take long.
+LINEARIZED_STATES, MAX_NUMBERS = 400, 128
+
+#: A step that is so many times as long as an advised one must not blow up either: more than twice how far apart the steps are at
+#: which the observed limit is looked for.
+MARGIN = 1.05
+
+#: The observed limit is searched on a geometric grid of this many steps in a factor of two: 2.2 % apart.
+RUNGS_PER_OCTAVE = 32
+
+
+class Prediction(NamedTuple):
+    """What the eigenvalues say of a step of a linear system.
+
+    Attributes:
+        error: the largest state error over the horizon, all modes of the start together.
+        frequency: relative frequency error Ψ/Φ − 1 of the mode of the start that drifts most; None if it does not oscillate.
+        damping: what is added to the damping of that mode, in 1 per unit of time; below zero it grows.
+    """
+
+    error: float
+    frequency: float | None
+    damping: float
+
+
+class Limit(NamedTuple):
+    """Where a method blows up.
+
+    Attributes:
+        dt: the step beyond which something grows, in units of time; 0 for never stable, infinite for always; None if unknown.
+            Where rounding hides what grows, the largest step of which it is known that nothing does; ``mode`` then says so.
+        how: ``"linear"``, or ``"frozen"`` for the fastest oscillation along the true motion, as if it stood still; ``"none"`` of
+            steps that are chosen to a tolerance.
+        mode: what grows there, in words; None if nothing or unknown.
+        frequency: in rad per unit of time, of that mode, or None.
+    """
+
+    dt: float | None
+    how: str
+    mode: str | None
+    frequency: float | None
+
+
+def predicted(scene: Scene, method: Method, dt: float, steps: int) -> Prediction | None:
+    """The prediction, or None where it makes no sense: not linear, driven, controlled, or with modes too alike."""
+    system = scene.system
+    if not system.linear or system.given_inputs() or scene.control is not None:
+        return None
+    found = analyse(system, method, dt=dt)
+    v, y = (np.asarray(block, dtype=float) for block in (scene.v, scene.y))
+    slot = method.steps.start(system.scaled(dt, ()), 0, 0.0, v, y) if method.carry else v
+    z, vectors = np.linalg.eig(found.P)
+    rates, shapes = np.linalg.eig(maps.rates(system))
+    if not max(np.linalg.cond(vectors), np.linalg.cond(shapes)) < MAX_CONDITION:
+        return None
+    start = np.concatenate([np.ravel(v), np.ravel(y)])
+    share, true_share = np.linalg.solve(vectors, np.concatenate([np.ravel(slot), np.ravel(y)])), np.linalg.solve(shapes, start)
+    finish = maps.finish(system, method, np.asarray(dt), ())
+    k = np.unique(np.linspace(0, steps, min(steps, SAMPLES) + 1).astype(np.int64))
+    with np.errstate(all="ignore"):
+        x = np.real(finish @ vectors @ (share[:, np.newaxis] * z[:, np.newaxis] ** k))
+        true = np.real(shapes @ (true_share[:, np.newaxis] * np.exp(rates[:, np.newaxis] * (k * dt))))
+        difference = np.nan_to_num(x - true, nan=np.inf, posinf=np.inf, neginf=-np.inf)
+        n_v = maps.size(system)[0]
+        blocks = (difference[:n_v], difference[n_v:])
+        errors = [
+            np.sqrt((b * b).sum(axis=0)).max() / scale for b, scale in zip(blocks, scene.scales, strict=True) if len(b) and scale
+        ]
+        # The mode that drifts most, by its share of the start.
+        weight = np.abs(true_share) * np.sqrt((np.abs(shapes) ** 2).sum(axis=0))
+        own = np.array([np.sqrt(weight[np.abs(rates - rate).argmin()]) for rate in found.rates])
+        drift = np.log(found.eigenvalues) / dt - found.rates
+        worst = int(np.nanargmax(own * np.abs(drift)))
+    ratio = float(found.frequency_ratios[worst])
+    frequency = ratio - 1.0 if math.isfinite(ratio) else None
+    return Prediction(float(max(errors, default=math.inf)), frequency, float(-drift[worst].real))
+
+
+def limit(trials: Trials, method: Method, fastest: float | None) -> Limit:
+    """The limit of a method on a scene; ``fastest`` is what ``fastest_oscillation`` found of one that is not linear."""
+    scene = trials.scene
+    if scene.system.linear and scene.control is None:
+        found = limit_of(scene.system, method)
+        mode: Mode | None = found.mode
+        if mode is None:
+            return Limit(found.stable, "linear", None, None)
+        kind = mode.kind if found.decided else f"{mode.kind}; not decided between {found.stable:.6g} and {found.grows:.6g}"
+        return Limit(found.stable, "linear", kind, abs(mode.rate.imag))
+    if not fastest:
+        return Limit(None, "frozen", None, None)
+    return Limit(method.limit / fastest, "frozen", "the fastest oscillation along the motion", fastest)
+
+
+def longest_step(trials: Trials, method: Method) -> float:
+    """The longest step that keeps a margin to the limit of a linear system; infinite where there is none.
+
+    What grows with every step, if slowly, has no limit to keep away from.
+    """
+    scene = trials.scene
+    if not scene.system.linear or scene.control is not None:
+        return math.inf
+    return limit_of(scene.system, method).stable / MARGIN or math.inf
+
+
+def keeps_margin(trials: Trials, method: Method, dt: float) -> bool:
+    """Whether runs with steps up to ``MARGIN`` times as long do not blow up either. Of a linear system the limit is known."""
+    horizon = trials.scene.horizon
+    steps = (math.floor(horizon / (dt * ratio)) for ratio in (MARGIN, math.sqrt(MARGIN)))
+    return trials.scene.system.linear or not any(trials.unstable(method, horizon / n, n) for n in steps if n)
+
+
+def fastest_oscillation(trials: Trials) -> float | None:
+    """The largest frequency of a small disturbance along the true motion, in rad per unit of time, or None if none oscillates.
+
+    Eigenvalues of what stands still are no limit of what moves, but the fastest oscillation is where a method blows up if it goes
+    on for some steps.
+    """
+    scene = trials.scene
+    system = scene.system
+    if system.linear or sum(maps.size(system)) > MAX_NUMBERS:
+        return None
+    assert scene.exact is not None
+    t = trials.marks[:: max(1, len(trials.marks) // LINEARIZED_STATES)]
+    v, y = (np.asarray(block) for block in scene.exact(t))
+    fastest = 0.0
+    try:
+        for i in range(len(t)):
+            matrix = maps.rates(system.sized(v[i], y[i]), float(t[i]), v[i], y[i])
+            if np.isfinite(matrix).all():
+                fastest = max(fastest, float(np.abs(np.linalg.eigvals(matrix).imag).max()))
+    except UnsupportedError:
+        return None
+    return fastest or None
+
+
+def observed_limit(trials: Trials, method: Method, stable: int) -> float:
+    """The largest step whose run over the horizon does not grow, within 2 %: infinite if four steps do not, 0 if none is stable.
+
+    Args:
+        trials: runs of the scene.
+        method: the method.
+        stable: a number of steps over the horizon with which the method is stable, and with ``MARGIN`` times fewer.
+    """
+    horizon = trials.scene.horizon
+
+    def grows(j: int) -> bool:
+        n = round(float(2.0 ** (j / RUNGS_PER_OCTAVE)))
+        return trials.unstable(method, horizon / n, n)
+
+    low = 2 * RUNGS_PER_OCTAVE
+    high = max(low, math.ceil(RUNGS_PER_OCTAVE * math.log2(stable / MARGIN)))
+    # From the fine end, which is known, since what is coarse may be stable again by chance.
+    last = high
+    for j in range(high - RUNGS_PER_OCTAVE, low - 1, -RUNGS_PER_OCTAVE):
+        if grows(j):
+            low, high = j, last
+            break
+        last = j
+    else:
+        if not grows(low):
+            return math.inf
+        high = last
+    if low == high:
+        return 0.0
+    while high > low + 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if grows(middle) else (low, middle)
+    return float(horizon / round(2.0 ** (high / RUNGS_PER_OCTAVE)))

@@ -1,0 +1,510 @@
+"""The result of ``advise``, as data and as text."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...base import checks, files, registry
+from ...base.arrays import Array
+from ...base.pictures import drawn
+from ...base.reprs import one_line, table
+from ...base.tables import finite
+from ...errors import ArgumentError
+from ...model.methods import Method
+from ...runs.integration import integrate
+from ...runs.result import Run
+from ...scenes import Scene
+from .motion import grid_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: The text has a line for at most so many methods; ``ranked`` and ``rejected`` have all.
+LINES = 6
+
+#: And says of so many rejected ones of each kind why, and names the others.
+REASONS = 2
+
+#: A run of a row may try so many times its steps: they depend a little on the times at which it is asked for its state.
+MORE_STEPS = 10
+
+#: The columns of the table; those whose name ends in ``>`` are flush right.
+COLUMNS = ("method", "steps>", "dt>", "error>", "predicted>", "evaluations>", "ns>", "objects>", "blows up at dt>")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A method with the largest step, or tolerance, that was found to be accurate enough in a run.
+
+    Attributes:
+        method: the method.
+        substeps: steps in a frame; None without a frame and for adaptive steps.
+        steps: steps over the horizon; for adaptive steps all attempts.
+        dt: the step, in units of time; for adaptive steps the mean of all attempts.
+        error: the largest state error of the run.
+        predicted: the error predicted without that run, or None where no prediction is possible.
+        predicted_by: ``"modes"``, the eigenvalues and modes of the step; ``"order"``, a run with longer steps and the order.
+        frequency_error: Ψ/Φ − 1 of the mode that drifts most, or None.
+        damping_error: damping that the method adds to that mode, in 1 per unit of time; below zero it grows. Or None.
+        evaluations_per_frame: mean number of function (rate) evaluations in a frame; None without a frame.
+        evaluations_per_time: function (rate) evaluations per unit of time.
+        ns_per_step: measured nanoseconds per step of one member of a batch, on one thread. Not repeatable.
+        seconds_per_frame: measured mean computing time of a frame; None without a frame.
+        seconds_per_time: measured computing time per unit of time.
+        objects: the number of such objects that fit into the budget, in the most expensive frame; None without a budget.
+        limit: the step beyond which a mode grows, by the eigenvalues: 0 for never stable, infinite for no limit, None if they
+            do not decide, and for adaptive steps.
+        limit_by: ``"linear"``, exact; ``"frozen"``, the fastest oscillation of the system linearised along the true motion;
+            ``"none"``, for adaptive steps.
+        mode: the kind of growth beyond the limit, in words, or None.
+        mode_frequency: its frequency in the exact solution, in rad per unit of time, or None.
+        observed_limit: the largest step whose run over the horizon does not grow; infinite if none that was tried does.
+        robust: from this many steps (in a frame, or over the horizon) on, or from this tolerance down, all runs that were tried
+            are accurate enough; None if errors are above the tolerance up to twice as many steps.
+        tolerance: the tolerance of adaptive steps, as ``integrate`` takes it; None for fixed steps.
+        rejected_steps: the number of rejected steps among the steps.
+        worst_evaluations: function (rate) evaluations in the most expensive frame; None without a frame.
+        dtype: in which its steps are computed, ``"float64"`` or ``"float32"``. A step of float32 is ``dt`` rounded to it.
+        float64_error: of a row in float32, the largest state error of the same steps in float64; else None.
+        float64_ns_per_step: of a row in float32, what a step of the same method takes in float64; else None.
+    """
+
+    method: Method
+    substeps: int | None
+    steps: int
+    dt: float
+    error: float
+    predicted: float | None
+    predicted_by: str | None
+    frequency_error: float | None
+    damping_error: float | None
+    evaluations_per_frame: float | None
+    evaluations_per_time: float
+    ns_per_step: float
+    seconds_per_frame: float | None
+    seconds_per_time: float
+    objects: int | None
+    limit: float | None
+    limit_by: str
+    mode: str | None
+    mode_frequency: float | None
+    observed_limit: float
+    robust: float | None
+    tolerance: float | None = None
+    rejected_steps: int = 0
+    worst_evaluations: int | None = None
+    dtype: str = "float64"
+    float64_error: float | None = None
+    float64_ns_per_step: float | None = None
+
+    __repr__ = one_line
+
+    @property
+    def by(self) -> str:
+        """``"step"`` for fixed steps, ``"tolerance"`` for adaptive ones."""
+        return "step" if self.tolerance is None else "tolerance"
+
+    @property
+    def name(self) -> str:
+        """The method's name, followed by "tolerance" for adaptive steps or by "float32": ``"merson, tolerance"``."""
+        return named(self.method.name, self.by, self.dtype)
+
+    @property
+    def margin(self) -> float:
+        """The exact stability limit, or else the observed one, divided by the step: how many times as long a step may be.
+
+        Infinite for adaptive steps, which are shortened instead.
+        """
+        exact = self.limit_by == "linear" and self.limit
+        return (self.limit if exact and self.limit else self.observed_limit) / self.dt
+
+    @property
+    def is_robust(self) -> bool:
+        """Whether a few more steps are good enough too."""
+        if self.tolerance is not None:
+            return self.robust is not None and self.robust >= self.tolerance
+        return self.robust is not None and self.robust <= (self.steps if self.substeps is None else self.substeps)
+
+    def data(self) -> dict[str, Any]:
+        """The same for programs, the method by its name."""
+        names = [name for name in self.__dataclass_fields__ if name != "method"]
+        first = {"method": self.method.name, "by": self.by}
+        return first | {name: getattr(self, name) for name in names} | {"margin": self.margin}
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """Why a method is not advised.
+
+    Attributes:
+        method: its name.
+        kind: ``"refused"`` by the system; ``"unstable"`` or ``"inaccurate"`` at the most steps that were tried; ``"dominated"``,
+            more than ten times as expensive as the best; ``"budget"``, good enough but too expensive.
+        reason: the same in words and numbers.
+        by: ``"step"`` or ``"tolerance"``, what its steps were chosen by.
+        dtype: ``"float64"`` or ``"float32"``, in which they were computed.
+    """
+
+    __repr__ = one_line
+
+    method: str
+    kind: str
+    reason: str
+    by: str = "step"
+    dtype: str = "float64"
+
+    @property
+    def name(self) -> str:
+        """The method's name, followed by "tolerance" for adaptive steps or by "float32": ``"merson, tolerance"``."""
+        return named(self.method, self.by, self.dtype)
+
+
+@dataclass(frozen=True)
+class Shortfall:
+    """What would have to give if nothing fits.
+
+    Attributes:
+        least_error: the least state error that was found within the budget, or infinity.
+        method: by which method, or None.
+        substeps: with how many steps in a frame (over the horizon without one), or None.
+        needed_budget: seconds in a frame (in a unit of time without one) that the tolerance needs, or None if nothing meets it.
+        needed_method: by which, ``"merson, tolerance"`` if it chooses its steps, or None.
+        tolerance: to which the steps of the least error are chosen, or None.
+        dtype: in which they are computed.
+    """
+
+    __repr__ = one_line
+
+    least_error: float
+    method: str | None
+    substeps: int | None
+    needed_budget: float | None
+    needed_method: str | None
+    tolerance: float | None = None
+    dtype: str = "float64"
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Which method and which step.
+
+    Attributes:
+        scene: for which scene, up to the horizon over which its true motion is known.
+        frame: the frame, in units of time, or None for any step.
+        tolerance: the largest state error that is allowed.
+        budget: seconds that may be used in a frame (in a unit of time without one), or None for any.
+        cost: by what ``ranked`` is ordered, ``"time"`` or ``"evaluations"``.
+        ranked: what is good enough and fits, the cheapest first; of those whose costs differ by ``cost_noise`` or less, the one
+            with the smallest error.
+        rejected: the other methods, and why.
+        shortfall: what would have to give; None if something fits.
+        runs: how many runs were made to find it.
+        cut: whether the scene's horizon is longer, and its true motion not known so far.
+        cost_noise: the share by which measured times may differ without a meaning; 0 for evaluations.
+        dtype: ``"float64"``, ``"float32"`` or ``"both"``: in which numbers steps were tried.
+    """
+
+    scene: Scene
+    frame: float | None
+    tolerance: float
+    budget: float | None
+    cost: str
+    ranked: tuple[Row, ...]
+    rejected: tuple[Rejected, ...]
+    shortfall: Shortfall | None
+    runs: int
+    cut: bool = False
+    cost_noise: float = 0.0
+    dtype: str = "float64"
+
+    @property
+    def best(self) -> Row | None:
+        """The cheapest that is good enough, or None."""
+        return self.ranked[0] if self.ranked else None
+
+    def data(self) -> dict[str, Any]:
+        """All of it for programs; what is infinite is None."""
+        whole = {
+            "scene": self.scene.name,
+            "horizon": self.scene.horizon,
+            "frame": self.frame,
+            "tolerance": self.tolerance,
+            "budget": self.budget,
+            "cost": self.cost,
+            "best": self.best.data() if self.best else None,
+            "ranked": [row.data() for row in self.ranked],
+            "rejected": [asdict(each) for each in self.rejected],
+            "shortfall": asdict(self.shortfall) if self.shortfall else None,
+            "runs": self.runs,
+            "cut": self.cut,
+            "cost_noise": self.cost_noise,
+            "dtype": self.dtype,
+        }
+        found: dict[str, Any] = finite(whole)
+        return found
+
+    def to_json(self, path: str | Path | None = None) -> str:
+        """The text of ``data()`` in JSON; also written to a file if one is given."""
+        text = json.dumps(self.data(), ensure_ascii=False, indent=1)
+        if path is not None:
+            files.write_text(checks.file("path", path), text + "\n")
+        return text
+
+    @property
+    def asked(self) -> Array:
+        """Output times of the runs with a tolerance: the ends of frames, or ten equidistant times, in units of time."""
+        return grid_of(self.scene.horizon, self.frame).asked
+
+    def run(self, row: Row | None = None) -> Run:
+        """The run of a row, in full.
+
+        Args:
+            row: of ``ranked``; the best if None.
+
+        Returns:
+            A ``Run`` that saves every step, or with a tolerance the states at ``asked``. ``advice.scene.state_error`` gives its
+            errors.
+
+        Raises:
+            ArgumentError: if there is no row.
+        """
+        row = self.best if row is None else row
+        if row is None:
+            raise ArgumentError("row: nothing fits, so there is nothing to run")
+        if row.tolerance is None:
+            return self.scene.run(row.method, row.dt, steps=row.steps, every=1, dtype=row.dtype)
+        scene = self.scene
+        options: dict[str, Any] = {
+            "tolerance": row.tolerance,
+            "at": self.asked,
+            "max_steps": MORE_STEPS * row.steps,
+        } | scene.adaptive_options
+        return integrate(scene.system, row.method, v=scene.v, y=scene.y, **options)
+
+    def summary(self) -> list[str]:
+        """The advice in sentences, a line each."""
+        per = "a frame" if self.frame is not None else "a unit of time"
+        best = self.best
+        if best is None:
+            return [*self._cut(), *self._what_would_have_to_give(per)]
+        if best.tolerance is not None:
+            run = f"error {best.error:.2g} in the run of {best.steps} steps, {best.rejected_steps} of them rejected"
+            lines = [f"Use {best.method.name} with adaptive steps to a tolerance of {best.tolerance:g}: {run}."]
+        else:
+            count = f"{best.substeps} step{'s' * (best.substeps != 1)} a frame" if best.substeps else f"{best.steps} steps"
+            run = f"error {best.error:.2g} in the run of {best.steps} steps"
+            single = " in float32" if best.dtype == "float32" else ""
+            lines = [f"Use {best.method.name}{single} with {count}, dt = {best.dt:.4g}: {run}."]
+        lines += self._cut()
+        ns = 1e9 * (best.seconds_per_frame if best.seconds_per_frame is not None else best.seconds_per_time)
+        evaluations = best.evaluations_per_frame if best.evaluations_per_frame is not None else best.evaluations_per_time
+        worst = f", {best.worst_evaluations} in the worst frame" if best.tolerance is not None and best.worst_evaluations else ""
+        counted = f"{evaluations:.4g} function evaluation{'s' * (evaluations != 1)}{worst}"
+        lines.append(f"Cost {per}: {counted}; {ns:.2g} ns measured in a batch on one thread.")
+        lines += self._as_cheap(best) + self._beside(best)
+        if best.objects is not None:
+            objects = f"{about(best.objects)} such object{'s' * (best.objects != 1)}{', also then' * bool(worst)}"
+            lines.append(f"The budget of {self.budget:.3g} s {per} suffices for {objects}.")
+        lines.append(_margin(best))
+        if not best.is_robust:
+            lines.append(self._uneven(best))
+        return lines
+
+    def _as_cheap(self, best: Row) -> list[str]:
+        """Which others cost the same as far as it was measured; the best has the smallest error of them."""
+        if self.cost != "time":
+            return []
+        alike = best.seconds_per_time * (1.0 + self.cost_noise)
+        same = [row.name for row in self.ranked[1:] if row.seconds_per_time <= alike and row.error >= best.error]
+        if not same:
+            return []
+        said = f"{'; '.join(same)} cost{'s' * (len(same) == 1)} the same, and the error is larger"
+        return [f"As far as can be measured (±{100 * self.cost_noise:.0f} %), {said}."]
+
+    def _beside(self, best: Row) -> list[str]:
+        """What float32 gains and costs, where it was asked for."""
+        row = next((row for row in self.ranked if row.dtype == "float32"), None)
+        if row is None or row.float64_error is None or row.float64_ns_per_step is None:
+            return []
+        ratio = f"a step takes {row.float64_ns_per_step / row.ns_per_step:.2g} times as long"
+        if row is best:
+            return [f"In float64 these steps have an error of {row.float64_error:.2g}, and {ratio}."]
+        error = f"error {row.error:.2g}, {row.float64_error:.2g} in float64, where {ratio}"
+        return [f"Of float32 the best is {row.method.name}, dt = {row.dt:.4g}: {error}."]
+
+    def _cut(self) -> list[str]:
+        if not self.cut:
+            return []
+        return [f"Errors are judged up to t = {self.scene.horizon:.4g} only: beyond, the true motion is not known well enough."]
+
+    def _uneven(self, row: Row) -> str:
+        unit = "steps a frame" if self.frame is not None else "steps"
+        if row.robust is None:
+            where = "nowhere near"
+        else:
+            where = f"from {row.robust:g} {unit} on" if row.tolerance is None else f"from a tolerance of {row.robust:g} down"
+        return f"Errors are not even here: {where} all that were tried are good enough too."
+
+    def _what_would_have_to_give(self, per: str) -> list[str]:
+        gap, unit = self.shortfall, "steps a frame" if self.frame is not None else "steps"
+        if gap is None:
+            return ["Nothing was tried."]
+        lines = ["Nothing fits."]
+        if gap.method is not None:
+            within = "within the budget" if self.budget is not None else "found"
+            how = f"{gap.substeps} {unit}" if gap.tolerance is None else f"a tolerance of {gap.tolerance:g}"
+            single = " in float32" if gap.dtype == "float32" else ""
+            lines.append(f"The least error {within} is {gap.least_error:.2g}, by {gap.method}{single} with {how}.")
+        elif self.budget is not None:
+            lines.append(f"The budget of {self.budget:.3g} s {per} does not suffice for one step of any method.")
+        if gap.needed_budget is not None:
+            lines.append(f"The tolerance needs a budget of {gap.needed_budget:.3g} s {per}, by {gap.needed_method}.")
+        else:
+            lines.append("Nothing that was tried meets the tolerance: allow a larger error, or a shorter horizon.")
+        return lines
+
+    def table(self) -> list[tuple[str, ...]]:
+        """The ranked rows as text, in ``COLUMNS``."""
+        rows: list[tuple[str, ...]] = []
+        for row in self.ranked:
+            framed = row.seconds_per_frame is not None and row.evaluations_per_frame is not None
+            steps = f"{row.steps / self._frames:.3g}" if framed and row.substeps is None else str(row.substeps or row.steps)
+            rows.append(
+                (
+                    row.name if row.tolerance is None else f"{row.method.name} to {row.tolerance:g}",
+                    steps + ("" if row.is_robust else "*"),
+                    ("" if row.tolerance is None else "~") + f"{row.dt:.4g}",
+                    f"{row.error:.2g}",
+                    "–" if row.predicted is None else f"{row.predicted:.2g}",
+                    f"{row.evaluations_per_frame if framed else row.evaluations_per_time:.4g}",
+                    f"{1e9 * ((row.seconds_per_frame or 0.0) if framed else row.seconds_per_time):.2g}",
+                    "–" if row.objects is None else about(row.objects).removeprefix("about "),
+                    _blows(row),
+                )
+            )
+        return rows
+
+    @property
+    def _frames(self) -> int:
+        return grid_of(self.scene.horizon, self.frame).spans
+
+    def rejections(self, most: int | None = None) -> list[str]:
+        """Why the others are rejected, a line for each reason; of each kind no more than ``most``, the others by name."""
+        lines = []
+        for kind in dict.fromkeys(each.kind for each in self.rejected):
+            reasons: dict[str, list[str]] = {}
+            for each in self.rejected:
+                if each.kind == kind:
+                    reasons.setdefault(each.reason, []).append(each.name)
+            said = ["; ".join(names) for names in reasons.values()]
+            lines += [f"{names}: {reason}" for names, reason in zip(said[:most], reasons, strict=False)]
+            if most is not None and len(said) > most:
+                lines.append(f"{kind} likewise: {'; '.join(said[most:])}")
+        return lines
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw cost and error of each ranked method, with the error that was asked for, and write the picture if asked.
+
+        Args:
+            path: the file; its ending says in which format.
+
+        Returns:
+            The figure; a notebook shows it.
+
+        Raises:
+            ArgumentError: if no method is good enough, or there is no such format.
+            UnsupportedError: if matplotlib is missing.
+
+        Example:
+            >>> import stepwell as sw
+            >>> advice = sw.advise("oscillator", tolerance=1e-3, methods=["rk4", "leapfrog"], cost="evaluations")
+            >>> figure = advice.plot()
+        """
+        return drawn(path, lambda: registry.task("draw_advice")(self))
+
+    @property
+    def title(self) -> str:
+        """What was asked."""
+        frame = "any step" if self.frame is None else f"frame {self.frame:.4g}"
+        per = "a unit of time" if self.frame is None else "a frame"
+        asked = f"error of {self.tolerance:g} or less up to t = {self.scene.horizon:.4g}, {frame}"
+        return f"{self.scene.title}: {asked}; costs are for {per}"
+
+    def __str__(self) -> str:
+        lines = [self.title, *self.summary()]
+        if self.ranked:
+            head = [name.removesuffix(">") for name in COLUMNS]
+            rows = [head, *map(list, self.table()[:LINES])]
+            widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+            lines += ["", *("  ".join(_aligned(cell, i, widths) for i, cell in enumerate(row)).rstrip() for row in rows)]
+            if len(self.ranked) > LINES:
+                lines.append(f"and {len(self.ranked) - LINES} more")
+        if self.rejected:
+            lines += ["", *self.rejections(REASONS)]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        return table(self.title, COLUMNS, self.table(), [*self.summary(), *self.rejections(REASONS)])
+
+    def __repr__(self) -> str:
+        best = self.best
+        if best is None:
+            return f"<advice for {self.scene.name}: nothing fits>"
+        how = f"dt = {best.dt:g}" if best.tolerance is None else f"tolerance {best.tolerance:g}"
+        single = ", float32" if best.dtype == "float32" else ""
+        return f"<advice for {self.scene.name}: {best.method.name}{single}, {how}, error {best.error:.2g}>"
+
+
+def about(number: int) -> str:
+    """A number that follows from a measured time, to the digits that mean something: ``"about 7·10⁷"``, and small ones as is."""
+    if number < 100:
+        return str(number)
+    digits = f"{number:.0e}" if number >= 10_000 else f"{float(f'{number:.1g}'):.0f}"
+    mantissa, _, exponent = digits.partition("e")
+    if not exponent:
+        return f"about {mantissa}"
+    power = str(int(exponent)).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"about {mantissa}·10{power}"
+
+
+def named(method: str, by: str, dtype: str) -> str:
+    """The method's name, followed by "tolerance" for adaptive steps, or by "float32"."""
+    return f"{method}{'' if by == 'step' else ', tolerance'}{'' if dtype == 'float64' else ', float32'}"
+
+
+def _aligned(cell: str, i: int, widths: list[int]) -> str:
+    return cell.rjust(widths[i]) if COLUMNS[i].endswith(">") else cell.ljust(widths[i])
+
+
+def _blows(row: Row) -> str:
+    """Where a row blows up, in a few letters."""
+    if row.tolerance is not None:
+        return "–"
+    if row.limit_by == "linear" and row.limit is not None:
+        return "grows always" if row.limit == 0.0 else ("never" if math.isinf(row.limit) else f"{row.limit:.4g}")
+    return "not seen" if math.isinf(row.observed_limit) else f"~{row.observed_limit:.3g}"
+
+
+def _margin(row: Row) -> str:
+    """How far a row is from blowing up, in a sentence."""
+    if row.tolerance is not None:
+        return "There is no step at which it blows up: what is too long is rejected."
+    seen = "" if math.isinf(row.observed_limit) else f" Runs up to the horizon are stable to dt = {row.observed_limit:.3g}."
+    turns = "" if not row.mode_frequency else f" of {row.mode_frequency:.4g} rad per unit of time"
+    if row.limit_by == "linear" and row.limit is not None:
+        if math.isinf(row.limit):
+            return "Nothing grows with any step."
+        if row.limit == 0.0:
+            return f"It is never stable: {row.mode}{turns} grows slowly with every step, so not beyond this horizon.{seen}"
+        return f"It blows up beyond dt = {row.limit:.5g}, a step {row.margin:.3g} times as long: {row.mode}{turns}."
+    said = f"It blows up beyond about dt = {row.observed_limit:.3g}, a step {row.margin:.3g} times as long."
+    if math.isinf(row.observed_limit):
+        said = "No step that was tried blows up."
+    if row.limit and row.mode_frequency:
+        said += f" The fastest oscillation along the motion,{turns[3:]}, could be held up to dt = {row.limit:.3g}."
+    return said

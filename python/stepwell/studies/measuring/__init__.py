@@ -1,0 +1,1 @@
+"""What methods cost and how wrong they are: work-precision data, and peers."""

@@ -1,0 +1,88 @@
+"""The exact solution of a scene for charts, which evaluate it thousands of times, up to the time until which it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.immutable import Value
+from ...errors import ArgumentError
+from ...scenes import Scene
+from ...scenes.truth import MAX_DIFFERENCE, with_truth
+
+#: Nodes of the polynomial that interpolates the state.
+INTERPOLATION_POINTS = 10
+
+#: Nodes of the whole motion at first and at most, and the largest error of the interpolation, relative to the blocks' largest
+#: lengths.
+FIRST_NODES, MAX_NODES, MAX_INTERPOLATION_ERROR = 500, 64_000, 0.1 * MAX_DIFFERENCE
+
+Exact = Callable[[Array], tuple[Array, Array]]
+
+
+def chartable(scene: Scene) -> tuple[Scene, float]:
+    """The scene with a known motion over its whole horizon, without a control, and the least error that means something.
+
+    A scene without an exact solution gets one by ``with_truth``, and ends where that does.
+
+    Raises:
+        ArgumentError: if the true motion is not known for any time.
+    """
+    if scene.exact is not None and scene.until >= scene.horizon:
+        return scene, 0.0
+    floor = 0.0 if scene.exact is not None else 10.0 * MAX_DIFFERENCE
+    known = with_truth(scene)
+    if not known.until > 0.0 or known.exact is None:
+        raise ArgumentError(f"scene: the true motion of {scene.name} is not known for any time, so there is no error to chart")
+    until = min(known.horizon, known.until)
+    if scene.exact is None:
+        error = "as far from the true places or velocities as the largest true ones"
+        known = replace(known, exact=dense(known.exact, until), control=None, error=error)
+    return replace(known, horizon=until), floor
+
+
+def dense(exact: Exact, until: float) -> Exact:
+    """The same motion from 0 to ``until``, by polynomials through states that are computed once."""
+    between = np.linspace(0.0, until, 97)[1:-1] + until / 2e4
+    wanted = exact(between)
+    nodes = FIRST_NODES
+    while True:
+        found = Interpolant(*exact(np.linspace(0.0, until, nodes + 1)), until / nodes)
+        apart = max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in zip(found(between), wanted, strict=True) if b.size)
+        if apart <= MAX_INTERPOLATION_ERROR or nodes >= MAX_NODES:
+            return found
+        nodes *= 2
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolant(Value):
+    """Polynomials through equidistant states; a class, since a local function cannot be pickled with its chart.
+
+    Attributes:
+        v: velocities at the nodes, shape (nodes, *block).
+        y: coordinates there, likewise.
+        spacing: the time from one node to the next; the first is at 0.
+    """
+
+    v: Array
+    y: Array
+    spacing: float
+
+    def __call__(self, t: Array) -> tuple[Array, Array]:
+        """Both blocks at times of shape (n,), of shape (n, *block)."""
+        last = len(self.v) - 1
+        place = np.asarray(t, dtype=np.float64) / self.spacing
+        first = np.clip(np.floor(place).astype(np.int64) - (INTERPOLATION_POINTS // 2 - 1), 0, last + 1 - INTERPOLATION_POINTS)
+        u = place - first
+        found = []
+        for block in (self.v, self.y):
+            value = np.zeros((len(u), *block.shape[1:]))
+            for j in range(INTERPOLATION_POINTS):
+                others = [k for k in range(INTERPOLATION_POINTS) if k != j]
+                share = np.prod([(u - k) / (j - k) for k in others], axis=0)
+                value += share.reshape(-1, *(1,) * (block.ndim - 1)) * block[first + j]
+            found.append(value)
+        return found[0], found[1]

@@ -1,0 +1,344 @@
+"""Measurements of one method on one scene: its errors, whether it is stable, and its time."""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, ToleranceWarning, UnsupportedError
+from ...model.compatibility import fits_together
+from ...model.methods import Method
+from ...runs import engine
+from ...runs.integration import integrate
+from ...runs.result import Run
+from ...scenes import Scene
+from .data import Curve, Point, Timing
+from .peers import Peer, Solved
+
+#: Errors are looked for in at least this many states of a run, or in all if it has fewer.
+SAMPLES = 1000
+
+#: The amplitude of a run grows if the largest of its second half is above the largest of its first half by this factor,
+#: and above the exact solution's. What is large but bounded, as near a stability limit, is as large in both halves.
+MIN_GROWTH = 1.1
+
+#: Number of output times of a run with a tolerance, evenly spread, the last at the horizon. Each costs an extra step,
+#: so they are few; the errors of the run are those at these times.
+SAVED_TIMES = 10
+
+#: Extra steps for a saved state within a step: one that ends at it, and the step that passes it once more.
+EXTRA_STEPS = 2
+
+#: And it makes no more steps than this, rejected ones counted.
+MOST_TRIED = 10_000_000
+
+#: The phase error is searched from the best of so many shifts in time, evenly spaced over a period, if the state at the end is
+#: wrong by more than this.
+COARSE_SHIFTS, COARSE_SEARCH_ABOVE = 64, 0.05
+
+#: Members of the batch that is timed, on one thread: enough to hide the cost of the call, few enough for the cache.
+MEMBERS = 4096
+
+#: Step of a timed run, as a share of the scene's: so small that no method leaves the finite numbers.
+TIMED_STEP = 1e-4
+
+#: A batch that is timed has no more numbers than this in a block, so that a cluster of stars does not take minutes.
+NUMBERS = 65_536
+
+#: Tolerance of the runs with a tolerance that are timed: those of a batch, and those of one member, whose call must be lost among
+#: many steps.
+TIMED_TOLERANCE = {True: 1e-6, False: 1e-12}
+
+#: A batch with a tolerance is timed over this share of the horizon at first, doubled until it takes long enough.
+FIRST_PART = 1 / 256
+
+#: How often a peer is run at each of its settings; the median counts.
+PEER_REPEATS = 3
+
+#: A timed run takes at least this many seconds, fifty times a call's own cost, and there are so many of each method.
+TIMED_SECONDS = 0.005
+REPEATS = 11
+
+
+def refusal(scene: Scene, method: Method) -> str | None:
+    """Why the method cannot do the scene, or None."""
+    try:
+        fits_together(scene.system, method)
+        engine.evaluations(method, scene.system)
+    except UnsupportedError as error:
+        return str(error)
+    return None
+
+
+def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = False, dtype: str = "float64") -> Point:
+    """Run the scene with a fixed step and measure its errors."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DivergenceWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
+        run = scene.run(method, dt, steps=steps, every=max(1, steps // SAMPLES), fused=fused, dtype=dtype)
+    state_error, end_error, energy_error = _errors(scene, run)
+    amplitude = scene.amplitude(run)
+    half = len(amplitude) // 2
+    # Not above the exact solution is no growth: a driven system may well start small. NaN is above everything.
+    grown = not amplitude[half:].max() <= MIN_GROWTH * max(1.0, float(amplitude[:half].max()))
+    return Point(
+        steps=steps,
+        dt=dt,
+        cost=engine.evaluations(method, scene.system) / dt,
+        state_error=state_error,
+        energy_error=energy_error,
+        unstable=grown and state_error > 1.0,
+        end_error=end_error,
+        phase_error=_phase(scene, run, state_error),
+    )
+
+
+def asked(scene: Scene) -> Array:
+    """The times at which a run with a tolerance, or a peer's, saves its state."""
+    return np.linspace(0.0, scene.horizon, SAVED_TIMES + 1)[1:]
+
+
+def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool = False) -> Point:
+    """Run the scene with a tolerance and measure its errors.
+
+    Its cost includes rejected steps, and the extra steps for the state at the end, but not those for the other output times.
+    """
+    times = asked(scene)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ToleranceWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
+        motion: dict[str, Any] = {"v": scene.v, "y": scene.y, "tolerance": tolerance, "at": times} | scene.adaptive_options
+        run = integrate(scene.system, method, **motion, dt=scene.dt, max_steps=MOST_TRIED, fused=fused)
+    assert run.paces is not None
+    state_error, end_error, energy_error = _errors(scene, run)
+    tried = int(run.paces.accepted + run.paces.rejected) + EXTRA_STEPS
+    stopped = bool(run.status != 0)
+    return Point(
+        steps=tried,
+        dt=scene.horizon / tried,
+        cost=method.attempt_evaluations * tried / scene.horizon,
+        state_error=math.inf if stopped else state_error,
+        energy_error=math.inf if stopped else energy_error,
+        unstable=stopped,
+        end_error=math.inf if stopped else end_error,
+        phase_error=None if stopped else _phase(scene, run, state_error),
+        tolerance=tolerance,
+    )
+
+
+def assess_peer(scene: Scene, peer: Peer) -> Curve:
+    """Run the scene by a peer at each of its settings.
+
+    Raises:
+        UnsupportedError: if the peer cannot do the scene, or is not installed.
+    """
+    times = asked(scene)
+    points, spent = [], []
+    for setting in sorted(peer.settings, reverse=True):
+        solved = [peer.solve(scene, times, setting) for _ in range(PEER_REPEATS)]
+        ns = sorted(1e9 * each.seconds / scene.horizon for each in solved)
+        points.append(_of_peer(scene, times, solved[0], peer.by, setting))
+        spent.append(Timing(statistics.median(ns), ns[0], ns[-1]))
+    return Curve(peer, tuple(points), math.inf, Timing.unknown(), by=peer.by, times=tuple(spent))
+
+
+def _of_peer(scene: Scene, times: Array, solved: Solved, by: str, setting: float) -> Point:
+    shape = (len(times), *scene.v.shape), (len(times), *scene.y.shape)
+    v, y = (np.asarray(block, dtype=np.float64).reshape(s) for block, s in zip((solved.v, solved.y), shape, strict=True))
+    run = Run(
+        t=times,
+        v=v,
+        y=y,
+        status=np.zeros((), dtype=np.int8),
+        first_bad_step=np.asarray(-1),
+        carry=None,
+        system=scene.system,
+        method=None,  # type: ignore[arg-type]  # of no method; only its states are used
+        dt=setting,
+        t0=0.0,
+        start_step=0,
+        steps=0,
+        start=None,
+    )
+    state_error, end_error, energy_error = _errors(scene, run)
+    return Point(
+        steps=None if by == "tolerance" else round(scene.horizon / setting),
+        dt=None if by == "tolerance" else setting,
+        cost=math.nan if solved.evaluations is None else solved.evaluations / scene.horizon,
+        state_error=state_error,
+        energy_error=energy_error,
+        unstable=not math.isfinite(state_error),
+        end_error=end_error,
+        phase_error=_phase(scene, run, state_error),
+        tolerance=setting if by == "tolerance" else None,
+    )
+
+
+def _errors(scene: Scene, run: Run) -> tuple[float, float, float]:
+    """The largest state error, that at the end, and the largest energy error."""
+    state = scene.state_error(run)
+    try:
+        energy = float(scene.energy_error(run).max())
+    except UnsupportedError:  # a system without an energy of its own
+        energy = math.nan
+    return float(state.max()), float(state[-1]), energy
+
+
+def _phase(scene: Scene, run: Run, state_error: float) -> float | None:
+    """The phase error, where it means something: in a motion with a period, and a state that has a digit right."""
+    if scene.period is None or not state_error <= 1.0:
+        return None
+    return phase_error(scene, run.v[-1], run.y[-1], float(run.t[-1]))
+
+
+def phase_error(scene: Scene, v: Array, y: Array, t: float) -> float:
+    """How far a state at time t is ahead of the exact motion, in periods; behind is negative.
+
+    It is the shift s that brings exact(t + s) nearest to the state, both blocks in the scene's scales, divided by the period;
+    from −½ to ½, since a motion that is a whole period ahead looks right.
+
+    Raises:
+        ArgumentError: if the scene has no exact solution or no period.
+    """
+    if scene.exact is None or scene.period is None:
+        raise ArgumentError(f"scene: {scene.name} has no exact solution that repeats itself, so it has no phase error")
+    exact, period = scene.exact, scene.period
+
+    def states(shifts: Array) -> Array:
+        """Scaled states at these shifts, one each row."""
+        blocks = zip(exact(t + shifts), scene.scales, strict=True)
+        return np.concatenate([np.reshape(block, (len(shifts), -1)) / scale for block, scale in blocks], axis=1)
+
+    state = np.concatenate([np.ravel(block) / scale for block, scale in zip((v, y), scene.scales, strict=True)])
+    shift = 0.0
+    if np.linalg.norm(state - states(np.zeros(1))[0]) > COARSE_SEARCH_ABOVE:
+        shifts = period * (np.arange(COARSE_SHIFTS + 1) / COARSE_SHIFTS - 0.5)
+        shift = float(shifts[np.argmin(np.linalg.norm(states(shifts) - state, axis=1))])
+    # The slope is good to eight digits or so, and Gauss-Newton's steps come to rest where the residue is across it whatever
+    # its length. No step is longer than the distance of two shifts: next to a near collision the orbit is no line.
+    small, most = 1e-5 * period, period / COARSE_SHIFTS
+    for _ in range(30):
+        before, here, after = states(shift + small * np.array([-1.0, 0.0, 1.0]))
+        slope = (after - before) / (2.0 * small)
+        step = float((state - here) @ slope / (slope @ slope))
+        shift += max(-most, min(most, step))
+        if abs(step) <= 1e-15 * period:
+            break
+    return (shift / period + 0.5) % 1.0 - 0.5 if abs(shift) > 0.5 * period else shift / period
+
+
+def largest_stable_step(
+    scene: Scene, method: Method, points: Sequence[Point], fused: bool = False, dtype: str = "float64"
+) -> float:
+    """The step at which the method falls off, within 0.1 %: below it every rung of ``points`` is stable.
+
+    ``points`` go from the largest step to the smallest. Infinite if all are stable, 0 if not even the last one is.
+    """
+    ladder = [(point.dt, point.unstable) for point in points if point.dt is not None]
+    unstable = [dt for dt, wrong in ladder if wrong]
+    if not unstable:
+        return math.inf
+    high = min(unstable)
+    low = max((dt for dt, _ in ladder if dt < high), default=0.0)
+    while low > 0.0 and high > 1.001 * low:
+        middle = math.sqrt(low * high)
+        point = assess(scene, method, middle, scene.steps_for(middle), fused, dtype)
+        low, high = (low, middle) if point.unstable else (middle, high)
+    return low
+
+
+def members_of(scene: Scene) -> int:
+    """How many members of the scene are timed as a batch."""
+    return max(8, min(MEMBERS, NUMBERS // max(1, scene.v.size, scene.y.size)))
+
+
+def step_times(
+    scene: Scene, methods: Sequence[Method], members: int | None = None, fused: bool = False, dtype: str = "float64"
+) -> dict[str, Timing]:
+    """Nanoseconds per step of one member of a batch, by method.
+
+    The time of a step depends neither on its length nor on the state, so one measurement serves a whole curve. The
+    methods take turns, so that whatever else the machine does meets them all alike.
+
+    Args:
+        scene: what to step.
+        methods: by which.
+        members: of the batch; ``members_of`` the scene if None, and 0 for a run without a batch.
+        fused: with fused multiply-adds.
+        dtype: in float64 or float32.
+    """
+    v, y, members = _batch(scene, members)
+    how: Any = {"threads": 1, "fused": fused, "dtype": dtype}
+
+    def timed(method: Method, steps: int) -> tuple[float, int]:
+        begin = time.perf_counter()
+        integrate(scene.system, method, v=v, y=y, dt=TIMED_STEP * scene.dt, steps=steps, **how)
+        return time.perf_counter() - begin, steps
+
+    # A step of many bodies alone takes long enough.
+    return _in_turns(methods, timed, 50 if scene.y.size <= 16 else 1, members)
+
+
+def tried_times(scene: Scene, methods: Sequence[Method], members: int | None = None, fused: bool = False) -> dict[str, Timing]:
+    """Nanoseconds per step that is tried, of one member of a batch, by method, in runs with a tolerance; as ``step_times``."""
+    v, y, members = _batch(scene, members)
+
+    def timed(method: Method, runs: int) -> tuple[float, int]:
+        # A batch goes over a part of the horizon at first, which is enough of most.
+        part = min(1.0, runs * FIRST_PART) if members > 1 else 1.0
+        begin, tried = time.perf_counter(), 0
+        for _ in range(max(1, round(runs * FIRST_PART)) if members > 1 else runs):
+            run = integrate(
+                scene.system,
+                method,
+                v=v,
+                y=y,
+                tolerance=TIMED_TOLERANCE[members > 1],
+                at=[part * scene.horizon],
+                dt=scene.dt,
+                threads=1,
+                fused=fused,
+                **scene.adaptive_options,
+            )
+            assert run.paces is not None
+            tried += int(run.paces.evaluations.max()) // method.attempt_evaluations
+        return time.perf_counter() - begin, tried
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ToleranceWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
+        return _in_turns(methods, timed, 1, members)
+
+
+def _batch(scene: Scene, members: int | None) -> tuple[Array, Array, int]:
+    """Blocks of equal members, or without a batch axis, and how many they are."""
+    members = members_of(scene) if members is None else members
+    v, y = (np.asarray(block) for block in (scene.v, scene.y))
+    if members:
+        v, y = (np.repeat(block[..., np.newaxis], members, axis=-1) for block in (v, y))
+    return v, y, max(1, members)
+
+
+def _in_turns(
+    methods: Sequence[Method], timed: Callable[[Method, int], tuple[float, int]], least: int, members: int
+) -> dict[str, Timing]:
+    sizes = {}
+    for method in methods:
+        n = least
+        timed(method, n)  # whose step is traced and written as machine code now, and not in what is timed
+        while timed(method, n)[0] < TIMED_SECONDS:
+            n *= 2
+        sizes[method.name] = n
+    found: dict[str, list[float]] = {method.name: [] for method in methods}
+    for _ in range(REPEATS):
+        for method in methods:
+            seconds, steps = timed(method, sizes[method.name])
+            found[method.name].append(1e9 * seconds / (steps * members))
+    return {name: Timing(statistics.median(ns), min(ns), max(ns)) for name, ns in found.items()}

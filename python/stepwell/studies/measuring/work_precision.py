@@ -1,0 +1,152 @@
+"""The work-precision chart: cost and error of each method on a scene, and the step at which it becomes unstable."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from ... import _core
+from ...base import checks
+from ...base.arrays import Array
+from ...errors import ArgumentError, UnsupportedError
+from ...model.methods import Method, choice
+from ...scenes import Scene
+from ...scenes import scene as find_scene
+from . import measure
+from .data import Curve, WorkPrecision
+from .known import chartable
+from .peers import TOLERANCES, Peer, Solved
+from .peers import peer as find_peer
+
+#: The longest and the shortest step of the ladder (a geometric grid of steps), as multiples of the scene's step.
+LARGEST, SMALLEST = 16.0, 1 / 3000
+
+#: So many longer steps are added, at which even the method with the largest stability limit is unstable.
+EXTRA_RUNGS = 2
+
+#: The most steps of a run of the ladder; more would take minutes.
+MAX_STEPS = 2_000_000
+
+#: The numbers of the curves of a chart.
+DTYPES = ("float64", "float32", "both")
+
+#: For blocks of more numbers than this it is divided by the square of the ratio, as the number of pairs of bodies grows.
+SMALL_BLOCK = 16
+
+#: But it is so many times the number of steps that the scene takes: large nets are stable only near that.
+TIMES_THE_SCENE = 10.0
+
+#: Steps of the ladder per factor of ten.
+RUNGS_PER_DECADE = 10
+
+
+def work_precision(
+    scene: Scene | str,
+    methods: Iterable[Method | str] | None = None,
+    steps: Iterable[int] | None = None,
+    *,
+    tolerances: Iterable[float] | None = None,
+    peers: Iterable[Peer | Callable[[Scene, Array, float], Solved]] = (),
+    fused: bool | str = False,
+    dtype: str = "float64",
+    progress: Callable[[float], object] | None = None,
+) -> WorkPrecision:
+    """Run a scene by many methods with many steps and tolerances, and measure errors, stability and cost.
+
+    Each point is a run over the scene's horizon. Its errors are the largest of the run, that at the end, the phase error at
+    the end and the energy error. Cost is counted in function (rate) evaluations per unit of simulated time. It is also measured,
+    for a single run and for a batch of equal members, on one thread. Everything but the times is repeatable to the bit.
+
+    A scene without an exact solution is compared with a run to a tight tolerance, as long as a less tight one agrees with
+    it; the horizon ends there. A scene's control is left out, since the true motion has none.
+
+    Args:
+        scene: a ``Scene``, or the name of one.
+        methods: names, or what ``stepwell.method`` returns; all if None.
+        steps: numbers of steps over the horizon, each 4 or more; if None, ten in each factor of ten, from steps of 24
+            times the scene's down to a 3000th of it, or to two million steps.
+        tolerances: for a second curve, "merson, tolerance", of each method that estimates its error; if None, 1e-2 to
+            1e-12, two in each factor of ten; no such curves if empty, or if the system has friction. Such a run saves its
+            state at ten times.
+        peers: other programs, such as ``peers.scipy("DOP853")``; see ``stepwell.charts.peers``.
+        fused: compute with fused multiply-adds; ``"both"`` for a curve of each, "rk4" and "rk4, fused". A scene whose step is too
+            long to be fused is refused.
+        dtype: ``"float64"``, ``"float32"``, or ``"both"`` for a curve of each, "rk4" and "rk4, float32". Curves by tolerance are
+            computed in float64. A scene that float32 does not go with is refused.
+        progress: is called with the fraction that is done.
+
+    Returns:
+        A ``WorkPrecision``. Methods that cannot step the system are in its ``refused``, with the reason.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: if a peer is not installed.
+
+    Example:
+        >>> chart = sw.charts.work_precision("oscillator", ["leapfrog", "rk4"], [500, 1000, 2000], tolerances=[])
+        >>> [curve.method.name for curve in chart.curves]
+        ['leapfrog', 'rk4']
+    """
+    whole, chosen = find_scene(scene), choice(methods)
+    numbers = None
+    if steps is not None:
+        numbers = sorted({checks.count("steps", n, 4) for n in checks.several("steps", steps, "numbers of steps")})
+        if not numbers:
+            raise ArgumentError("steps: expected at least one, got none")
+    given = TOLERANCES if tolerances is None else checks.several("tolerances", tolerances, "tolerances")
+    asked = sorted({checks.number("tolerances", each, positive=True) for each in given}, reverse=True)
+    others = [find_peer(each) for each in checks.several("peers", peers, "peers")]
+    ways = (False, True) if isinstance(fused, str) and checks.known("fused", fused, ("both",)) else (checks.flag("fused", fused),)
+    dtypes = [name for name in ("float64", "float32") if checks.known("dtype", dtype, DTYPES) in (name, "both")]
+    progress = checks.callback("progress", progress)
+    scene, floor = chartable(whole)
+    ladder = _ladder(scene) if numbers is None else numbers
+
+    reasons = {method.name: measure.refusal(scene, method) for method in chosen}
+    refused = {name: reason for name, reason in reasons.items() if reason is not None}
+    able = [method for method in chosen if reasons[method.name] is None]
+    paced = asked and scene.system.rubbing is None and not scene.system.contacts  # adaptive steps do not go with these
+    adaptive = [method for method in able if method.error_order is not None and not method.has_series and paced]
+    curves: list[Curve] = []
+
+    def done() -> None:
+        if progress is not None:
+            in_all = len(ways) * (len(dtypes) * len(able) + len(adaptive)) + len(others)
+            progress((len(curves) + len(refused) - len(chosen) + len(able)) / in_all)
+
+    for kind, way in itertools.product(dtypes, ways):
+        batch, single = (measure.step_times(scene, able, members, way, kind) for members in (None, 0))
+        for method in able:
+            points = tuple(measure.assess(scene, method, scene.horizon / n, n, way, kind) for n in ladder)
+            edge = measure.largest_stable_step(scene, method, points, way, kind)
+            curves.append(Curve(method, points, edge, batch[method.name], single[method.name], fused=way, dtype=kind))
+            done()
+    for way in ways:
+        batch, single = measure.tried_times(scene, adaptive, None, way), measure.tried_times(scene, adaptive, 0, way)
+        for method in adaptive:
+            points = tuple(measure.assess_tolerance(scene, method, tolerance, way) for tolerance in asked)
+            times = batch[method.name], single[method.name]
+            curves.append(Curve(method, points, math.inf, *times, by="tolerance", fused=way))
+            done()
+    for peer in others:
+        try:
+            curves.append(measure.assess_peer(scene, peer))
+        except UnsupportedError as error:
+            refused[peer.name] = str(error)
+        done()
+    cut = scene.horizon < whole.horizon
+    return WorkPrecision(scene, tuple(curves), refused, measure.members_of(scene), measure.REPEATS, _core.isa(), floor, cut)
+
+
+def _ladder(scene: Scene) -> list[int]:
+    """Numbers of steps, evenly spread on a logarithmic scale."""
+    usual = scene.horizon / scene.dt
+    most = MAX_STEPS * min(1.0, SMALL_BLOCK / max(1, scene.y.size)) ** 2
+    few, many = usual / LARGEST, min(max(most, TIMES_THE_SCENE * usual), MAX_STEPS, usual / SMALLEST)
+    few = max(4.0, few)
+    gaps = round(RUNGS_PER_DECADE * np.log10(many / few))
+    rungs = few * (many / few) ** (np.arange(-EXTRA_RUNGS, gaps + 1) / gaps)
+    return sorted({round(n) for n in rungs.tolist() if n >= 4.0})

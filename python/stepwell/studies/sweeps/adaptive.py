@@ -1,0 +1,175 @@
+"""Sweeps with a tolerance: their arguments, the function evaluations of each member, and which members stopped, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array
+from ...errors import ArgumentError, ShapeError, UnsupportedError
+from ...model.methods import Method
+from ...runs.adaptive import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
+from ...runs.engine import PACE_NUMBERS
+from ...runs.request import goes_with_times
+from ...runs.result import Run, Status
+from ...runs.stops import WHY_STOPPED
+from .axes import Grid
+from .exponents import Exponents
+from .observed import Piece
+from .outcomes import Found, Outcome, Reduction, Variable
+
+#: A member takes so many numbers for the step-size controller while it is computed: before, after, and as it is handed over.
+NUMBERS_OF_A_CONTROLLER = 4 * PACE_NUMBERS
+
+
+class Evaluations(Outcome):
+    """What a member cost, with a tolerance: ``evaluations``, ``accepted_steps``, ``rejected_steps``.
+
+    Those of ``run.paces``: function (rate) evaluations of accepted and rejected steps, and of the extra steps for the times of
+    ``at``.
+
+    Example:
+        >>> axes = {"omega": ("omega", [1.0, 10.0])}
+        >>> found = sw.sweep(sw.Oscillator, axes, "dop853", v=0.0, y=1.0, tolerance=1e-9, at=[10.0], outcomes="evaluations")
+        >>> bool(found.evaluations[1] > 5 * found.evaluations[0])
+        True
+    """
+
+    observes = False
+
+    def begin(self) -> Reduction:
+        """A new reduction."""
+        return _Evaluations()
+
+
+class _Evaluations(Reduction):
+    def see(self, piece: Piece) -> None:
+        self.run = piece.run
+
+    def found(self) -> Found:
+        paces = self.run.paces
+        assert paces is not None
+        return {
+            "evaluations": Variable((), np.array(paces.evaluations), "function evaluations"),
+            "accepted_steps": Variable((), np.array(paces.accepted), "number of accepted steps"),
+            "rejected_steps": Variable((), np.array(paces.rejected), "number of rejected steps"),
+        }
+
+
+def arguments(
+    grid: Grid,
+    method: Method,
+    tolerance: Any,
+    at: Any,
+    options: Mapping[str, Any],
+    fixed: Mapping[str, Any],
+    outcomes: Iterable[Outcome],
+) -> tuple[dict[str, Any], Array]:
+    """Further arguments of ``integrate``, and the times.
+
+    Args:
+        grid: the members.
+        method: by which they are computed.
+        tolerance: as the user gave it; None if it is an axis.
+        at: as the user gave it.
+        options: what goes with a tolerance only, by name; None if it was not given.
+        fixed: what goes with fixed steps only, by name; None if it was not given.
+        outcomes: what is kept.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: what is not defined with a tolerance.
+    """
+    if wrong := [name for name, value in fixed.items() if value is not None]:
+        raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
+    varied = {axis.argument: axis for axis in grid.axes}
+    if "dt" in varied:
+        raise ArgumentError(
+            "axes: dt: with a tolerance, dt is the step to try first and nothing else; leave it out, or give one for all by dt="
+        )
+    if "force" in varied:
+        raise ArgumentError("axes: force: goes with fixed steps only, and tolerance= or at= was given")
+    if "tolerance" in varied:
+        axis = varied["tolerance"]
+        if axis.own:
+            raise ArgumentError(f"axes: tolerance: expected one number for each member, got shape {axis.values.shape}")
+        order_of_series(method, axis.values)
+    goes_with_times(tolerance is not None or "tolerance" in varied, at)
+    times = np.atleast_1d(checks.numbers("at", at, unit="units of time"))
+    if times.ndim > 1:
+        raise ShapeError(f"at: expected times along one axis, the same for all members, got shape {times.shape}")
+    _fits_outcomes(outcomes, times)
+    given = {} if tolerance is None else {"tolerance": _one_for_all(tolerance)}
+    if options["max_steps"] is not None:
+        given["max_steps"] = checks.count("max_steps", options["max_steps"], 1)
+    if options["max_step"] is not None:
+        given["max_step"] = checks.number("max_step", options["max_step"], positive=True, unit="units of time")
+    if options["jumps"] is not None:
+        given["jumps"] = jumps = np.atleast_1d(checks.numbers("jumps", options["jumps"], unit="units of time"))
+        if jumps.ndim > 1:
+            raise ShapeError(f"jumps: expected times along one axis, the same for all members, got shape {jumps.shape}")
+    if options["positive"] is not None:
+        given["positive"] = options["positive"]
+    return given, times
+
+
+def _one_for_all(tolerance: Any) -> Any:
+    """A tolerance, or a pair of them, of numbers and not of arrays."""
+    parts = tolerance if isinstance(tolerance, tuple) else (tolerance,)
+    numbers = [checks.numbers("tolerance", each, positive=True) for each in parts]
+    if (isinstance(tolerance, tuple) and len(parts) != 2) or any(each.ndim for each in numbers):
+        raise ShapeError(
+            f"tolerance: expected a number, or a pair (relative, absolute), the same for all members, got "
+            f"{checks.short(tolerance)}; if it varies, it is an axis"
+        )
+    found = tuple(float(each) for each in numbers)
+    return found if isinstance(tolerance, tuple) else found[0]
+
+
+def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
+    for each in outcomes:
+        name = type(each).__name__
+        if isinstance(each, Exponents) and each.transient >= times.size:
+            raise ArgumentError(f"transient: expected fewer intervals than at has times, {times.size}, got {each.transient}")
+        if each.observes and times.size < 2:
+            raise ArgumentError(
+                f"at: expected two or more times, since with a tolerance {name} sees the states at these times and no others, "
+                f"got {times.tolist()}"
+            )
+
+
+def refuse_fixed(outcomes: Iterable[Outcome], options: Mapping[str, Any]) -> None:
+    """Raise if something was given that goes with a tolerance only."""
+    if options["max_steps"] is not None:
+        raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
+    if wrong := [name for name, value in options.items() if value is not None]:
+        raise ArgumentError(f"{', '.join(wrong)}: goes with tolerance= and at= only; steps of fixed length are dt long")
+    if any(isinstance(each, Evaluations) for each in outcomes):
+        raise UnsupportedError(
+            "outcomes: Evaluations: with fixed steps every member has the same number, method(…).evaluations a step; it goes "
+            "with tolerance= and at="
+        )
+
+
+def lost(run: Run) -> int:
+    """How many members have an absolute tolerance so large that the motion is lost in it."""
+    if run.stand is None:
+        return 0
+    groups = len(run.stand.pace) - PACE_NUMBERS
+    return int(np.count_nonzero(lost_in_tolerance(run.stand.pace, groups)))
+
+
+def why(status: int) -> str:
+    """Why a member stopped, in words."""
+    hint = "; a run of that member alone tells the cause" if status == Status.UNDERFLOW else ""
+    return f"{WHY_STOPPED[Status(status)]}{hint}"
+
+
+#: What is told of members that are lost in the absolute tolerance.
+LOST = (
+    f"tolerance: for {{lost}} of {{members}} the absolute part lets a step err by more than {MAX_ABSOLUTE_SHARE:g} of the "
+    f"longest that v or y has been; give one number, which goes by these lengths, or a smaller absolute part"
+)

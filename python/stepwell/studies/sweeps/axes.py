@@ -1,0 +1,197 @@
+"""What is varied: arguments by name, each with the dimension along which its values lie, and the grid of all members."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array, Shape
+from ...errors import ArgumentError, DTypeError, ShapeError
+
+#: Arguments of ``integrate`` that can be axes. All other names are those of parameters of the system.
+OF_THE_RUN = ("v", "y", "dt", "force", "tolerance")
+
+
+class Axis(NamedTuple):
+    """The values of one argument.
+
+    Attributes:
+        argument: its name.
+        dims: names of the dimensions along which it varies.
+        values: shape (*own axes of the argument, *sizes of the dimensions).
+        attrs: what is told of it, such as its units.
+    """
+
+    argument: str
+    dims: tuple[str, ...]
+    values: Array
+    attrs: dict[str, Any]
+
+    @property
+    def own(self) -> int:
+        """How many axes of its own the argument has."""
+        return self.values.ndim - len(self.dims)
+
+
+class Chunk(NamedTuple):
+    """Members that are computed together: a piece of the grid, whose members follow each other.
+
+    Attributes:
+        place: which chunk along each dimension.
+        slices: of each dimension.
+        shape: how many members along each dimension.
+        first: number of its first member.
+    """
+
+    place: Shape
+    slices: tuple[slice, ...]
+    shape: Shape
+    first: int
+
+    @property
+    def members(self) -> int:
+        """How many."""
+        return prod(self.shape)
+
+
+class Grid:
+    """All members of a sweep: the product of its dimensions.
+
+    Members are numbered with the last dimension fastest. Dimensions of ``dt`` come first, so that members of one step follow each
+    other: a run has one step.
+
+    Attributes:
+        axes: what is varied.
+        dims: names of the dimensions.
+        shape: their sizes.
+    """
+
+    def __init__(self, axes: list[Axis]) -> None:
+        self.axes = axes
+        sizes: dict[str, int] = {}
+        given_by: dict[str, str] = {}
+        for axis in sorted(axes, key=lambda axis: axis.argument != "dt"):
+            for dim, size in zip(axis.dims, axis.values.shape[axis.own :], strict=True):
+                if sizes.setdefault(dim, size) != size:
+                    raise ShapeError(
+                        f"axes: expected as many values of {axis.argument} as of {given_by[dim]}, since both vary along the "
+                        f"dimension {dim!r}, got {size} and {sizes[dim]}"
+                    )
+                given_by.setdefault(dim, axis.argument)
+        self.dims, self.shape = tuple(sizes), tuple(sizes.values())
+        #: How many of the first dimensions ``dt`` varies along.
+        self.of_dt = next((len(axis.dims) for axis in axes if axis.argument == "dt"), 0)
+
+    @property
+    def members(self) -> int:
+        """How many."""
+        return prod(self.shape)
+
+    def chunk_shape(self, most: int) -> Shape:
+        """The shape of chunks of at most so many members (and of at least one), of about equal size.
+
+        A chunk is whole along the last dimensions, so its members follow each other, and one wide along the first, so each is of
+        one ``dt``.
+        """
+        shape, room = [1] * len(self.shape), max(1, most)
+        for i in range(len(self.shape) - 1, self.of_dt - 1, -1):
+            size = self.shape[i]
+            parts = -(-size // min(size, room))
+            shape[i] = -(-size // parts)
+            if parts > 1:
+                break
+            room //= size
+        return tuple(shape)
+
+    def chunks(self, shape: Shape) -> Iterator[Chunk]:
+        """All members in chunks of that shape, in their order; those at an end may be smaller."""
+        counts = [-(-size // width) for size, width in zip(self.shape, shape, strict=True)]
+        first = 0
+        for place in np.ndindex(*counts):
+            bounds = [(i * width, min((i + 1) * width, size)) for i, width, size in zip(place, shape, self.shape, strict=True)]
+            chunk = Chunk(place, tuple(slice(*each) for each in bounds), tuple(b - a for a, b in bounds), first)
+            yield chunk
+            first += chunk.members
+
+    def values(self, chunk: Chunk) -> dict[str, Any]:
+        """The arguments of the members of a chunk, shape (*own axes, members); ``dt`` is one number."""
+        found: dict[str, Any] = {}
+        for axis in self.axes:
+            own = axis.values.shape[: axis.own]
+            order = sorted(range(len(axis.dims)), key=lambda i: self.dims.index(axis.dims[i]))
+            values = axis.values.transpose([*range(axis.own), *(axis.own + i for i in order)])
+            there = [self.dims.index(axis.dims[i]) for i in order]
+            slices: Any = (..., *(chunk.slices[i] for i in there))
+            values = values[slices]
+            widths = [chunk.shape[i] if i in there else 1 for i in range(len(self.dims))]
+            values = np.broadcast_to(values.reshape(*own, *widths), (*own, *chunk.shape)).reshape(*own, chunk.members)
+            found[axis.argument] = float(values[0]) if axis.argument == "dt" else np.ascontiguousarray(values)
+        return found
+
+    def place(self, member: int) -> str:
+        """Where a member is, in words: the values that the dimensions have there."""
+        index = dict(zip(self.dims, np.unravel_index(member, self.shape), strict=True))
+        told = []
+        for axis in self.axes:
+            if axis.own == 0:
+                value = axis.values[tuple(index[dim] for dim in axis.dims)]
+                told.append(f"{axis.argument} = {value:.6g}")
+        return ", ".join(told) or f"member {member}"
+
+
+def grid(axes: Any) -> Grid:
+    """What is varied, from what the user gave.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+    """
+    if not isinstance(axes, Mapping):
+        raise DTypeError(
+            f"axes: expected a dictionary of arguments by name, such as {{'mu': ('mu', values)}}, got {type(axes).__name__}"
+        )
+    if not axes:
+        raise ArgumentError("axes: expected at least one, such as {'mu': ('mu', values)}, got none; for one run use integrate")
+    return Grid([_axis(name, value) for name, value in axes.items()])
+
+
+def _axis(name: Any, given: Any) -> Axis:
+    if not isinstance(name, str) or not name.isidentifier():
+        raise ArgumentError(f"axes: expected names of arguments, got {checks.short(name)}")
+    argument, attrs = f"axes: {name}", {}
+    if hasattr(given, "dims") and hasattr(given, "values"):  # of xarray
+        dims, values, attrs = given.dims, given.values, dict(given.attrs)
+    elif isinstance(given, tuple) and given and (isinstance(given[0], str) or _words(given[0])):
+        if len(given) not in (2, 3):
+            raise ShapeError(
+                f"{argument}: expected (dimension, values) or (dimension, values, attributes), got {len(given)} parts"
+            )
+        dims, values, *more = given
+        if more:
+            if not isinstance(more[0], Mapping):
+                raise DTypeError(
+                    f"{argument}: expected attributes by name, such as {{'units': 's'}}, got {checks.short(more[0])}"
+                )
+            attrs = dict(more[0])
+    else:
+        dims, values = name, given
+    dims = (dims,) if isinstance(dims, str) else tuple(dims)
+    numbers = checks.numbers(argument, values, positive=name in ("dt", "tolerance"))
+    if len(set(dims)) < len(dims) or not all(isinstance(dim, str) and dim for dim in dims):
+        raise ArgumentError(f"{argument}: expected different names of dimensions, got {checks.short(dims)}")
+    if numbers.ndim < len(dims):
+        raise ShapeError(
+            f"{argument}: expected values along {', '.join(map(repr, dims))}, the last of their axes, got shape {numbers.shape}"
+        )
+    if 0 in numbers.shape:
+        raise ShapeError(f"{argument}: expected at least one value, got shape {numbers.shape}")
+    if name == "dt" and numbers.ndim > len(dims):
+        raise ShapeError(f"{argument}: expected one number for each member, got shape {numbers.shape}")
+    return Axis(name, dims, numbers, attrs)
+
+
+def _words(value: Any) -> bool:
+    return isinstance(value, (tuple, list)) and bool(value) and all(isinstance(each, str) for each in value)

@@ -1,0 +1,124 @@
+"""What a sweep tells of itself: the attributes of its result, and what makes one sweep another than the next."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from hashlib import blake2b
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...base.reprs import counted
+from ...model.methods import method as find_method
+from ...model.systems import System
+from ...runs.events import Event
+from .axes import Grid
+from .layout import Layout, coordinates
+from .outcomes import History, Outcome
+from .stores import SWEEP
+from .task import Task
+
+
+def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str, str]) -> Layout:
+    """How the results of a task are laid out, and what is told of it.
+
+    Args:
+        task: what is done with every chunk.
+        grid: the members.
+        system: that of the first member.
+        bits: a hash of the first steps.
+        units: words by name.
+    """
+    coords = coordinates(grid, units)
+    renamed = {"t": "saved"} if grid.of_dt else {}
+    if task.kinds(History):
+        coords["t"] = _times(task, grid, renamed, units)
+    told: dict[str, Any] = {
+        "stepwell": str(_core.__version__),
+        "system": system.kind_name,
+        "method": task.method,
+        "steps": task.steps,
+        "transient": task.transient,
+        "observe": task.observe,
+        "every": task.every,
+        "outcomes": [_told(each) for each in task.outcomes],
+        "axes": {axis.argument: f"along {', '.join(axis.dims)}: {_digest(axis.values)}" for axis in grid.axes},
+        "given": {name: _digest(value) for name, value in task.given.items() if name != "threads"},
+        "first steps": bits,
+    }
+    if "events" in task.given:
+        told["given"]["events"] = [_told(each) for each in task.given["events"]]
+    if task.at is not None:
+        told["at"] = _digest(task.at)
+    attrs: dict[str, Any] = {
+        "title": f"{system.kind_name} by {find_method(task.method).title}: a sweep of {counted(grid.members, 'member')}",
+        "stepwell_version": str(_core.__version__),
+        "numpy_version": np.__version__,
+        "system": repr(task.system) if isinstance(task.system, System) else system.kind_name,
+        "method": task.method,
+        **_steps_told(task, grid),
+        "t0": task.given["t0"],
+        "fused": int(task.given["fused"]),
+        **({"dtype": "float32"} if task.single else {}),
+        **({} if task.every is None else {"every": task.every}),
+        **({"control": repr(task.given["control"])} if "control" in task.given else {}),
+        SWEEP: json.dumps(told, ensure_ascii=False),
+    }
+    return Layout(grid, coords, attrs, units, renamed)
+
+
+def _steps_told(task: Task, grid: Grid) -> dict[str, Any]:
+    """How long the steps are, and how many."""
+    if task.at is None:
+        dt = {} if grid.of_dt else {"dt": task.given["dt"]}
+        return {**dt, "steps": task.steps, "transient": task.transient, "observe": task.observe}
+    told: dict[str, Any] = {name: task.given[name] for name in ("dt", "max_steps") if name in task.given}
+    if (tolerance := task.given.get("tolerance")) is not None:
+        told["tolerance"] = repr(tolerance) if isinstance(tolerance, tuple) else float(tolerance)
+    return told | {"end": float(task.at[-1])}
+
+
+def _times(
+    task: Task, grid: Grid, renamed: dict[str, str], units: dict[str, str]
+) -> tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, Any]]:
+    """Times of the states of a history, by the formula of the core: t0 + k·dt."""
+    attrs = {"long_name": "time", **({"units": units["t"]} if "t" in units else {})}
+    if task.at is not None:
+        return ("t",), task.at, attrs
+    every = task.every or task.steps
+    k = task.transient + np.append(np.arange(0, task.steps, every), task.steps).astype(np.float64)
+    if not grid.of_dt:
+        return ("t",), task.given["t0"] + k * task.rounded(np.asarray(task.given["dt"])), attrs
+    axis = next(axis for axis in grid.axes if axis.argument == "dt")
+    return (*axis.dims, renamed["t"]), task.given["t0"] + k * task.rounded(axis.values)[..., np.newaxis], attrs
+
+
+def _digest(value: Any) -> str:
+    """A value in words: a number as it is, an array by its hash."""
+    if isinstance(value, (str, bool, int, float, type(None))):
+        return repr(value)
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return repr(value)
+    return f"{array.shape} {blake2b(np.ascontiguousarray(array).tobytes(), digest_size=8).hexdigest()}"
+
+
+def _told(value: Any) -> Any:
+    """An outcome in words that are the same in every process; a function by its name and its instructions."""
+    if isinstance(value, Event):
+        return {name: _told(part) for name, part in vars(value).items()}
+    if isinstance(value, Outcome):
+        return {"kind": type(value).__name__, **{name: _told(each) for name, each in vars(value).items()}}
+    if isinstance(value, partial):
+        return [_told(value.func), repr(value.args), repr(value.keywords)]
+    code = getattr(value, "__code__", None)
+    if code is not None:
+        plain = [each for each in code.co_consts if not hasattr(each, "co_code")]
+        digest = blake2b(code.co_code + repr((code.co_names, plain)).encode(), digest_size=8)
+        return f"{value.__qualname__} {digest.hexdigest()}"
+    if callable(value):
+        return getattr(value, "__qualname__", type(value).__qualname__)
+    return [_told(each) for each in value] if isinstance(value, tuple) else value

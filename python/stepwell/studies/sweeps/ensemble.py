@@ -1,0 +1,398 @@
+"""``sweep``: an ensemble of runs, and what is kept of each, as a labelled array."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
+from hashlib import blake2b
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...analysis.growth import Growth
+from ...base import checks
+from ...base.reprs import counted
+from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, ToleranceWarning, UnsupportedError
+from ...model.methods import Method
+from ...model.methods import method as find_method
+from ...model.systems import System
+from ...runs import float32
+from . import adaptive, happenings
+from .adaptive import Evaluations
+from .axes import OF_THE_RUN, Chunk, Grid
+from .axes import grid as a_grid
+from .crossings import Crossing, Period
+from .description import layout_of
+from .engines import Engine
+from .exponents import Exponents
+from .extras import need
+from .layout import named_units
+from .outcomes import Extremes, Function, History, Last, Mean, Outcome
+from .stores import Memory, Zarr, store_of
+from .task import Done, Task, probed
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ...model.controls import AnyControl
+
+#: Outcomes by word.
+WORDS: dict[str, type[Outcome]] = {
+    "last": Last,
+    "extremes": Extremes,
+    "mean": Mean,
+    "crossing": Crossing,
+    "period": Period,
+    "lyapunov": Exponents,
+    "evaluations": Evaluations,
+    "history": History,
+}
+#: Default of ``memory``, in bytes.
+MEMORY = 64 * 2**20
+#: Most members of a chunk by default: enough that a call costs little beside their steps.
+MAX_MEMBERS = 1 << 14
+#: Likewise with a tolerance, where a chunk is made in pieces between the times of ``at`` only, so that Ctrl-C waits for it.
+MAX_ADAPTIVE_MEMBERS = 1 << 11
+#: Members are divided into so many chunks for each worker, or more, as long as each has so many members.
+CHUNKS_OF_A_WORKER, MIN_MEMBERS = 4, 256
+
+
+def sweep(
+    system: System | Callable[..., System],
+    axes: Mapping[str, Any],
+    method: str | Method,
+    *,
+    v: Any = None,
+    y: Any = None,
+    dt: float | None = None,
+    steps: int | None = None,
+    transient: int | None = None,
+    outcomes: Any = None,
+    every: int | None = None,
+    observe: int | None = None,
+    tolerance: Any = None,
+    at: Any = None,
+    max_steps: int | None = None,
+    max_step: float | None = None,
+    jumps: Any = None,
+    positive: Any = None,
+    control: AnyControl | None = None,
+    force: Any = None,
+    events: Any = None,
+    fused: bool = False,
+    dtype: Any = "float64",
+    t0: float = 0.0,
+    start: str | None = None,
+    units: Mapping[str, str] | None = None,
+    store: Any = None,
+    engine: Any = None,
+    threads: int | None = None,
+    chunk: int | None = None,
+    memory: float = MEMORY,
+    progress: bool = False,
+) -> xarray.Dataset:
+    """Run an ensemble, and keep of each member what was asked for, in an array with named dimensions.
+
+    Members are computed in chunks, on all cores, in other processes or on a cluster. What is found of a member is the same to the
+    last bit on every engine and in every division into chunks. Trajectories are reduced while they are computed and are not
+    stored, unless ``"history"`` asks for them. Steps are fixed, by ``dt`` and ``steps``, or adaptive, by ``tolerance`` and
+    ``at``. Needs ``pip install "stepwell[sweep]"``.
+
+    Args:
+        system: a system; or what makes one of parameters by name: a class such as ``Oscillator``, your own equations, a function,
+            or ``functools.partial`` of any of them.
+        axes: what varies, by the name of the argument: a parameter of the system, or ``y``, ``v``, ``dt``, ``force`` or
+            ``tolerance``. Each is (dimension, values) or (dimension, values, attributes), as in xarray, or values alone, whose
+            dimension has the name of the argument. Those of one dimension vary together; different dimensions are multiplied.
+            The dimension is the last axis of the values; axes before it are those of the argument. ``stepwell.sweeps.random``
+            and ``sobol`` make samples.
+        method: its name, or what ``stepwell.method`` returns.
+        v: velocity block at the start, the same for all members.
+        y: coordinate block at the start, likewise.
+        dt: the step, in units of time, above zero; with a tolerance the step to try first, or None.
+        steps: number of steps that are observed, one or more.
+        transient: number of steps before those, of which nothing is kept; none if None.
+        outcomes: what to keep of each member, one or a list: "last", "extremes", "mean", "crossing", "period", "lyapunov",
+            "evaluations", "history"; the classes of ``stepwell.sweeps`` of these names, with arguments; or a function of the
+            ``Run`` of a chunk. "last" if None, or with ``every``, "history". How a member ended, ``status`` and
+            ``first_bad_step``, is always kept.
+        every: steps between the states of a history, or of the runs that functions are given.
+        observe: steps between the states that reductions see; every one if None. What happens in between is not seen.
+        tolerance: in place of ``steps``, for adaptive steps of each member: a number, or a pair (relative, absolute), as for
+            ``integrate``. An axis of this name has the relative ones.
+        at: with a tolerance, the times whose states are observed: the last is that of "last", a history has all of them, and
+            reductions see the states at these times and no others. Not with ``transient``, ``every`` or ``observe``.
+        max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
+        max_step: with a tolerance, the longest step, in units of time.
+        jumps: with a tolerance, times that no step crosses, shape (jumps,): as for ``integrate``, the same for all members.
+        positive: with a tolerance, the components that must not become negative, as for ``integrate``.
+        control: as for ``integrate``, the same for all members.
+        force: likewise.
+        events: what is located of each member, as for ``integrate``; an event may stop a member, or change its state. Of an event
+            ``ground`` there are ``ground_count``, how many there were, and ``ground_t``, the time of the first, NaN without one;
+            ``stopped_at`` is when an event stopped a member. All states that reductions see are then in memory at once. Not with
+            ``transient`` or "lyapunov".
+        fused: likewise.
+        dtype: ``"float64"`` or ``"float32"``, in which steps are made, as for ``integrate``. In float32 states are float32 and
+            what is found of them is computed in float64; a dt is rounded to float32. With fixed steps only.
+        t0: time of step 0.
+        start: likewise.
+        units: words for "t", "v", "y", parameters and results, by name; they become attributes.
+        store: a path ending in .zarr or .nc. Every finished chunk is written there, and a sweep that was interrupted goes on
+            where it stopped when it is called again. Then the results need not fit in memory. None for memory.
+        engine: None for threads of this process, an ``Executor`` of ``concurrent.futures``, or a ``dask.distributed.Client``.
+        threads: how many threads, without an engine; None for as many as there are cores.
+        chunk: most members of a chunk; None for as many as ``memory`` allows, up to 16384.
+        memory: how many bytes a chunk may take while it is computed. As many chunks are computed at once as there are workers.
+        progress: show a progress bar, in a terminal or in a notebook.
+
+    Returns:
+        An ``xarray.Dataset``. Its attributes say how it was made; ``bits`` is a hash of all results.
+
+    Raises:
+        ArgumentError: before any work: what was given and what was expected.
+        UnsupportedError: if the method cannot do the system, if float32 does not go with what is asked for, or a package is
+            missing.
+        KeyboardInterrupt: at Ctrl-C. The store has all chunks that were finished.
+
+    Warns:
+        DivergenceWarning: how many members left the finite range, and which first. The others are not affected.
+        ToleranceWarning: how many members stopped before the last time, which first, and why; or that an absolute tolerance is
+            so large that the motion is lost in it.
+        AccuracyWarning: if numbers are finite and mean nothing: how many members grew a million times by fixed steps that are
+            beyond the stability limit, and which first; or a pendulum turned so far that its angle has no sine. Encounters of
+            bodies are not searched for here.
+
+    Example:
+        >>> axes = {"omega": ("omega", [1.0, 2.0, 4.0]), "y": ("y0", [0.5, 1.0])}
+        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, dt=0.01, steps=1000, outcomes=["extremes", "period"])
+        >>> found.y_period.dims, found.y_period.sel(omega=2.0).values.round(6)
+        (('omega', 'y0'), array([3.141593, 3.141593]))
+    """
+    need("xarray")
+    grid, how, named = a_grid(axes), find_method(method), named_units(units)
+    paced = tolerance is not None or at is not None or any(axis.argument == "tolerance" for axis in grid.axes)
+    fixed = {"v": v, "y": y, "dt": dt, "force": force, "tolerance": tolerance}
+    _fits_axes(system, {axis.argument for axis in grid.axes}, fixed, ("y",) if paced else ("y", "dt"))
+    if dt is not None:
+        fixed["dt"] = checks.number("dt", dt, positive=True, unit="units of time")
+    given = {name: value for name, value in fixed.items() if value is not None}
+    given |= {"t0": checks.number("t0", t0, unit="units of time"), "fused": checks.flag("fused", fused), "threads": 1}
+    given |= {name: value for name, value in (("control", control), ("start", start)) if value is not None}
+    if checks.is_single(dtype):
+        _fits_single(grid, paced)
+        given["dtype"] = "float32"
+    every = None if every is None else checks.count("every", every, 1)
+    kept_of_each = _outcomes(outcomes, every)
+    if events is not None:
+        located = happenings.events_of(events, kept_of_each, transient)
+        given["events"], kept_of_each = list(located), (*kept_of_each, happenings.Happenings(located))
+    times = None
+    if paced:
+        others = {"steps": steps, "transient": transient, "every": every, "observe": observe, "start": start, "force": force}
+        options = {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive}
+        more, times = adaptive.arguments(grid, how, tolerance, at, options, others, kept_of_each)
+        given |= more
+    else:
+        adaptive.refuse_fixed(kept_of_each, {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive})
+        if steps is None:
+            raise ArgumentError("steps: expected with fixed steps; or give tolerance= and at= for adaptive steps")
+    task = Task(
+        system=system,
+        method=how.name,
+        given=given,
+        transient=0 if transient is None else checks.count("transient", transient, 0),
+        steps=0 if steps is None else checks.count("steps", steps, 1),
+        observe=1 if observe is None else checks.count("observe", observe, 1),
+        every=every,
+        outcomes=kept_of_each,
+        memory=checks.number("memory", memory, positive=True, unit="bytes"),
+        at=times,
+    )
+    first, bits, names = _probe(task, grid)
+    workers = Engine(engine, threads)
+    shape = grid.chunk_shape(_members(task, first, grid, workers.workers, chunk))
+    layout = layout_of(task, grid, first, bits, named)
+    if taken := sorted(names & {*layout.coords, *grid.dims}):
+        raise ArgumentError(
+            f'axes: {taken[0]!r} is the name of a result; give the dimension another name, as ("run", values), or '
+            f"the outcome one by name="
+        )
+    where = store_of(store)
+    kept = Memory(layout, shape) if where is None else where[0](where[1], layout, shape)
+    _compute(task, grid, workers, kept, checks.flag("progress", progress))
+    dataset: xarray.Dataset = kept.finish()
+    return dataset
+
+
+def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any], needed: tuple[str, ...]) -> None:
+    """Raise if an argument is given twice or not at all, or a parameter is of nothing."""
+    if both := [name for name, value in fixed.items() if value is not None and name in varied]:
+        raise ArgumentError(f"{both[0]}: given twice, as an argument and in axes; leave one of them out")
+    if missing := [name for name in needed if fixed[name] is None and name not in varied]:
+        raise ArgumentError(f"{' and '.join(missing)}: expected as an argument or in axes")
+    if isinstance(system, System):
+        if of_system := sorted(varied - set(OF_THE_RUN)):
+            raise ArgumentError(
+                f"axes: {of_system[0]} would be a parameter, but {system!r} has its parameters already; give what makes it, such "
+                f"as the class {type(system).__name__}, or functools.partial of it"
+            )
+    elif not callable(system):
+        raise DTypeError(f"system: expected a system, or what makes one of parameters by name, got {type(system).__name__}")
+
+
+def _fits_single(grid: Grid, paced: bool) -> None:
+    """Raise if members do not go with float32: with adaptive steps, or numbers that it does not have."""
+    if paced:
+        raise UnsupportedError("dtype: float32 goes with fixed steps only, and tolerance= or at= was given; use dt= and steps=")
+    for axis in grid.axes:
+        checks.fits_single(f"axes: {axis.argument}", axis.values)
+        if axis.argument == "dt":
+            float32.rounded_step(float(axis.values.min()))
+
+
+def _outcomes(given: Any, every: int | None) -> tuple[Outcome, ...]:
+    if given is None:
+        given = "last" if every is None else "history"
+    several = [given] if isinstance(given, (str, Outcome)) or callable(given) else checks.several("outcomes", given, "outcomes")
+    found: list[Outcome] = []
+    for each in several:
+        if isinstance(each, str):
+            found.append(WORDS[checks.known("outcomes", each, WORDS)]())
+        elif isinstance(each, Outcome):
+            found.append(each)
+        elif isinstance(each, type) and issubclass(each, Outcome) and each is not Function:
+            found.append(each())
+        elif callable(each):
+            found.append(Function(each))
+        else:
+            raise DTypeError(f"outcomes: expected words, outcomes or functions of a run, got {checks.short(each)}")
+    if not found:
+        raise ArgumentError(f"outcomes: expected at least one of {', '.join(WORDS)}, or a function of a run, got none")
+    if every is not None and not any(isinstance(each, (History, Function)) for each in found):
+        raise ArgumentError("every: goes with the outcome 'history' or a function of a run; reductions see states by observe=")
+    return tuple(found)
+
+
+def _probe(task: Task, grid: Grid) -> tuple[System, str, set[str]]:
+    """The system of the first member, a hash of the first steps of the first and the last member, and names of results."""
+    digest = blake2b(digest_size=8)
+    for member in dict.fromkeys((0, grid.members - 1)):
+        index = np.unravel_index(member, grid.shape)
+        one = Chunk(tuple(map(int, index)), tuple(slice(int(i), int(i) + 1) for i in index), (1,) * len(index), member)
+        found = probed(task, grid.values(one))
+        for block in found.state:
+            digest.update(np.where(np.isnan(block), np.nan, block).tobytes())
+        if member == 0:
+            first = found
+    return first.system, digest.hexdigest(), first.names
+
+
+def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | None) -> int:
+    """How many members a chunk may have."""
+    most = task.most_members(system)
+    if most < 1:
+        needed = 8.0 * task.numbers(system) / 2**20
+        raise ArgumentError(
+            f"memory: one member takes some {needed:.3g} MiB while it is computed, got {task.memory / 2**20:.3g} MiB"
+        )
+    if chunk is not None:
+        return min(checks.count("chunk", chunk, 1), most)
+    parts = CHUNKS_OF_A_WORKER * workers
+    largest = MAX_MEMBERS if task.at is None else MAX_ADAPTIVE_MEMBERS
+    return min(most, largest, max(MIN_MEMBERS, -(-grid.members // parts)))
+
+
+def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progress: bool) -> None:
+    """Compute every chunk that is not finished, and keep what is found."""
+    done, tally = 0, _Tally(grid, task)
+
+    def unfinished() -> Iterator[Chunk]:  # one after the other, for there may be more than memory has room for
+        nonlocal done
+        for chunk in grid.chunks(kept.chunk_shape):
+            if kept.finished(chunk):
+                done += chunk.members
+            else:
+                yield chunk
+
+    if progress:
+        from ...base.progress import bar
+
+        shown: Any = bar(f"sweep, {counted(grid.members, 'member')}")
+    else:
+        shown = nullcontext(None)
+    with shown as told:
+        found = engine.compute(task, grid, unfinished())
+        try:
+            for chunk, each in found:
+                kept.write(chunk, each.found)
+                tally.add(chunk, each)
+                done += chunk.members
+                if told is not None:
+                    told(done / grid.members)
+        finally:
+            found.close()  # type: ignore[attr-defined]
+    tally.warn()
+
+
+class _Tally:
+    """What there is to warn of."""
+
+    def __init__(self, grid: Grid, task: Task) -> None:
+        self.grid, self.task, self.bad, self.members, self.first, self.step = grid, task, 0, 0, grid.members, -1
+        self.lost = self.status = 0
+        self.doubts: dict[int, str] = {}
+        self.growths: dict[int, Growth] = {}
+
+    def add(self, chunk: Chunk, done: Done) -> None:
+        status = np.where(np.isin(done.found["status"].values, happenings.EVENTS), 0, done.found["status"].values)
+        self.members += chunk.members
+        if status.any():
+            self.bad += int(np.count_nonzero(status))
+            member = int(np.flatnonzero(status)[0])
+            if chunk.first + member < self.first:
+                self.first, self.step = chunk.first + member, int(done.found["first_bad_step"].values[member])
+                self.status = int(status[member])
+        self.lost += done.lost
+        if done.doubt is not None:
+            self.doubts[chunk.first] = done.doubt
+        if done.growth is not None:
+            self.growths[chunk.first] = done.growth
+
+    def warn(self) -> None:
+        if self.bad and self.task.at is not None:
+            warnings.warn(
+                f"{self.bad} of {counted(self.members, 'member')} stopped before t = {self.task.at[-1]:g}, "
+                f"{'the first of them' if self.bad > 1 else 'that'} at {self.grid.place(self.first)}: "
+                f"{adaptive.why(self.status)}; status tells which and why",
+                ToleranceWarning,
+                stacklevel=4,
+            )
+        elif self.bad:
+            warnings.warn(
+                f"{self.bad} of {counted(self.members, 'member')} diverged, {'the first of them' if self.bad > 1 else 'that'} at "
+                f"{self.grid.place(self.first)}, at step {self.step}; status and first_bad_step tell which and when",
+                DivergenceWarning,
+                stacklevel=4,
+            )
+        if self.lost:
+            warnings.warn(
+                adaptive.LOST.format(lost=self.lost, members=counted(self.members, "member")), ToleranceWarning, stacklevel=4
+            )
+        if self.doubts:
+            chunk = min(self.doubts)
+            warnings.warn(
+                f"in {counted(len(self.doubts), 'chunk')}, the first beginning at {self.grid.place(chunk)}: {self.doubts[chunk]}",
+                AccuracyWarning,
+                stacklevel=4,
+            )
+        if self.growths:
+            chunk, number = min(self.growths), sum(each.number for each in self.growths.values())
+            first = self.growths[chunk]
+            warnings.warn(
+                f"{number} of {counted(self.members, 'member')} {first.size}, {'the first of them' if number > 1 else 'that'} at "
+                f"{self.grid.place(chunk + first.first[0])}: {first.why}",
+                AccuracyWarning,
+                stacklevel=4,
+            )

@@ -1,0 +1,139 @@
+"""What is observed of a run: v, y, a component of them, a recordable quantity, or a function of the state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array, Shape
+from ...errors import ArgumentError, ShapeError, UnsupportedError
+from ...model.systems import System
+from ...runs.result import Run
+
+Name = str
+#: What can be asked for.
+Of = Name | tuple[Any, ...] | Callable[[Array, Array, Array], Any]
+
+
+class Piece(NamedTuple):
+    """Some saved states of a run of a chunk of members.
+
+    Attributes:
+        run: the piece of the run; its first state may be the last one of the piece before.
+        since: 1 if it is, otherwise 0: index of the first state that is new.
+    """
+
+    run: Run
+    since: int
+
+    @property
+    def t(self) -> Array:
+        """Times of the new states."""
+        return self.run.t[self.since :]
+
+    def of(self, what: Of) -> Array:
+        """A quantity of the new states, shape (states, *its own axes, members).
+
+        Of states of float32, v and y are float32; all else is computed of them in float64.
+        """
+        run, since = self.run, self.since
+        if isinstance(what, str) and what in ("v", "y"):
+            return np.asarray(getattr(run, what)[since:])
+        if isinstance(what, tuple):
+            return np.asarray(getattr(run, what[0])[(slice(since, None), *what[1:])])
+        if isinstance(what, str):
+            return np.asarray(run.quantity(what)[since:])
+        v, y = (np.moveaxis(np.asarray(a[since:], np.float64), 0, -2) for a in (run.v, run.y))
+        with np.errstate(all="ignore"):
+            found = np.asarray(what(self.t[:, np.newaxis], v, y), dtype=np.float64)
+        shape = (len(self.t), run.status.size)
+        if found.shape[-2:] != shape:
+            try:
+                found = np.broadcast_to(found, shape)
+            except ValueError:
+                raise ShapeError(
+                    f"of: expected that {name_of(what)}(t, v, y) returns the shape (…, {shape[0]}, {shape[1]}), states and "
+                    f"members, got {found.shape}"
+                ) from None
+        return np.moveaxis(found, -2, 0)
+
+
+def name_of(what: Of | Callable[..., Any]) -> str:
+    """What it is called in names of variables."""
+    if isinstance(what, str):
+        return what
+    if isinstance(what, tuple):
+        return "_".join(map(str, what))
+    name = getattr(what, "__name__", "")
+    return name if name.isidentifier() else type(what).__name__
+
+
+def checked(what: Any) -> Of:
+    """What is asked for, if it can be meant.
+
+    Raises:
+        ArgumentError: if not.
+    """
+    if isinstance(what, tuple):
+        if len(what) < 2 or what[0] not in ("v", "y"):
+            raise ArgumentError(f"of: expected a component such as ('y', 0), got {checks.short(what)}")
+        if nested := [each for each in what[1:] if isinstance(each, (tuple, list))]:
+            right = (what[0], *nested[0])
+            raise ArgumentError(f"of: expected a component of a block with several axes as {right}, got {checks.short(what)}")
+        return (what[0], *(checks.count("of", each, 0) for each in what[1:]))
+    if callable(what):
+        checks.argument_order("of", what, ("t", "v", "y"))
+    if isinstance(what, str) or callable(what):
+        found: Of = what
+        return found
+    raise ArgumentError(
+        f"of: expected 'v', 'y', a component such as ('y', 0), a quantity such as 'energy', or a function f(t, v, y), "
+        f"got {checks.short(what)}"
+    )
+
+
+def possible(what: Of, system: System) -> None:
+    """Raise if a system has no such quantity, before any work."""
+    shapes: dict[str, Shape] = {"v": system.v_shape, "y": system.y_shape}
+    if isinstance(what, str) and what == "v" and system.v_shape == (0,):
+        raise UnsupportedError(f"of: {system!r} is of first order and has no v")
+    if isinstance(what, str) and what not in shapes:
+        checks.known("of", what, ("v", "y", "energy", *system.quantities))
+        if what == "energy" and what not in system.quantities:
+            system.energy(*(np.zeros((*shape, *system.batch)) for shape in shapes.values()))
+    if isinstance(what, tuple):
+        shape = shapes[what[0]]
+        if len(what) - 1 != len(shape) or any(i >= n for i, n in zip(what[1:], shape, strict=True)):
+            places = ("row", "column", "layer")[: len(shape)] if len(shape) < 4 else range(len(shape))
+            like = ", ".join((f'"{what[0]}"', *map(str, places)))
+            raise ShapeError(f"of: a component of {what[0]} of shape {shape} is ({like}), got {what}")
+
+
+def block_dims(system: System, block: str) -> tuple[str, ...]:
+    """Names of the dimensions of a block."""
+    shape = system.v_shape if block == "v" else system.y_shape
+    alike = system.v_shape == system.y_shape
+    names = [each.strip() for each in system.axes.split(",")] if system.axes else []
+    if alike and len(names) == len(shape) and all(names):
+        return tuple(names)
+    stem = "component" if alike or system.v_shape == (0,) else f"{block}_component"
+    return (stem,) if len(shape) == 1 else tuple(f"{stem}_{i}" for i in range(len(shape)))
+
+
+def rates(run: Run, what: Of, t: Array, v: Array, y: Array) -> Array | None:
+    """The rate of change of v, y, or a component, at states of all members of a run; None for other quantities.
+
+    ``t`` has one time for each member, ``v`` and ``y`` have the shape (*block, members).
+    """
+    block = what if isinstance(what, str) else what[0] if isinstance(what, tuple) else ""
+    if block not in ("v", "y"):
+        return None
+    with np.errstate(all="ignore"):
+        s = run.system.scaled(run.dt, run.status.shape, run.force)
+        change = np.asarray((s.dv if block == "v" else s.dy)(t, v, y)) / run.dt
+    shape = (v if block == "v" else y).shape
+    change = np.broadcast_to(change, shape)
+    return change[what[1:]] if isinstance(what, tuple) else change

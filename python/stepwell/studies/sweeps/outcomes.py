@@ -1,0 +1,379 @@
+"""What is kept of a member: its last state, extremes, means, the history at intervals, or what a function finds.
+
+Reductions see the states of a run piece by piece and keep a few numbers of each member. They do not depend on where pieces end.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ...base import checks
+from ...base.arrays import Array
+from ...base.immutable import Value
+from ...errors import ArgumentError, ShapeError
+from ...model.systems import System
+from ...runs.result import Run
+from .observed import Of, Piece, block_dims, checked, name_of, possible
+
+
+class Variable(NamedTuple):
+    """A result of the members of a chunk.
+
+    Attributes:
+        dims: names of its own axes.
+        values: shape (*own axes, members).
+        about: what it is, in words.
+        unit: the quantity whose unit it has, "v", "y" or "t"; None for others.
+        coords: coordinates along its own axes, by name.
+    """
+
+    dims: tuple[str, ...]
+    values: Array
+    about: str
+    unit: str | None = None
+    coords: Mapping[str, Array] = {}
+
+
+Found = dict[str, Variable]
+
+
+def together(parts: Iterable[Found]) -> Found:
+    """All results.
+
+    Raises:
+        ArgumentError: if two have one name.
+    """
+    found: Found = {}
+    for part in parts:
+        if twice := sorted(set(found) & set(part)):
+            raise ArgumentError(f"outcomes: there are two results {twice[0]!r}; give one another name by name=, or leave it out")
+        found |= part
+    return found
+
+
+class Reduction(ABC):
+    """Sees pieces of a run, in their order, and keeps what it needs."""
+
+    @abstractmethod
+    def see(self, piece: Piece) -> None:
+        """Take the new states of a piece into account."""
+
+    @abstractmethod
+    def found(self) -> Found:
+        """The results, by name."""
+
+
+class Outcome(Value):
+    """What is to be kept of each member; given in ``outcomes`` of ``stepwell.sweep``.
+
+    Attributes:
+        observes: whether it sees the states in between, and not the last alone.
+        numbers: about how many numbers it keeps of each member, besides those of a state.
+    """
+
+    observes: ClassVar[bool] = True
+    numbers: int = 4
+
+    def check(self, system: System) -> None:
+        """Raise if it cannot be found of a system, before any work."""
+
+    def begin(self) -> Reduction:
+        """A new reduction."""
+        raise NotImplementedError
+
+
+def _blocks(system: System) -> tuple[str, ...]:
+    """The blocks that a system has."""
+    return ("y",) if system.v_shape == (0,) else ("v", "y")
+
+
+def _dims(run: Run, what: Of, values: Array) -> tuple[str, ...]:
+    """Names of the own axes of values of shape (*own, members)."""
+    if what in ("v", "y"):
+        return block_dims(run.system, str(what))
+    return tuple(f"{name_of(what)}_{i}" for i in range(values.ndim - 1))
+
+
+def _unit(what: Of) -> str | None:
+    block = what[0] if isinstance(what, tuple) else what
+    return block if isinstance(block, str) else None
+
+
+class Last(Outcome):
+    """The state at the end: ``v_last`` and ``y_last``.
+
+    Example:
+        >>> axes = {"omega": ("omega", [1.0, 2.0])}
+        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.01, steps=100, outcomes=sw.sweeps.Last())
+        >>> found.y_last.values.round(6)
+        array([ 0.540302, -0.416147])
+    """
+
+    observes = False
+
+    def begin(self) -> Reduction:
+        """A new reduction."""
+        return _Last()
+
+
+class _Last(Reduction):
+    def see(self, piece: Piece) -> None:
+        self.run = piece.run
+
+    def found(self) -> Found:
+        run = self.run
+        return {
+            f"{block}_last": Variable(
+                block_dims(run.system, block), np.array(getattr(run, block)[-1]), f"{block} at the end", block
+            )
+            for block in _blocks(run.system)
+        }
+
+
+class _Several(Outcome):
+    """Of v and y, or of what is asked for."""
+
+    def __init__(self, of: Any = None, *, name: str | None = None) -> None:
+        self.of = None if of is None else checked(of)
+        self.name = called(name, self.of)
+
+    def check(self, system: System) -> None:
+        """Raise if the system has no such quantity."""
+        if self.of is not None:
+            possible(self.of, system)
+
+    def whats(self, run: Run) -> list[Of]:
+        """What is reduced."""
+        return [*_blocks(run.system)] if self.of is None else [self.of]
+
+
+class Extremes(_Several):
+    """The least and the largest value among the observed states, ``y_min`` and ``y_max``; NaN if a state was NaN.
+
+    Between observed states the motion may go beyond: at a smooth extreme by (interval)²·|ÿ|/8 at most.
+
+    Args:
+        of: as for ``Crossing``; both blocks if None.
+        name: of the results, in place of what they are of.
+
+    Example:
+        >>> outcome = sw.sweeps.Extremes("energy")
+        >>> found = sw.sweep(sw.Oscillator, {"omega": [1.0, 2.0]}, "rk4", v=0.0, y=1.0, dt=0.1, steps=100, outcomes=outcome)
+        >>> sorted(found.data_vars)
+        ['energy_max', 'energy_min', 'first_bad_step', 'status']
+    """
+
+    def begin(self) -> Reduction:
+        """A new reduction."""
+        return _Extremes(self)
+
+
+class _Extremes(Reduction):
+    def __init__(self, outcome: Extremes) -> None:
+        self.outcome = outcome
+        self.least: list[Array] = []
+        self.largest: list[Array] = []
+
+    def see(self, piece: Piece) -> None:
+        self.run = piece.run
+        if len(piece.t) == 0:
+            return
+        all_of = [piece.of(what) for what in self.outcome.whats(piece.run)]
+        least, largest = [each.min(axis=0) for each in all_of], [each.max(axis=0) for each in all_of]
+        if self.least:
+            least = list(map(np.minimum, least, self.least))
+            largest = list(map(np.maximum, largest, self.largest))
+        self.least, self.largest = least, largest
+
+    def found(self) -> Found:
+        found = {}
+        for what, least, largest in zip(self.outcome.whats(self.run), self.least, self.largest, strict=True):
+            name, dims = self.outcome.name or name_of(what), _dims(self.run, what, least)
+            # Which of −0 and +0 is the least depends on the order in which they are compared; adding +0 leaves +0 alone.
+            found[f"{name}_min"] = Variable(dims, least + 0.0, f"least {name} of the observed states", _unit(what))
+            found[f"{name}_max"] = Variable(dims, largest + 0.0, f"largest {name} of the observed states", _unit(what))
+        return found
+
+
+class Mean(_Several):
+    """The mean over the observed time, ``y_mean``, by the trapezoidal rule over the observed states.
+
+    Its error against the mean of a smooth motion is (interval)²/12 times the largest second derivative, at most.
+
+    Args:
+        of: as for ``Crossing``; both blocks if None.
+        name: of the results, in place of what they are of.
+
+    Example:
+        >>> square = sw.sweeps.Mean(lambda t, v, y: y * y, name="square")
+        >>> axes = {"y": ("y0", [1.0, 2.0])}
+        >>> found = sw.sweep(sw.Oscillator(), axes, "rk4", v=0.0, dt=np.pi / 100, steps=200, outcomes=square)
+        >>> found.square_mean.values.round(6)
+        array([0.5, 2. ])
+    """
+
+    def begin(self) -> Reduction:
+        """A new reduction."""
+        return _Mean(self)
+
+
+#: So many numbers of states are added up at once.
+NUMBERS_AT_ONCE = 1 << 16
+
+
+class _Mean(Reduction):
+    def __init__(self, outcome: Mean) -> None:
+        self.outcome = outcome
+        self.sums: list[Array] = []
+        self.before: list[Array] = []
+        self.begin = self.t = np.nan
+
+    def see(self, piece: Piece) -> None:
+        self.run = piece.run
+        all_of = [piece.of(what) for what in self.outcome.whats(piece.run)]
+        first = 0 if self.before else 1
+        if first:
+            now = [np.asarray(each[0], np.float64) for each in all_of]
+            self.sums, self.before, self.begin = [np.zeros(each.shape) for each in now], now, float(piece.t[0])
+            self.t = self.begin
+        # Some states at once: a chunk of few members has many of them.
+        at_once = max(1, NUMBERS_AT_ONCE // max(1, *(each[:1].size for each in all_of)))
+        for k in range(first, len(piece.t), at_once):
+            self._add(piece.t[k : k + at_once], [each[k : k + at_once] for each in all_of])
+
+    def _add(self, t: Array, all_of: list[Array]) -> None:
+        half = 0.5 * np.diff(t, prepend=self.t)
+        for i, states in enumerate(all_of):
+            now = np.concatenate([self.before[i][np.newaxis], states], dtype=np.float64)
+            terms = half.reshape(-1, *(1,) * (now.ndim - 1)) * (now[:-1] + now[1:])
+            # State after state, so that the order of the sum does not depend on the piece.
+            self.sums[i] = np.add.accumulate(np.concatenate([self.sums[i][np.newaxis], terms]), axis=0)[-1].copy()
+            self.before[i] = now[-1].copy()
+        self.t = float(t[-1])
+
+    def found(self) -> Found:
+        time, found = self.t - self.begin, {}
+        for what, total in zip(self.outcome.whats(self.run), self.sums, strict=True):
+            name = self.outcome.name or name_of(what)
+            found[f"{name}_mean"] = Variable(
+                _dims(self.run, what, total), total / time, f"mean {name} over the time", _unit(what)
+            )
+        return found
+
+
+def called(name: Any, of: Of | None) -> str | None:
+    """The name of results, if one is given.
+
+    Raises:
+        ArgumentError: if it is none, or would be that of v and of y.
+    """
+    if name is None:
+        return None
+    if of is None:
+        raise ArgumentError(f"name: goes with of=, since there are results of v and of y, got {checks.short(name)}")
+    if not isinstance(name, str) or not name.isidentifier():
+        raise ArgumentError(f"name: expected the name of a variable, got {checks.short(name)}")
+    return name
+
+
+class History(Outcome):
+    """The states at intervals: ``v`` and ``y`` along the dimension ``t``; ``every`` of ``stepwell.sweep`` asks for it.
+
+    With a tolerance, those at the times of ``at``.
+
+    Where ``dt`` is an axis the dimension is ``saved``, and ``t`` a coordinate that depends on both.
+
+    Example:
+        >>> axes = {"omega": ("omega", [1.0, 2.0])}
+        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.1, steps=10, every=5)
+        >>> found.y.dims, found.t.values
+        (('omega', 't'), array([0. , 0.5, 1. ]))
+    """
+
+    observes = False
+
+    def begin(self) -> Reduction:
+        """A new reduction."""
+        return _History()
+
+
+class _History(Reduction):
+    def __init__(self) -> None:
+        self.pieces: list[Piece] = []
+
+    def see(self, piece: Piece) -> None:
+        self.pieces.append(piece)
+
+    def found(self) -> Found:
+        system = self.pieces[0].run.system
+        t = np.concatenate([piece.t for piece in self.pieces])
+        return {
+            block: Variable(
+                ("t", *block_dims(system, block)),
+                np.concatenate([piece.of(block) for piece in self.pieces]),
+                f"{block} at intervals",
+                block,
+                {"t": t},
+            )
+            for block in _blocks(system)
+        }
+
+
+class Function(Outcome):
+    """What a function finds in the run of a chunk of members.
+
+    It is called with a ``Run`` whose batch is the chunk, one axis of members, with the states after the transient that ``every``
+    asks for; without it, the last alone; with a tolerance, those at the times of ``at``. A member may be in a chunk with any
+    others, so what is found of one must not depend on the others.
+
+    Args:
+        function: returns an array whose last axis is that of the members, or a dictionary of them by name; in place of an array,
+            (names of the axes before the last, array).
+
+    Example:
+        >>> def amplitude(run):
+        ...     return abs(run.y).max(axis=0)
+        >>> axes = {"omega": ("omega", [1.0, 2.0])}
+        >>> found = sw.sweep(
+        ...     sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.01, steps=1000, every=1, outcomes=sw.sweeps.Function(amplitude)
+        ... )
+        >>> found.amplitude.dims
+        ('omega',)
+    """
+
+    observes = False
+
+    def __init__(self, function: Callable[[Run], Any]) -> None:
+        if not callable(function):
+            raise ArgumentError(f"outcomes: expected a function of a run, got {checks.short(function)}")
+        self.function = function
+
+    def of_run(self, run: Run) -> Found:
+        """What it finds."""
+        made = self.function(run)
+        named = made if isinstance(made, Mapping) else {name_of(self.function): made}
+        found = {}
+        for name, given in named.items():
+            if not isinstance(name, str) or not name:
+                raise ArgumentError(f"outcomes: expected names of variables, got {checks.short(name)}")
+            dims: Any = None
+            if isinstance(given, tuple):
+                dims, given = given
+                dims = (dims,) if isinstance(dims, str) else tuple(dims)
+            values = checks.as_array(f"outcomes: {name}", given)
+            if values.dtype.kind not in "biuf":
+                raise ArgumentError(f"outcomes: {name}: expected numbers, got an array of dtype {values.dtype}")
+            if values.ndim == 0 or values.shape[-1] != run.status.size:
+                raise ShapeError(
+                    f"outcomes: {name}: expected an array whose last axis has one number for each member of the run, "
+                    f"{run.status.size}, got shape {values.shape}"
+                )
+            dims = tuple(f"{name}_{i}" for i in range(values.ndim - 1)) if dims is None else dims
+            if len(dims) != values.ndim - 1:
+                raise ShapeError(f"outcomes: {name}: expected {values.ndim - 1} names of axes before the last, got {dims}")
+            found[name] = Variable(dims, values, f"by the function {name_of(self.function)}")
+        return found

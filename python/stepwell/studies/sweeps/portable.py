@@ -1,0 +1,79 @@
+"""What goes to another process: by cloudpickle, with own equations of a script or a notebook by their text and not by name."""
+
+from __future__ import annotations
+
+import io
+import pickle
+import sys
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+from ...errors import ArgumentError
+from ...model.equations.definition import Definition
+from ...model.equations.invariants import Invariant
+from .axes import Chunk
+from .extras import need
+from .task import Done, Task, run
+
+#: Tasks that a process remembers; each is the same for all chunks of a sweep.
+REMEMBERED_TASKS = 4
+
+
+def packed(task: Task) -> bytes:
+    """A task for other processes.
+
+    Raises:
+        ArgumentError: if it holds what cannot travel.
+    """
+    cloudpickle = need("cloudpickle")
+
+    class Pickler(cloudpickle.Pickler):  # type: ignore[misc, name-defined]
+        def reducer_override(self, obj: Any) -> Any:
+            if isinstance(obj, Definition) and not _found_by_name(obj):
+                told = (obj.order, obj.blocks, obj.shape, obj.quick_sines, obj.scale)
+                return _defined, (obj.function, told, obj.__module__, obj.__qualname__, list(obj.invariants.values()))
+            return super().reducer_override(obj)
+
+    file = io.BytesIO()
+    try:
+        Pickler(file).dump(task)
+    except (pickle.PicklingError, TypeError, AttributeError) as error:
+        raise ArgumentError(
+            f"engine: system and outcomes go to other processes by pickle, and one of them cannot: {error}; threads, "
+            f"the default, need none"
+        ) from None
+    return file.getvalue()
+
+
+def _found_by_name(definition: Definition) -> bool:
+    """Whether another process finds it in a module that it can import; the script that was started is none."""
+    if definition.__module__ == "__main__":
+        return False
+    found: Any = sys.modules.get(definition.__module__)
+    for part in definition.__qualname__.split("."):
+        found = getattr(found, part, None)
+    return found is definition
+
+
+def _defined(
+    function: Callable[..., Any], told: tuple[Any, ...], module: str, qualified: str, invariants: list[Invariant]
+) -> Definition:
+    """A definition, of its function."""
+    made = Definition(function, *told)
+    made.__module__, made.__qualname__ = module, qualified
+    made.invariants = {each.name: each for each in invariants}
+    return made
+
+
+@lru_cache(REMEMBERED_TASKS)
+def _task(package: bytes) -> Task:
+    """A task, unpacked once a process: so its system is traced once, and its kernels are compiled once."""
+    task = pickle.loads(package)
+    assert isinstance(task, Task)
+    return task
+
+
+def sweep_chunk(package: bytes, values: dict[str, Any], chunk: Chunk) -> tuple[Chunk, Done]:
+    """Compute a chunk of members in another process. Dask shows chunks under this name."""
+    return chunk, run(_task(package), values, chunk.members)

@@ -1,0 +1,388 @@
+"""A chunk of members: its system is made, its run is made in pieces, and what was asked for is kept."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from math import gcd, prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ...analysis import growth as _growth
+from ...analysis.growth import Growth
+from ...base import checks
+from ...base.arrays import Array
+from ...errors import AccuracyWarning, DivergenceWarning, EventWarning, ShapeError, ToleranceWarning, UnsupportedError
+from ...model.compatibility import velocities
+from ...model.systems import System
+from ...model.systems.base import a_system
+from ...runs.integration import integrate
+from ...runs.request import spread
+from ...runs.result import Run
+from .adaptive import NUMBERS_OF_A_CONTROLLER, lost
+from .axes import OF_THE_RUN
+from .exponents import Exponents
+from .observed import Piece
+from .outcomes import Found, Function, History, Outcome, Variable, together
+
+#: A piece of a run makes at most so many steps of members, after which a sweep may be stopped.
+MAX_STEPS_OF_MEMBERS = 50_000_000
+#: A state in a piece takes its own numbers so many times: itself, what is computed of it, and what that leaves in between.
+COPIES_OF_A_STATE = 4
+#: A member takes its own numbers so many times besides: where it starts, what it carries, where it ends.
+COPIES_OF_A_MEMBER = 12
+
+
+class Stopped(Exception):  # noqa: N818 (not an error)
+    """The sweep was stopped while this chunk was computed."""
+
+
+class Task(NamedTuple):
+    """What to do with every chunk.
+
+    Attributes:
+        system: a system, or what makes one of parameters by name.
+        method: name of the method.
+        given: further arguments of ``integrate``, the same for all members.
+        transient: steps before those that are observed.
+        steps: steps that are observed.
+        observe: interval of the states that reductions see, in steps.
+        every: interval of the states of a history or of a function's run, in steps; None for the last alone.
+        outcomes: what to keep.
+        memory: how many bytes a chunk may take.
+        at: with a tolerance, the times whose states are observed, and all that are saved; None with fixed steps.
+    """
+
+    system: Any
+    method: str
+    given: dict[str, Any]
+    transient: int
+    steps: int
+    observe: int
+    every: int | None
+    outcomes: tuple[Outcome, ...]
+    memory: float
+    at: Array | None = None
+
+    def kinds(self, kind: type[Outcome]) -> list[Any]:
+        """The outcomes of a kind."""
+        return [each for each in self.outcomes if isinstance(each, kind)]
+
+    @property
+    def single(self) -> bool:
+        """Whether steps are made in float32."""
+        return self.given.get("dtype") == "float32"
+
+    def rounded(self, dt: Array) -> Array:
+        """The steps that are made of those that were given."""
+        return dt.astype(np.float32).astype(np.float64) if self.single else dt
+
+    @property
+    def reductions(self) -> list[Outcome]:
+        """The outcomes that are found piece by piece."""
+        return [each for each in self.outcomes if not isinstance(each, (Function, Exponents))]
+
+    @property
+    def between(self) -> int | None:
+        """Interval of the states that are saved for reductions; None for the last alone."""
+        observed = self.observe if any(each.observes for each in self.reductions) else 0
+        kept = (self.every or 0) if self.kinds(History) else 0
+        return gcd(observed, kept) or None
+
+    def numbers(self, system: System) -> float:
+        """How many numbers a member takes while it is computed, without the states of a piece."""
+        state = prod(system.v_shape) + prod(system.y_shape)
+        numbers = COPIES_OF_A_MEMBER * state + sum(each.numbers for each in self.outcomes)
+        saved = 1 if self.every is None else self.steps // self.every + 2
+        if self.at is not None:
+            saved = self.at.size
+            numbers += NUMBERS_OF_A_CONTROLLER
+        if "events" in self.given:  # whose run is one piece
+            observed = 1 if self.between is None else self.steps // self.between + 2
+            numbers += COPIES_OF_A_STATE * state * (observed if self.at is None else saved)
+            numbers += sum((3 + state) * each.most for each in self.given["events"])
+        if self.kinds(History) or self.kinds(Function):
+            numbers += 2 * saved * state
+        for each in self.kinds(Exponents):
+            k = state if each.exponents == "all" else int(each.exponents)
+            numbers += (6 if self.at is None else 12) * state * (k + 1) + 4 * k
+        return numbers
+
+    def most_members(self, system: System) -> int:
+        """How many members may be in a chunk, for its memory."""
+        state = prod(system.v_shape) + prod(system.y_shape)
+        least = (
+            0 if self.between is None and self.at is None else 3 * COPIES_OF_A_STATE * state
+        )  # two states of a piece, and the one before
+        return int(self.memory / (8.0 * (self.numbers(system) + least)))
+
+    def states_at_once(self, system: System, members: int) -> int:
+        """How many saved states a piece may have, for its memory."""
+        state = prod(system.v_shape) + prod(system.y_shape)
+        room = self.memory / (8.0 * members) - self.numbers(system)
+        return max(2, int(room / (COPIES_OF_A_STATE * state)))
+
+
+class Done(NamedTuple):
+    """What was found of a chunk.
+
+    Attributes:
+        found: results by name, values of shape (*own axes, members).
+        doubt: a message if the numbers are finite and mean nothing, or None.
+        lost: how many members have an absolute tolerance so large that the motion is lost in it.
+        growth: of the members that grew by fixed steps beyond their stability limit, or None.
+    """
+
+    found: Found
+    doubt: str | None
+    lost: int = 0
+    growth: Growth | None = None
+
+
+def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
+    """The system of these values, and the arguments of its run."""
+    given = {**task.given, **{name: value for name, value in values.items() if name in OF_THE_RUN}}
+    parameters = {name: value for name, value in values.items() if name not in OF_THE_RUN}
+    system = task.system if isinstance(task.system, System) else task.system(**parameters)
+    system = a_system(system).sized(given.get("v"), given["y"])
+    if set(values) == {"dt"}:
+        # Nothing else has an axis of members; a chunk of one dt has one.
+        block = checks.block("y", given["y"], system.y_shape, system.axes)
+        if block.shape == system.y_shape:
+            given["y"] = block[..., np.newaxis]
+    return system, given
+
+
+def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], bool] | None = None) -> Done:
+    """Compute a chunk of members."""
+    with _quiet(), _listening(stopped), np.errstate(all="ignore"):  # members that diverge are told of by their status
+        system, given = made(task, values)
+        start = given
+        for each in _pieces(task, system, given, members, task.transient, None, stopped):
+            start = _going_on(given, each)
+        parts: list[Found] = []
+        functions = task.kinds(Function)
+        if functions:
+            how: dict[str, Any] = {"steps": task.steps, "every": task.every} if task.at is None else {"at": task.at}
+            last = integrate(system, task.method, **how, **start)
+            _as_many(last, members)
+            parts += [each.of_run(last) for each in functions]
+        if task.reductions or not functions:
+            last, reduced = _reduced(task, system, start, members, stopped)
+            parts += reduced
+        for each in task.kinds(Exponents):
+            look = partial(_stop, stopped)
+            parts.append(each.of_start(system, task.method, given, task.transient, task.steps, look, task.at))
+    status = Variable((), np.array(last.status), "how the member ended")
+    about = "first step that was not finite, or −1" if task.at is None else "step at which the member stopped, or −1"
+    bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)
+    parts.append({"status": status, "first_bad_step": bad})
+    grown = _growth_of(task, given, last) if task.at is None else None
+    return Done(together(parts), last.system.doubt(last.y), lost(last), grown)
+
+
+def _growth_of(task: Task, given: dict[str, Any], last: Run) -> Growth | None:
+    """The members that grew by their steps alone, from the start of the sweep to the end of the last piece of its run."""
+    if any(event.then for event in given.get("events", ())):
+        return None  # what an event makes of a state tells nothing of the steps
+    system, batch = last.system, last.status.shape
+    blocks = (("v", velocities(system, given.get("v")), system.v_shape), ("y", given["y"], system.y_shape))
+    v, y = (spread(checks.block(name, block, shape, system.axes), shape, batch) for name, block, shape in blocks)
+    return _growth.of_last_piece(last, (v, y), task.transient + task.steps)
+
+
+def _reduced(
+    task: Task, system: System, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
+) -> tuple[Run, list[Found]]:
+    """The last piece of the run, and what the reductions found in it."""
+    between, reductions = task.between, [(each, each.begin()) for each in task.reductions]
+    at, last = 0, None
+    if task.at is not None:
+        for last in _pieces_between_times(task, system, start, members, stopped):
+            for _, reduction in reductions:
+                reduction.see(Piece(last, 0))
+        assert last is not None
+        return last, [reduction.found() for _, reduction in reductions]
+    for each in _pieces(task, system, start, members, task.steps, between, stopped):
+        since = 0 if at == 0 else 1
+        steps = at + (each.t.size - 1 if between else 0)  # number of the last saved state
+        for outcome, reduction in reductions:
+            reduction.see(_thinned(task, outcome, each, at, since))
+        at, last = steps + (0 if between else 1), each
+    assert last is not None
+    return last, [reduction.found() for _, reduction in reductions]
+
+
+def _thinned(task: Task, outcome: Outcome, piece: Run, first: int, since: int) -> Piece:
+    """The states of a piece that an outcome asks for: every so many, counted from the first of all, and the very last."""
+    interval = task.observe if outcome.observes else (task.every or 0) if isinstance(outcome, History) else 0
+    step = interval // (task.between or 1)
+    if step <= 1:
+        return Piece(piece, since)
+    number = first + np.arange(len(piece.t))
+    wanted = number % step == 0
+    wanted[-1] |= piece.start_step + piece.steps >= task.transient + task.steps
+    wanted[:since] = False
+    return Piece(_Chosen(piece, wanted), 0)  # type: ignore[arg-type]
+
+
+class _Chosen:
+    """Some of the saved states of a run."""
+
+    def __init__(self, run: Run, wanted: Any) -> None:
+        self._run, self._wanted = run, wanted
+        self.t, self.v, self.y = run.t[wanted], run.v[wanted], run.y[wanted]
+
+    def quantity(self, name: str) -> Array:
+        return np.asarray(self._run.quantity(name)[self._wanted])
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._run, name)
+
+
+def _pieces(
+    task: Task,
+    system: System,
+    start: dict[str, Any],
+    members: int,
+    steps: int,
+    between: int | None,
+    stopped: Callable[[], bool] | None,
+) -> Iterator[Run]:
+    """So many steps in pieces; a piece ends where a state is saved."""
+    length = max(1, MAX_STEPS_OF_MEMBERS // members)
+    if "events" in start:  # a member that an event stopped does not go on
+        length = steps
+    elif between is not None:
+        length = between * max(1, min(length // between, task.states_at_once(system, members) - 1))
+    done, going_on = 0, start
+    while done < steps:
+        _stop(stopped)
+        made = integrate(system, task.method, steps=min(length, steps - done), every=between, **going_on)
+        _as_many(made, members)
+        done += made.steps
+        if done < steps:
+            going_on = _going_on(start, made)
+        yield made
+
+
+def _pieces_between_times(
+    task: Task, system: System, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
+) -> Iterator[Run]:
+    """A run with a tolerance in pieces, each of some of its times; its steps do not depend on them."""
+    assert task.at is not None
+    length = task.at.size if "events" in start else task.states_at_once(system, members)
+    going_on = start
+    for first in range(0, task.at.size, length):
+        _stop(stopped)
+        made = integrate(system, task.method, at=task.at[first : first + length], **going_on)
+        _as_many(made, members)
+        if first + length < task.at.size:
+            going_on = _going_on(start, made)
+        yield made
+
+
+def _going_on(given: dict[str, Any], run: Run) -> dict[str, Any]:
+    """Arguments with which a run goes on; what it does not carry, such as threads, is given again."""
+    kept = {name: value for name, value in given.items() if name in ("threads", "backend", "max_steps")}
+    return {**kept, **run.resume}
+
+
+@contextmanager
+def _listening(stopped: Callable[[], bool] | None) -> Iterator[None]:
+    """Everything that this thread steps ends when the sweep is stopped; Ctrl-C reaches the main thread alone."""
+    _core.ask(partial(_stop, stopped))
+    try:
+        yield
+    finally:
+        _core.ask(None)
+
+
+def _stop(stopped: Callable[[], bool] | None) -> None:
+    if stopped is not None and stopped():
+        raise Stopped
+
+
+def _as_many(run: Run, members: int) -> None:
+    """Raise if the batch of a run is another than the members of the chunk."""
+    if run.status.shape != (members,):
+        raise ShapeError(
+            f"axes: expected a run of as many members as axes have values, batch ({members},), got {run.status.shape}; what "
+            f"varies from member to member is an axis, and everything else is the same for all"
+        )
+
+
+class Probed(NamedTuple):
+    """What the first steps of a member tell: the system, the state after them, and the names of what is found piece by piece."""
+
+    system: System
+    state: tuple[Array, Array]
+    names: set[str]
+
+
+def probed(task: Task, values: dict[str, Any]) -> Probed:
+    """The first steps of one member: errors in what was given show here, before any work, and so does what is computed."""
+    with _quiet():
+        system, given = made(task, values)
+        for each in task.outcomes:
+            each.check(system)
+        if task.kinds(History) and task.every is None and task.at is None:
+            raise UnsupportedError("every: expected how many steps are between the states of a history")
+        if task.at is not None:
+            few = min(PROBED_STEPS, given.get("max_steps", PROBED_STEPS))
+            begun = integrate(system, task.method, at=task.at, **(given | {"max_steps": few}))
+            _as_many(begun, 1)
+            assert begun.stand is not None
+            return Probed(begun.system, (begun.stand.v, begun.stand.y), _names(task, begun))
+        first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **given)
+        _as_many(first, 1)
+        return Probed(first.system, (first.v[-1], first.y[-1]), _names(task, first))
+
+
+def _names(task: Task, run: Run) -> set[str]:
+    """The names of results, but for those of functions and of exponents; raise if two of them are the same."""
+    parts: list[Found] = []
+    with np.errstate(all="ignore"):
+        for outcome in task.reductions:
+            reduction = outcome.begin()
+            reduction.see(Piece(run, 0))
+            parts.append(reduction.found())
+    return set(together([*parts, dict.fromkeys(("status", "first_bad_step"), Variable((), np.array(run.status), ""))]))
+
+
+#: Of so many steps the bits tell one sweep from another.
+PROBED_STEPS = 3
+
+
+# ---- warnings
+
+_lock = threading.Lock()
+_quiet_runs = 0
+_caught = warnings.catch_warnings()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the warnings of single runs, which a sweep sums up; in any number of threads, since filters are those of all."""
+    global _quiet_runs, _caught
+    with _lock:
+        _quiet_runs += 1
+        if _quiet_runs == 1:
+            _caught = warnings.catch_warnings()
+            _caught.__enter__()
+            warnings.simplefilter("ignore", DivergenceWarning)
+            warnings.simplefilter("ignore", AccuracyWarning)
+            warnings.simplefilter("ignore", ToleranceWarning)
+            warnings.simplefilter("ignore", EventWarning)
+    try:
+        yield
+    finally:
+        with _lock:
+            _quiet_runs -= 1
+            if _quiet_runs == 0:
+                _caught.__exit__(None, None, None)

@@ -1,0 +1,306 @@
+"""Control charts: what a control does to what it keeps and to the state, over its gain, and what a projection does (§12)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base import checks, registry
+from ...base.arrays import Array
+from ...base.immutable import Value
+from ...base.pictures import Drawn
+from ...base.tables import write_csv, write_json
+from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
+from ...model import controls
+from ...model.methods import Method, choice
+from ...model.methods import method as find_method
+from ...model.systems import NBody, System
+from ...scenes import Scene
+from ...scenes import scene as find_scene
+from ...studies.measuring.known import chartable
+from .control_runs import LENGTH_KINDS, Exact, Held, Runs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Default methods: one that adds energy, one that keeps it, and two more accurate ones.
+METHODS = ("standard_euler", "false_euler", "standard_heun", "rk4")
+
+#: Default gains: h·C·K at the start of bodies, six decades; c of rods, from 0.01 to 4, past the limits of most methods.
+RELATIVE = tuple(float(gain) for gain in 10.0 ** np.linspace(-4.0, 2.0, 25))
+LENGTH_GAINS = tuple(float(gain) for gain in np.geomspace(0.01, 4.0, 27))
+
+#: Function evaluations of each run of rods, for each of the scene's steps.
+LENGTH_EVALUATIONS = (4, 16, 64)
+
+#: Ways of projection, the limit of a control with an infinite gain.
+WAYS: tuple[str, ...] = controls.WAYS
+
+
+@dataclass(frozen=True, eq=False)
+class ControlSweep(Drawn, Value):
+    """Errors of what a control keeps, and of the state, against its gain.
+
+    Attributes:
+        title: title of the picture.
+        system: the system: bodies, whose energy is kept, or rods, whose lengths are.
+        horizon: the time of each run.
+        evaluations: function (rate) evaluations of a run, one or several numbers; each is another step.
+        lines: one for each method and kind that can be combined, and each number of evaluations.
+        refused: why others cannot, by method and kind.
+        exact: whether the exact state at the end is known.
+    """
+
+    title: str
+    system: System
+    horizon: float
+    evaluations: tuple[int, ...]
+    lines: tuple[Held, ...]
+    refused: dict[tuple[str, str], str]
+    exact: bool
+
+    @property
+    def keeps_lengths(self) -> bool:
+        """Whether it is a chart of rods, and not of an energy."""
+        return self.system.constraint == "length"
+
+    def line(self, method: Method | str, kind: str, evaluations: int | None = None) -> Held:
+        """The line of that method and kind, with so many evaluations; the first number of them if None.
+
+        Raises:
+            UnknownNameError: if there is none.
+            ArgumentError: if there are no runs of so many evaluations.
+        """
+        name = find_method(method).name
+        count = self.evaluations[0] if evaluations is None else evaluations
+        if count not in self.evaluations:
+            raise ArgumentError(f"evaluations: expected one of {list(self.evaluations)}, got {checks.short(count)}")
+        at = self.evaluations.index(count)
+        of_method: dict[str, list[Held]] = {}
+        for line in self.lines:
+            if line.method.name == name:
+                of_method.setdefault(line.kind, []).append(line)
+        return of_method[checks.known("kind", kind, of_method)][at]
+
+    @property
+    def better(self) -> dict[str, tuple[bool, ...]]:
+        """Of rods: for each method and each number of evaluations, whether control is better than resetting at most gains.
+
+        Better is the smaller error of the last state; gains at which the run diverged are left out.
+        """
+        found: dict[str, tuple[bool, ...]] = {}
+        for name in dict.fromkeys(line.method.name for line in self.lines if line.kind == LENGTH_KINDS[1] and self.exact):
+            pairs = [[self.line(name, kind, count) for kind in LENGTH_KINDS] for count in self.evaluations]
+            found[name] = tuple(
+                bool(np.median([*held.state_error[~held.diverged], np.inf][:-1] or [np.inf]) < reset.state_error[0])
+                for held, reset in pairs
+            )
+        return found
+
+    @property
+    def answer(self) -> str:
+        """Of rods, in a sentence: for which methods control is better than resetting, as the document supposes (§12)."""
+        titles: dict[str, list[str]] = {"control": [], "resetting": [], "depends": []}
+        for name, found in self.better.items():
+            titles["control" if all(found) else "depends" if any(found) else "resetting"].append(find_method(name).title)
+        parts = [f"{each} is better for {_listed(names)}" for each, names in titles.items() if names and each != "depends"]
+        parts += [f"for {_listed(titles['depends'])} it depends on the step"] * bool(titles["depends"])
+        return f"Rods under control, or reset after every step: {'; '.join(parts)}" if parts else ""
+
+    def draw(self) -> Figure:
+        """The picture, on a new figure."""
+        figure: Figure = registry.task("draw_lengths" if self.keeps_lengths else "draw_control")(self)
+        return figure
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each method, kind and gain."""
+        columns = self._columns()
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def summary(self) -> list[dict[str, Any]]:
+        """A row for each method, kind and step: the gains with the least errors, and from which gain on some diverged."""
+        rows = []
+        for line in self.lines:
+            least = [_least(line.relative, errors) for errors in (line.energy_error, line.state_error)]
+            fell = line.relative[line.diverged]
+            rows.append(
+                {
+                    "method": line.method.name,
+                    "kind": line.kind,
+                    "dt": line.dt,
+                    "least_energy_error": least[0][1],
+                    "at_relative": least[0][0],
+                    "least_state_error": least[1][1],
+                    "state_at_relative": least[1][0],
+                    "diverged": int(line.diverged.sum()),
+                    "diverged_from": float(fell[0]) if fell.size else float("nan"),
+                }
+            )
+        return rows
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write ``rows()``, one line each; every number reads back as itself."""
+        write_csv(self._columns(), path)
+
+    def to_json(self, path: str | Path) -> None:
+        """Write system, horizon, summary, rows and refusals; what is not finite is null."""
+        head: dict[str, Any] = {"title": self.title, "system": repr(self.system), "horizon": self.horizon}
+        head["evaluations"] = list(self.evaluations)
+        if self.keeps_lengths:
+            head |= {"answer": self.answer, "better": {name: list(each) for name, each in self.better.items()}}
+        refused = [{"method": method, "kind": kind, "reason": why} for (method, kind), why in self.refused.items()]
+        write_json(head | {"summary": self.summary(), "rows": self.rows(), "refused": refused}, path)
+
+    def _columns(self) -> dict[str, list[Any]]:
+        names = ["relative", "energy_error", "state_error", "largest", "first_bad_step"]
+        if self.keeps_lengths:
+            names.insert(3, "length_error")
+        columns: dict[str, list[Any]] = {name: [] for name in ("method", "kind", "dt", "steps", *names)}
+        for line in self.lines:
+            for name in ("kind", "dt", "steps"):
+                columns[name] += [getattr(line, name)] * len(line.relative)
+            columns["method"] += [line.method.name] * len(line.relative)
+            for name in names:
+                columns[name] += getattr(line, name).tolist()
+        return columns
+
+
+def control(
+    scene: Scene | System | str,
+    methods: Iterable[Method | str] = METHODS,
+    *,
+    v: Any = None,
+    y: Any = None,
+    horizon: float | None = None,
+    evaluations: int | Iterable[int] | None = None,
+    exact: Exact | tuple[Any, Any] | None = None,
+    relative: Any = None,
+    forms: Iterable[str] | None = None,
+    ways: Iterable[str] | None = None,
+    title: str | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> ControlSweep:
+    """Run bodies or rods by several methods without control, under control with many gains, and projected; measure the errors.
+
+    What is kept is the energy of bodies or the lengths of rods. All methods make the same number of function evaluations, so a
+    method with k evaluations a step makes a k-th of the steps, each k times as long. All gains of a method and a form are one
+    batch.
+
+    Args:
+        scene: a scene of bodies or of rods or its name, or a system ``NBody``, ``Rods`` or ``Pendulum3D`` for which ``v``,
+            ``y``, ``horizon`` and ``evaluations`` are given.
+        methods: names, or what ``stepwell.method`` returns.
+        v: velocities at the start, of the shape of the block; those of the scene if None.
+        y: coordinates at the start, likewise.
+        horizon: the time of each run, in units of time; the scene's if None.
+        evaluations: function (rate) evaluations of each run, one number or several; if None, one for each of the scene's steps,
+            and for rods 4, 16 and 64.
+        exact: the exact solution as a function of times of shape (n,), which returns blocks v and y of shape (n, *block), or the
+            two blocks at the end; the scene's if None. For a scene of rods without one it is a run to a tight tolerance.
+        relative: gains, shape (gains,), without a unit: h·C·K at the start for bodies, c for rods.
+        forms: forms of the control: those of ``EnergyControl``, or ``"control"`` for ``LengthControl``; all if None.
+        ways: ways of ``Projection``: ``"scaling"`` and ``"nacozy"``, or ``"length"``; all if None.
+        title: title of the picture; if None, the scene's title or the system.
+        progress: is called with the fraction that is done.
+
+    Returns:
+        A ``ControlSweep``. Methods that cannot be controlled are in its ``refused``, with the reason.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+
+    Example:
+        >>> chart = sw.charts.control("energy_control", ["standard_euler"], relative=[0.1, 0.3], evaluations=[500], horizon=5.0)
+        >>> [row["kind"] for row in chart.summary()]
+        ['none', 'limited', 'printed', 'scaling', 'nacozy']
+    """
+    if isinstance(scene, str):
+        scene = find_scene(scene)
+    if isinstance(scene, Scene):
+        if horizon is not None:
+            scene = replace(scene, horizon=checks.number("horizon", horizon, positive=True, unit="units of time"))
+        rods = scene.system.constraint == "length"
+        if rods and exact is None:
+            scene = chartable(scene)[0]
+        given: Any = scene.system
+        v, y = (b if a is None else a for a, b in ((v, scene.v), (y, scene.y)))
+        horizon = scene.horizon
+        if evaluations is None:
+            evaluations = [factor * scene.steps_for(scene.dt) for factor in (LENGTH_EVALUATIONS if rods else (1,))]
+        if exact is None and horizon <= scene.until:
+            exact = scene.exact
+        title = scene.title if title is None else title
+    else:
+        given = scene
+    if not isinstance(given, NBody) and not (isinstance(given, System) and given.constraint == "length"):
+        raise DTypeError(f"scene: expected a scene of bodies or rods, its name, or such a system, got {type(given).__name__}")
+    for name, argument in {"v": v, "y": y, "horizon": horizon, "evaluations": evaluations}.items():
+        if argument is None:
+            raise ArgumentError(
+                f"{name}: expected it beside {'an' if isinstance(given, NBody) else 'a'} {given.kind_name} system, got None"
+            )
+    chosen = choice(METHODS if methods is None else methods)
+    kinds = _kinds(given, forms, ways)
+    progress = checks.callback("progress", progress)
+
+    system = given.sized(v, y)
+    v, y = (checks.block(name, a, system.v_shape, system.axes) for name, a in (("v", v), ("y", y)))
+    if system.batch or v.shape != system.v_shape or y.shape != system.y_shape:
+        raise ShapeError(f"scene: expected one start of shape {system.v_shape}, got a batch; the gains are the batch here")
+    horizon = checks.number("horizon", horizon, positive=True, unit="units of time")
+    counts = _counts(evaluations)
+    setup = Runs(system, np.asarray(v), np.asarray(y), horizon, exact)
+    if relative is None:
+        relative = LENGTH_GAINS if system.constraint == "length" else RELATIVE
+    gains = np.atleast_1d(checks.numbers("relative", relative, positive=True))
+    if gains.ndim != 1 or not gains.size:
+        raise ShapeError(f"relative: expected gains of shape (gains,), got {gains.shape}")
+
+    lines, refused = [], {}
+    for i, method in enumerate(chosen):
+        for kind in kinds:
+            try:
+                lines += [setup.line(method, kind, np.sort(gains), count) for count in counts]
+            except UnsupportedError as why:
+                refused[method.name, kind] = str(why)
+        if progress is not None:
+            progress((i + 1) / len(chosen))
+    name = repr(system) if title is None else title
+    return ControlSweep(name, system, horizon, counts, tuple(lines), refused, exact is not None)
+
+
+def _kinds(system: System, forms: Any, ways: Any) -> list[str]:
+    """What is run: nothing that keeps anything, each form of the control, each way of projection."""
+    known = ((LENGTH_KINDS[0],), (LENGTH_KINDS[1],)) if system.constraint == "length" else (controls.FORMS, WAYS)
+    kinds = ["none"]
+    for argument, given, names in zip(("forms", "ways"), (forms, ways), known, strict=True):
+        kinds += [
+            checks.known(argument, each, names) for each in checks.several(argument, names if given is None else given, argument)
+        ]
+    return kinds
+
+
+def _counts(evaluations: Any) -> tuple[int, ...]:
+    """The numbers of evaluations, each once, ascending."""
+    one = isinstance(evaluations, str) or not isinstance(evaluations, Iterable) or getattr(evaluations, "ndim", 1) == 0
+    several = [evaluations] if one else checks.several("evaluations", evaluations, "numbers")
+    counts = sorted({checks.count("evaluations", each, 1) for each in several})
+    if not counts:
+        raise ShapeError("evaluations: expected one number or several, got none")
+    return tuple(counts)
+
+
+def _listed(names: list[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def _least(relative: Array, errors: Array) -> tuple[float, float]:
+    """The gain with the least error, and that error."""
+    if not np.isfinite(errors).any():
+        return float("nan"), float("nan")
+    i = int(np.nanargmin(errors))
+    return float(relative[i]), float(errors[i])

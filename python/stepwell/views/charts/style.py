@@ -1,0 +1,83 @@
+"""The look of a method in every picture: the colour of its family and its own marker; the line shows its order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from ...model.methods import Method
+from ...model.methods import methods as every_method
+
+MARKERS: tuple[Any, ...] = (*"osD^vPh*<>pdX8H", (4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0), (3, 1, 180))
+#: A colour for each family of methods, the same in every chart. No two are alike in grey, in print, or to an eye without green
+#: cones: tests/test_looks.py measures them.
+FAMILIES = {
+    "Euler": "#efb02e",
+    "leapfrog": "#25a985",
+    "Heun": "#c75a22",
+    "Runge-Kutta": "#175ca6",
+    "PEFRL": "#74194f",
+    "Dormand-Prince": "#10123a",
+}
+COLOURS = tuple(FAMILIES.values())
+#: What is not the finding.
+PALE = "#b8b8b8"
+#: For a second, third and fourth method of one family.
+SECOND = ("#111111", "#666666", "#999999")
+PEERS = "1234+|"
+#: The line shows the order: the higher, the more solid.
+LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 3: (0, (8, 1.8)), 5: (0, (12, 1.5)), 8: (0, (24, 1.2))}
+GREY = "#666666"
+
+#: Sizes in points, for pictures of about 1600 pixels' width at 100 dots per inch.
+FONT: Any = {"font.size": 14.0, "axes.labelsize": 14.0, "legend.fontsize": 12.0}
+
+
+def look(method: Method) -> dict[str, Any]:
+    """Keywords for a line of that method."""
+    i = [m.name for m in every_method()].index(method.name)
+    return {
+        "color": FAMILIES[family(method)],
+        "marker": MARKERS[i % len(MARKERS)],
+        "linestyle": LINES.get(method.order, "-"),
+        "linewidth": 1.6,
+        "markersize": 7.5,
+    }
+
+
+def apart(methods: Iterable[Method], method: Method) -> dict[str, Any]:
+    """Keywords for a line of a method in a chart where each has a colour of its own: the second of a family is black.
+
+    The third and fourth are grey. Where curves have their names beside them, methods of a family share its colour.
+    """
+    before: list[str] = []
+    for each in methods:
+        if each.name == method.name:
+            break
+        before.append(family(each))
+    place = before.count(family(method))
+    return look(method) | ({} if place == 0 else {"color": SECOND[min(place, len(SECOND)) - 1]})
+
+
+def family(method: Method) -> str:
+    """Which of ``FAMILIES`` a method belongs to; one of which nothing else is known is a Runge-Kutta method."""
+    known = {"verlet": "leapfrog", "pefrl": "PEFRL", "dop853": "Dormand-Prince"}
+    last = method.name.rsplit("_", 1)[-1]
+    return {"euler": "Euler", "heun": "Heun", "leapfrog": "leapfrog"}.get(last, known.get(method.name, "Runge-Kutta"))
+
+
+def named(method: Method) -> str:
+    """Its title, and its section if it is in the document."""
+    return f"{method.title} ({method.section})" if method.section.startswith("§") else method.title
+
+
+def peer_look(number: int) -> dict[str, Any]:
+    """Keywords for a line of another program, the first being 0."""
+    return {
+        "color": "#333333",
+        "marker": PEERS[number % len(PEERS)],
+        "linestyle": (0, (1, 2)),
+        "linewidth": 1.3,
+        "markersize": 9.0,
+        "markeredgewidth": 1.8,
+    }

@@ -1,0 +1,93 @@
+"""Time the methods on this machine.
+
+A step of one member of a batch, on one thread, and what it costs against the others. The methods take turns, and the least time
+of some repeats counts, since whatever else the machine does only adds to it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ... import isa
+from ...errors import UnsupportedError
+from ...model.methods import Method, method, methods
+from ...runs.engine import evaluations
+from ...scenes import Scene, scene
+from ...studies.measuring.measure import REPEATS, members_of, refusal, step_times
+from . import show
+
+COLUMNS = ("method", "ns a step>", "±>", "ns an evaluation>", "times the least>", "share of all>", "steps a second>")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument(
+        "scene",
+        nargs="?",
+        default="oscillator",
+        metavar="SCENE",
+        help="a scene (see stepwell scenes), or a Python file that makes one (default: oscillator)",
+    )
+    parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
+    parser.add_argument(
+        "--members", type=int, metavar="N", help="trajectories in the batch; 1 for a single one (default: some hundreds)"
+    )
+    parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
+    show.output_option(parser)
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Time, list."""
+    one = scene(args.scene)
+    chosen = list(methods()) if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
+    show.check_output(args)
+    refused = {each.name: why for each in chosen if (why := refusal(one, each)) is not None}
+    able = [each for each in chosen if each.name not in refused]
+    if not able:
+        raise UnsupportedError("; ".join(refused.values()))
+    members = members_of(one) if args.members is None else args.members
+    found = rows(one, able, members, args.fused)
+    show.listing(
+        args,
+        f"{one.title}: a step of {'a single member' if members == 1 else f'one of {members} members'} on one thread, {isa()}",
+        COLUMNS,
+        [
+            (
+                row["method"],
+                f"{row['ns_per_step']:.3g}",
+                f"{100 * row['error']:.0f} %",
+                f"{row['ns_per_evaluation']:.3g}",
+                f"{row['times_the_least']:.2f}",
+                f"{100 * row['share']:.0f} %",
+                f"{row['steps_per_second']:.2g}",
+            )
+            for row in found
+        ],
+        found,
+        notes=[
+            f"± is by how much the median of {REPEATS} repeats is above their least, which is what is listed.",
+            *(f"{name} is refused: {why}" for name, why in refused.items()),
+        ],
+    )
+
+
+def rows(one: Scene, chosen: list[Method], members: int, fused: bool) -> list[dict[str, Any]]:
+    """A row for each method, the cheapest step first; shares are of the time of one step by each."""
+    times = step_times(one, chosen, 0 if members == 1 else members, fused)
+    least = min(each.low for each in times.values())
+    whole = sum(each.low for each in times.values())
+    return [
+        {
+            "method": each.name,
+            "ns_per_step": times[each.name].low,
+            "median_ns_per_step": times[each.name].median,
+            "error": times[each.name].median / times[each.name].low - 1.0,
+            "ns_per_evaluation": times[each.name].low / evaluations(each, one.system),
+            "times_the_least": times[each.name].low / least,
+            "share": times[each.name].low / whole,
+            "steps_per_second": 1e9 / times[each.name].low,
+        }
+        for each in sorted(chosen, key=lambda each: times[each.name].low)
+    ]

@@ -1,0 +1,132 @@
+"""Chart the error of methods against their cost.
+
+A picture and a table of numbers for each scene, or one for all, and a summary.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from contextlib import nullcontext
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from ...base import checks
+from ...base.pictures import new_figure
+from ...model.methods import method
+from ...scenes import scene
+from ...studies.measuring.data import ERRORS, TARGETS
+from ..charts import Panel, WorkPrecision, work_precision
+from ..charts.picture import title_of
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument(
+        "scenes",
+        nargs="+",
+        metavar="SCENE",
+        help="a scene (see stepwell scenes), with arguments as in kepler:e=0.5, or a Python file that makes one",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path(),
+        metavar="DIR",
+        help="a folder for what is drawn and written (default: this one)",
+    )
+    parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
+    parser.add_argument("--panel", action="store_true", help="one picture and one table of all scenes")
+    parser.add_argument("--fused", action="store_true", help="also with fused multiply-adds, a second curve of each method")
+    parser.add_argument("--float32", action="store_true", help="also in float32, a further curve of each method")
+    parser.add_argument("--error", choices=ERRORS, default=ERRORS[0], help="which error the pictures show (default: %(default)s)")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Measure, draw, write, summarise."""
+    # All names and requirements are checked before any work.
+    chosen = [scene(name) for name in args.scenes]
+    methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
+    names = ["panel"] if args.panel else [one.name for one in chosen]
+    checks.folder("-o", args.output, [name + ending for name in names for ending in (".png", ".csv", ".json")])
+    new_figure(1.0, 1.0)  # raises if there can be no picture
+    args.output.mkdir(parents=True, exist_ok=True)
+
+    written = show.Written()
+    done: list[tuple[WorkPrecision, list[str]]] = []
+    for one in chosen:
+        with nullcontext(None) if args.json else show.progress(one.title) as told:
+            ways: Any = {"fused": "both" if args.fused else False, "dtype": "both" if args.float32 else "float64"}
+            chart = work_precision(one, methods, **ways, progress=told)
+        if args.panel:
+            done.append((chart, []))
+            continue
+        before = len(written.files)
+        written.write(args.output / f"{one.name}.png", partial(chart.plot, error=args.error))
+        written.write(args.output / f"{one.name}.csv", chart.to_csv)
+        done.append((chart, written.files[before:]))
+    if args.panel:
+        whole = Panel(tuple(chart for chart, _ in done))
+        written.write(args.output / "panel.png", partial(whole.plot, error=args.error))
+        written.write(args.output / "panel.csv", whole.to_csv)
+        written.write(args.output / "panel.json", whole.to_json)
+        done = [(chart, written.files) for chart, _ in done]
+    if args.json:
+        show.print_json(
+            [
+                {"scene": c.scene.name, "files": files, "summary": c.summary(), "front": c.front(), "refused": c.refused}
+                for c, files in done
+            ]
+        )
+    else:
+        for chart, files in done:
+            _summary(chart, files)
+    written.close()
+
+
+def _summary(chart: WorkPrecision, files: list[str]) -> None:
+    rows = [
+        (
+            curve.title,
+            "–" if curve.method.order is None else str(curve.method.order),
+            *(_number(curve.cheapest(error)) for error in TARGETS),
+            _number(row["least_error"]),
+            "all" if curve.largest_stable_step == math.inf else f"{curve.largest_stable_step:#.3g}",
+            _number(float(f"{curve.step_time.median:.2g}")),
+        )
+        for curve, row in zip(chart.curves, chart.summary(), strict=True)
+    ]
+    show.table(
+        f"{chart.scene.title}: function evaluations per unit of time for an error",
+        (
+            "method",
+            "order>",
+            *(f"error {error:g}>" for error in TARGETS),
+            "least error>",
+            "stable to dt>",
+            "ns a step>",
+        ),
+        rows,
+        _best(chart)
+        + [f"{title_of(name)} is refused: {reason}" for name, reason in chart.refused.items()]
+        + ([f"written: {', '.join(files)}"] if files else []),
+    )
+
+
+def _best(chart: WorkPrecision) -> list[str]:
+    """Which is the cheapest for each of three errors."""
+    rows = [(error, row) for error in TARGETS if (row := chart.best(error)) is not None]
+    text = "; ".join(f"for {error:g} {row['method']} ({_how(row)})" for error, row in rows)
+    return [f"cheapest: {text}"] if text else []
+
+
+def _how(row: dict[str, Any]) -> str:
+    return f"dt = {row['dt']:.3g}" if row["tolerance"] is None else f"tolerance {row['tolerance']:.3g}"
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "–"

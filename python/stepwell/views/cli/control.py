@@ -1,0 +1,98 @@
+"""Chart what a control does, over its gain.
+
+To what it keeps and to the motion: the energy of bodies, or the lengths of rods.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from ...base import checks
+from ...base.pictures import new_figure
+from ...errors import ArgumentError
+from ...model.methods import method
+from ...scenes import scene
+from ..charts import ControlSweep, control
+from ..charts.picture import title_of
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scene", metavar="SCENE", help="a scene of bodies or rods, or a Python file that makes one")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path(),
+        metavar="DIR",
+        help="a folder for what is drawn and written (default: this one)",
+    )
+    parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: four)")
+    parser.add_argument("--gains", metavar="A,B,…", help="which gains: h·C·K at the start of bodies, c of rods")
+    parser.add_argument("--evaluations", metavar="N,M,…", help="function evaluations of a run; each number is another step")
+    parser.add_argument("--horizon", type=float, metavar="T", help="the time of each run (default: the scene's)")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Run, draw, write, summarise."""
+    one = scene(args.scene)
+    given: dict[str, Any] = {"horizon": args.horizon}
+    if args.methods is not None:
+        given["methods"] = [method(name.strip()) for name in args.methods.split(",")]
+    if args.gains is not None:
+        given["relative"] = _numbers("--gains", args.gains, float)
+    if args.evaluations is not None:
+        given["evaluations"] = _numbers("--evaluations", args.evaluations, int)
+    name = f"{one.name}-control"
+    checks.folder("-o", args.output, [name + ending for ending in (".png", ".csv")])
+    new_figure(1.0, 1.0)  # raises if there can be no picture
+    args.output.mkdir(parents=True, exist_ok=True)
+    with nullcontext(None) if args.json else show.progress(one.title) as told:
+        chart = control(one, progress=told, **given)
+    written = show.Written()
+    written.write(args.output / f"{name}.png", chart.plot)
+    written.write(args.output / f"{name}.csv", chart.to_csv)
+    if args.json:
+        refused = [{"method": key, "kind": kind, "reason": why} for (key, kind), why in chart.refused.items()]
+        head = {"scene": one.name, "files": written.files, "evaluations": list(chart.evaluations)}
+        show.print_json(head | {"answer": chart.answer, "summary": chart.summary(), "refused": refused})
+    else:
+        _summary(chart, written.files)
+    written.close()
+
+
+def _numbers(option: str, text: str, kind: type[int] | type[float]) -> list[Any]:
+    try:
+        return [kind(word) for word in text.split(",")]
+    except ValueError:
+        raise ArgumentError(f"{option}: expected numbers with commas between them, got {text!r}") from None
+
+
+def _summary(chart: ControlSweep, files: list[str]) -> None:
+    rows = [
+        (
+            title_of(row["method"]),
+            row["kind"],
+            f"{row['dt']:.4g}",
+            *(_number(row[name]) for name in ("least_state_error", "state_at_relative", "least_energy_error", "diverged_from")),
+        )
+        for row in chart.summary()
+    ]
+    show.table(
+        f"{chart.title}: the least errors over the gains",
+        ("method", "kept by", "dt>", "state error>", "at gain>", "energy error>", "diverged from gain>"),
+        rows,
+        ([chart.answer] if chart.answer else [])
+        + [f"{title_of(name)}, {kind}, is refused: {why}" for (name, kind), why in chart.refused.items()]
+        + [f"written: {', '.join(files)}"],
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "–"

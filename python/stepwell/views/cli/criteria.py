@@ -1,0 +1,70 @@
+"""Judge methods by the four criteria of Hoffmann (2002).
+
+They are stability, frequency, operations and the largest step (§1).
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ...analysis.stability import Criteria, criteria
+from ...analysis.stability.criterion import PHI
+from ...base import checks
+from ...errors import ArgumentError
+from ...model.methods import method
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
+    default = ",".join(f"{phi:g}" for phi in PHI)
+    parser.add_argument(
+        "--phi", default=default, metavar="A,B,…", help=f"Φ = ω₀·dt at which errors are shown (default: {default})"
+    )
+    parser.add_argument("--markdown", action="store_true", help="print one table in Markdown")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it: .json or .md")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Find, write, tell."""
+    methods = [method(name) for name in args.methods] or None
+    try:
+        phi = [float(text) for text in args.phi.split(",")]
+    except ValueError:
+        raise ArgumentError(f"--phi: expected numbers in rad, such as 0.1,0.5, got {args.phi!r}") from None
+    if args.json and args.markdown:
+        raise ArgumentError("--markdown: expected either this or --json, got both")
+    if args.output is not None:
+        checks.file("-o", args.output, (".json", ".md"))
+
+    found = criteria(methods, phi=phi)
+    written = show.Written()
+    if args.output is not None and args.output.suffix == ".json":
+        written.write(args.output, found.to_json)
+    elif args.output is not None:
+        written.write(args.output, lambda path: path.write_text(found.markdown(), encoding="utf-8"))
+    if args.json:
+        show.print_json(found.rows())
+    elif args.markdown:
+        print(found.markdown(), end="")
+    else:
+        _tables(found, written.notes())
+    written.close()
+
+
+def _tables(found: Criteria, notes: list[str]) -> None:
+    """The one table would be too wide for a screen; its columns in three, each with the methods' names."""
+    head, rows = found.table()
+    series, costs = 1 + head.index("Ψ/Φ − 1"), head.index("+>")
+    parts: tuple[tuple[str, range, list[str]], ...] = (
+        ("Stability of the undamped oscillator, Φ = ω₀·dt, and the series of its errors", range(1, series), []),
+        ("Errors of the undamped oscillator at some Φ", range(series, costs), []),
+        ("Operations of a step", range(costs, len(head)), notes),
+    )
+    for number, (title, columns, below) in enumerate(parts):
+        if number:
+            print()
+        show.table(title, [head[i] for i in (0, *columns)], [[row[i] for i in (0, *columns)] for row in rows], below)

@@ -1,0 +1,87 @@
+"""Explain a step: every operation, by name.
+
+With how often each is computed, and its machine code.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ...base import checks
+from ...errors import ArgumentError, StepwellError, UnknownNameError
+from ...model import systems
+from ...model.controls import AnyControl
+from ...model.systems import System
+from ...scenes import FILE, scene, scenes
+from ...source.explanation import explain
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument(
+        "system",
+        metavar="SYSTEM",
+        help="a scene (see stepwell scenes), a Python file that makes one, or a system by its class, such as Pendulum",
+    )
+    parser.add_argument("method", metavar="METHOD", help="a method; see stepwell methods")
+    parser.add_argument("--members", type=int, metavar="N", help="how many trajectories go together (default: 1)")
+    parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
+    parser.add_argument("--float32", action="store_true", help="in float32, with half the digits")
+    parser.add_argument("--attempt", action="store_true", help="an attempt at an adaptive step")
+    parser.add_argument("--form", default="direct", choices=("direct", "matrix"), help="a step by the transition matrix, or not")
+    parser.add_argument("--start", metavar="HOW", help="how a method with a choice starts; see stepwell methods")
+    parser.add_argument("--record", action="append", default=[], metavar="NAME", help="a quantity to list, too, such as energy")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it: .json, .html or .txt")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Look up, explain, write, tell."""
+    system, control = system_and_control(args.system)
+    if args.output is not None:
+        checks.file("-o", args.output, (".json", ".html", ".txt"))
+    explained = explain(
+        system,
+        args.method,
+        members=args.members,
+        control=control,
+        fused=args.fused,
+        attempt=args.attempt,
+        form=args.form,
+        start=args.start,
+        record=args.record,
+        dtype="float32" if args.float32 else "float64",
+    )
+    written = show.Written()
+    if args.output is not None:
+        if args.output.suffix == ".json":
+            written.write(args.output, explained.to_json)
+        else:
+            text = explained._repr_html_() if args.output.suffix == ".html" else str(explained)
+            written.write(args.output, lambda path: path.write_text(text + "\n", encoding="utf-8"))
+    if args.json:
+        show.print_json(explained.as_dict())
+    else:
+        print("\n".join([str(explained), *written.notes()]))
+    written.close()
+
+
+def system_and_control(name: str) -> tuple[System, AnyControl | None]:
+    """A scene's system and control, or a system of that class as it is by default."""
+    kind = getattr(systems, name, None)
+    if isinstance(kind, type) and issubclass(kind, System) and kind is not System:
+        try:
+            return kind(), None
+        except (StepwellError, TypeError):
+            raise ArgumentError(f"system: {name} needs arguments; name a scene, or use stepwell.explain in Python") from None
+    known = [each.name for each in scenes()]
+    if name not in known and not FILE.fullmatch(name):
+        classes = [each for each in systems.__all__ if isinstance(getattr(systems, each), type) and each != "System"]
+        raise UnknownNameError(
+            f"system: there is no {checks.short(name)}; expected a scene, {', '.join(known)}, or a system, "
+            f"{', '.join(each for each in classes if issubclass(getattr(systems, each), System))}"
+        )
+    found = scene(name)
+    return found.system.sized(found.v, found.y), found.control

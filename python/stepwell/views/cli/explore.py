@@ -1,0 +1,65 @@
+"""Show scenes in the browser, by two methods side by side.
+
+The page has sliders for the step and the parameters, and needs no server; -o writes it to a file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ...base import checks
+from ...scenes import scene as find_scene
+from ..explorer import explore
+from ..explorer.page import offered
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument(
+        "--scene", metavar="SCENE", help="the scene that is shown first, or a Python file that makes one (default: clover)"
+    )
+    parser.add_argument("--only", action="store_true", help="leave out all other scenes")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the page there instead of opening it: .html")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Make the page, then write or open it, and report where it is."""
+    if args.output is not None:
+        checks.file("-o", args.output, (".html", ".htm"))
+    chosen = offered()
+    if args.scene is not None:
+        first = next((each for each in chosen if each.name == args.scene), None) or find_scene(args.scene)
+        others = [] if args.only else [each for each in chosen if each.name != first.name]
+        chosen = [first, *others]
+    if sys.stderr.isatty() and not args.json:
+        print("stepwell: making the page takes some seconds", file=sys.stderr)
+    page = explore(chosen)
+    written = show.Written()
+    if args.output is not None:
+        written.write(args.output, page.save)
+    else:
+        written.files.append(str(page.open()))
+    told = [
+        {
+            "name": each["name"],
+            "title": each["title"],
+            "methods": [name for name in each["steps"] if name != "truth"],
+            "sliders": [slider["name"] for slider in each["sliders"]],
+        }
+        for each in page.data["scenes"]
+    ]
+    if args.json:
+        show.print_json({"written": written.files, "bytes": len(page.html.encode()), "scenes": told})
+    else:
+        size = f"{len(page.html.encode()) / 1000:.0f} kB"
+        print(f"a page of {size} for browsers since 2023, with {len(page.methods)} methods; scene{'s' * (len(told) > 1)}:")
+        for each in told:
+            sliders = ", ".join(each["sliders"]) or "none"
+            print(f"  {each['name']}: {each['title']}; {len(each['methods'])} methods; sliders {sliders}")
+        for note in written.notes():
+            print(note)
+    written.close()

@@ -1,0 +1,52 @@
+"""List the methods, or describe one."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ...errors import ArgumentError
+from ...model.methods import Method, method, methods
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("name", nargs="?", help="a method by any of its names, such as false_euler or RK4")
+    show.output_option(parser)
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """List the methods, or describe one."""
+    if args.name is not None:
+        one = method(args.name)
+        if args.output is not None:
+            raise ArgumentError("-o: expected no METHOD beside it; the file is the table of all methods")
+        if args.json:
+            show.print_json(_record(one))
+        else:
+            print(one.__doc__)
+        return
+    show.listing(
+        args,
+        "Methods",
+        ("method", "order>", "function evaluations>", "oscillator stable for", "section", "title", "also called"),
+        [
+            (
+                m.name,
+                str(m.order),
+                str(m.evaluations),
+                f"Φ < {m.limit:.6g}" if m.limit else "no Φ",
+                m.section,
+                m.title,
+                "; ".join(m.other_names),
+            )
+            for m in methods()
+        ],
+        [_record(m) for m in methods()],
+    )
+
+
+def _record(method: Method) -> dict[str, Any]:
+    return {key: value for key, value in vars(method).items() if not key.startswith("_")}

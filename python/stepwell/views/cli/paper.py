@@ -1,0 +1,63 @@
+"""Run the document (Hoffmann 2002), section by section.
+
+Every statement, what it finds here, and every figure.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ...base import checks
+from ...base.pictures import new_figure
+from ...errors import StepwellError
+from .. import paper
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("section", nargs="?", metavar="SECTION", help='one section, such as 7 or "App. C" (default: all)')
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="a folder: draw the figures into it, too")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Run, list, draw."""
+    section = args.section
+    if section is not None:
+        section = f"§{section}" if section.isdigit() else f"App. {section}" if len(section) == 1 else section
+    chosen = paper.entries(section)
+    if args.output is not None:
+        checks.folder("-o", args.output)
+        new_figure(1.0, 1.0)  # raises if there can be no picture
+
+    found = [entry.run() for entry in chosen]
+    written = show.Written()
+    if args.output is not None and any(entry.draw for entry in chosen):
+        written.files = [str(path) for path in written.write(args.output, lambda folder: paper.draw(folder, section)) or ()]
+    if args.json:
+        rows = [
+            {name: getattr(entry, name) for name in ("section", "kind", "name", "says", "here", "corrected", "picture")}
+            | run._asdict()
+            for entry, run in zip(chosen, found, strict=True)
+        ]
+        show.print_json({"statements": rows, "files": written.files})
+    else:
+        show.table(
+            "The document, section by section",
+            ("section", "statement", "right instead", "found here", ""),
+            [
+                (entry.section, entry.says, plain(entry.corrected), run.found, "✓" if run.holds else "✗ not reproduced")
+                for entry, run in zip(chosen, found, strict=True)
+            ],
+            written.notes(),
+        )
+    written.close()
+    if failed := [entry.name for entry, run in zip(chosen, found, strict=True) if not run.holds]:
+        raise StepwellError(f"not reproduced: {', '.join(failed)}")
+
+
+def plain(text: str) -> str:
+    """Text without the marks of code."""
+    return text.replace("`", "")

@@ -1,0 +1,195 @@
+"""Run a scene by a method.
+
+Shows its end and its errors, and writes numbers, a picture or an animation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from ...base import checks
+from ...base.pictures import new_figure
+from ...errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning, ToleranceWarning
+from ...model.controls import WAYS, AnyControl, EnergyControl, Projection
+from ...runs.integration import FORMS, integrate
+from ...runs.result import Run
+from ...scenes import Scene
+from ..charts import RunPicture, run_picture
+from ..charts.runs_animation import ENDINGS as ANIMATIONS
+from ..charts.runs_animation import need as need_for_animation
+from . import show
+from .settings import scene_with
+from .verdict import verdict
+
+#: Without --every, about so many states are kept; more for a picture, whose curves are to be smooth.
+KEPT, KEPT_TO_DRAW = 1000, 20_000
+
+#: With a tolerance the state is saved so often; more for a picture.
+ADAPTIVE, ADAPTIVE_TO_DRAW = 100, 2000
+
+#: Digits of a number on the screen, and the most numbers of a block there.
+DIGITS, DIGITS_OF_AN_ERROR, MOST_SHOWN = 8, 3, 12
+
+#: What a number of the report is called on the screen, if not by its name.
+NAMES = {"kept": "saved states"}
+
+NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument(
+        "scene",
+        metavar="SCENE",
+        help="a scene (see stepwell scenes), with arguments as in energy_control:pair=printed, or a Python file that makes one",
+    )
+    parser.add_argument("--method", required=True, metavar="NAME", help="a method; see stepwell methods")
+    parser.add_argument("--dt", type=float, metavar="TIME", help="the step (default: the scene's)")
+    parser.add_argument("--steps", type=int, metavar="N", help="how many steps (default: up to the scene's horizon)")
+    parser.add_argument("--every", type=int, metavar="N", help=f"keep every Nth state (default: about {KEPT} in all)")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter or the start, as omega=3 or y=2"
+    )
+    parser.add_argument("--tolerance", type=float, metavar="E", help="adaptive steps, whose estimated error stays below this")
+    parser.add_argument("--start", metavar="HOW", help="how a method with a choice starts; see stepwell methods NAME")
+    parser.add_argument(
+        "--form", default="direct", choices=FORMS, help="step directly, by the transition matrix, or by its powers"
+    )
+    parser.add_argument(
+        "--control",
+        metavar="CONTROL",
+        help="what keeps the energy of bodies: a gain and a form, such as 0.3 or 0.3:printed; a projection, scaling or nacozy; "
+        "off for none (default: the scene's)",
+    )
+    parser.add_argument("--fused", action="store_true", help="compute with fused multiply-adds")
+    parser.add_argument("--float32", action="store_true", help="compute in float32, with half the digits")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="write the saved states (.csv, .npz), a picture (.png, .svg, .pdf) or an animation (.gif, .mp4, .html)",
+    )
+    parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="how long an animation lasts (default: 10)")
+    parser.add_argument("--fps", type=float, default=20.0, metavar="N", help="frames a second of an animation (default: 20)")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Run, report, write."""
+    chosen = scene_with(args.scene, args.set)
+    ending = "" if args.output is None else args.output.suffix
+    _ready(args.output, args.seconds, args.fps)
+    to_draw = ending in (*PICTURES, *ANIMATIONS)
+    given: dict[str, Any] = {"control": chosen.control if args.control is None else _control(args.control)}
+    given |= {"record": list(chosen.system.quantities)[:1]}
+    if args.fused:
+        given["fused"] = True
+    if args.float32:
+        given["dtype"] = "float32"
+    if args.start is not None:
+        given["start"] = args.start
+    if args.form != "direct":
+        given |= {"form": args.form, "record": ()}
+    with warnings.catch_warnings(record=True) as told:
+        for kind in (AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning):
+            warnings.simplefilter("always", kind)
+        run = _fixed(args, chosen, to_draw, given) if args.tolerance is None else _adaptive(args, chosen, to_draw, given)
+    for warning in told:
+        print(f"stepwell: warning: {warning.message}", file=sys.stderr)
+
+    picture = run_picture(chosen, run)
+    columns: dict[str, Any] = picture.columns()
+    written = show.Written()
+    if ending == ".npz":
+        written.write(args.output, lambda path: np.savez(path, **columns))
+    elif ending == ".csv":
+        written.write(args.output, picture.to_csv)
+    elif ending in PICTURES:
+        written.write(args.output, picture.plot)
+    elif ending in ANIMATIONS:
+        written.write(args.output, lambda path: picture.animate(path, seconds=args.seconds, fps=args.fps))
+    report = _report(picture, columns) | ({"written": written.files[0]} if written.files else {})
+    if args.json:
+        show.print_json(report)
+    else:
+        for name, value in report.items():
+            if value is not None:
+                print(f"{NAMES.get(name, name.replace('_', ' ')):21} {_said(name, value)}")
+    written.close()
+
+
+def _fixed(args: argparse.Namespace, chosen: Scene, to_draw: bool, given: dict[str, Any]) -> Run:
+    """The run with steps of one length."""
+    dt = chosen.dt if args.dt is None else args.dt
+    steps = chosen.steps_for(dt) if args.steps is None else args.steps
+    every = max(1, steps // (KEPT_TO_DRAW if to_draw else KEPT)) if args.every is None else args.every
+    return chosen.run(args.method, dt, steps=steps, every=every, **given)
+
+
+def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, given: dict[str, Any]) -> Run:
+    """The run with adaptive steps over the horizon, at equidistant times."""
+    for option in ("steps", "every"):
+        if getattr(args, option) is not None:
+            raise ArgumentError(f"--{option}: goes with fixed steps only; with --tolerance the steps follow the error")
+    at = np.linspace(0.0, chosen.horizon, 1 + (ADAPTIVE_TO_DRAW if to_draw else ADAPTIVE))
+    given |= chosen.adaptive_options | ({} if args.dt is None else {"dt": args.dt})
+    return integrate(chosen.system, args.method, v=chosen.v, y=chosen.y, tolerance=args.tolerance, at=at, **given)
+
+
+def _said(name: str, value: Any) -> str:
+    """A value in the digits that are looked at; --json and files have all."""
+    if isinstance(value, float):
+        return f"{value:.{DIGITS_OF_AN_ERROR if name.endswith('error') else DIGITS}g}"
+    if isinstance(value, list):
+        array = np.array(value)
+        if array.size > MOST_SHOWN:
+            return f"{' × '.join(map(str, array.shape))} numbers; -o FILE writes them, --json prints them"
+        return np.array2string(array, precision=DIGITS, floatmode="maxprec", separator=", ", max_line_width=1000).replace(
+            "\n", ""
+        )
+    return str(value)
+
+
+def _ready(path: Path | None, seconds: float, fps: float) -> None:
+    """Raise if the file cannot be written, for want of a format, a program or a place, before any work is done."""
+    if path is None:
+        return
+    checks.file("-o", path, (*NUMBERS, *PICTURES, *ANIMATIONS))
+    if path.suffix in PICTURES:
+        new_figure(1.0, 1.0)
+    elif path.suffix in ANIMATIONS:
+        need_for_animation(path, seconds, fps)
+
+
+def _control(given: str) -> AnyControl | None:
+    """The control that ``GAIN[:FORM]``, the way of a projection or ``off`` says."""
+    if given == "off":
+        return None
+    if given in WAYS:
+        return Projection(given)
+    gain, _, form = given.partition(":")
+    try:
+        strength = float(gain)
+    except ValueError:
+        raise ArgumentError(
+            f"--control: expected a gain and a form, such as 0.3:printed, {', '.join(WAYS)} or off, got {given!r}"
+        ) from None
+    return EnergyControl(strength, cast(Any, form)) if form else EnergyControl(strength)
+
+
+def _report(picture: RunPicture, columns: dict[str, Any]) -> dict[str, Any]:
+    known = {name: value for name, value in picture.summary().items() if not name.startswith("largest") or value is not None}
+    if (paces := picture.run.paces) is not None:
+        del known["dt"]
+        known["steps"] = int(paces.accepted)
+        known |= {"rejected_steps": int(paces.rejected), "function_evaluations": int(paces.evaluations)}
+    known = {"scene": known.pop("scene"), "method": known.pop("method"), "verdict": verdict(picture)} | known
+    largest = {name: known.pop(name) for name in list(known) if name.startswith("largest")}
+    return known | {f"last_{name}": columns[name][-1].tolist() for name in ("t", "v", "y", "energy") if name in columns} | largest

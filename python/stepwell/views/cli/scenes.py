@@ -1,0 +1,36 @@
+"""List the scenes.
+
+A scene is a system with its start, a step and, where there is one, the exact solution.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from ...scenes import scenes
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    show.output_option(parser)
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """List the scenes."""
+    fields = ("name", "title", "section", "description", "error", "dt", "horizon")
+    listed = scenes()
+    show.listing(
+        args,
+        "Scenes",
+        ("scene", "section", "dt>", "horizon>", "exact", "what it is"),
+        [
+            (s.name, s.section, f"{s.dt:.4g}", f"{s.horizon:.4g}", "no" if s.exact is None else "yes", s.description)
+            for s in listed
+        ],
+        [
+            {field: getattr(scene, field) for field in fields} | {"system": repr(scene.system), "exact": scene.exact is not None}
+            for scene in listed
+        ],
+    )

@@ -1,0 +1,126 @@
+"""What the commands print and write: tables, or JSON for programs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import textwrap
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+from ...base import checks
+from ...base.tables import finite, write_csv, write_json
+from .table import lines_of, width_of_terminal
+
+
+def json_option(parser: argparse.ArgumentParser) -> None:
+    """Let a command print JSON instead of a table."""
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+
+
+def print_json(value: Any) -> None:
+    """Print a value for other programs; what is not finite is null."""
+    print(json.dumps(finite(value), ensure_ascii=False, indent=1))
+
+
+#: The files into which the table of a list is written.
+TABLE_FILES = (".csv", ".json", ".md")
+
+
+def output_option(parser: argparse.ArgumentParser) -> None:
+    """Let a command that lists something write the list."""
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"write the table: {', '.join(TABLE_FILES)}")
+
+
+def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], notes: Sequence[str] = ()) -> None:
+    """Print a table; columns whose name ends in ``>`` are flush right."""
+    bold = sys.stdout.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
+    print("\n".join(lines_of(title, columns, rows, notes, width=width_of_terminal(), bold=bold)))
+
+
+def paragraphs(lines: Iterable[str]) -> None:
+    """Print sentences, which a terminal's width wraps between words."""
+    width = width_of_terminal()
+    for line in lines:
+        print("\n".join(textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False)) if line else "")
+
+
+def listing(
+    args: argparse.Namespace,
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    data: list[dict[str, Any]],
+    notes: Sequence[str] = (),
+) -> None:
+    """Print a list as a table or as JSON, and write it if a file is asked for; ``data`` has all of it for programs."""
+    check_output(args)
+    written = Written()
+    if args.output is not None:
+        written.write(args.output, lambda path: _write(path, columns, rows, data))
+    if args.json:
+        print_json(data)
+    else:
+        table(title, columns, rows, [*notes, *written.notes()])
+    written.close()
+
+
+def check_output(args: argparse.Namespace) -> None:
+    """Raise if the list cannot be written, before any work is done."""
+    if args.output is not None:
+        checks.file("-o", args.output, TABLE_FILES)
+
+
+def _write(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]], data: list[dict[str, Any]]) -> None:
+    if path.suffix == ".json":
+        write_json(data, path)
+    elif path.suffix == ".csv":
+        write_csv({name: [_cell(row[name]) for row in data] for name in data[0]}, path)
+    else:
+        names = [name.removesuffix(">") for name in columns]
+        sides = ["--:" if name.endswith(">") else "---" for name in columns]
+        cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+        path.write_text("".join(f"| {' | '.join(line)} |\n" for line in [names, sides, *cells]), encoding="utf-8")
+
+
+def _cell(value: Any) -> Any:
+    """A value in a file of commas: the parts of a list with semicolons between them."""
+    return "; ".join(map(str, value)) if isinstance(value, (list, tuple)) else value
+
+
+class Written:
+    """Files that a command writes. What cannot be written is said when all else has been, so that no result is lost with it."""
+
+    def __init__(self) -> None:
+        self.files: list[str] = []
+        self.error: Exception | None = None
+
+    def write(self, path: Path, how: Callable[[Path], Any]) -> Any:
+        """Write a file and return what ``how`` returns, or keep the error for ``close``."""
+        try:
+            what = how(path)
+        except Exception as error:  # whatever it is, it is raised in the end
+            self.error = self.error or error
+            return None
+        self.files.append(str(path))
+        return what
+
+    def notes(self) -> list[str]:
+        """What a table says below."""
+        return [f"written: {', '.join(self.files)}"] if self.files else []
+
+    def close(self) -> None:
+        """Raise what was kept."""
+        if self.error is not None:
+            raise self.error
+
+
+def progress(title: str) -> AbstractContextManager[Callable[[float], object]]:
+    """A progress bar; gives the function that takes the share that is done."""
+    from ...base.progress import bar
+
+    return bar(title)

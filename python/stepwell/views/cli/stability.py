@@ -1,0 +1,91 @@
+"""Chart where methods are stable.
+
+The eigenvalues of a step, how much it grows or damps, and the largest stable steps.
+"""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+
+from ...base import checks
+from ...base.pictures import new_figure
+from ...errors import ArgumentError, UnsupportedError
+from ...model.methods import method
+from ..charts import Stability, powers, stability, stability_map
+from ..charts.zplane import KINDS, ladder, within
+from . import show
+
+#: The default drawings: the pictures of all methods, and the map of each. Powers are drawn if asked for.
+USUAL = (*KINDS, "map")
+CHARTS = (*USUAL, "powers")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="a folder for pictures and numbers")
+    parser.add_argument("--charts", metavar="A,B,…", help=f"which of {', '.join(CHARTS)} to draw (default: all but powers)")
+    parser.add_argument("--phi", type=float, metavar="RAD", help="the largest Φ = ω₀·dt (default: past the largest limit)")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Analyse, draw, write, tell."""
+    # All names and requirements are checked before any work.
+    methods = [method(name) for name in args.methods] or None
+    asked = USUAL if args.charts is None else tuple(name.strip() for name in args.charts.split(","))
+    kinds = [checks.known("--charts", name, CHARTS) for name in dict.fromkeys(asked)]
+    if args.charts is not None and args.output is None:
+        raise ArgumentError("-o: expected a folder for what --charts asks for")
+    top = None if args.phi is None else within("--phi", checks.number("--phi", args.phi, positive=True, unit="rad"))
+    if args.output is not None:
+        checks.folder("-o", args.output, ["stability.csv", *(f"stability-{kind}.png" for kind in kinds)])
+        new_figure(1.0, 1.0)  # raises if there can be no picture
+
+    chart = stability(methods, phi=None if top is None else ladder(top))
+    written = show.Written()
+    refused = {} if args.output is None else _write(chart, args.output, kinds, top, written)
+    if args.json:
+        show.print_json({"files": written.files, "summary": chart.summary(), "refused": refused})
+        written.close()
+        return
+    rows = [
+        (
+            row["title"],
+            f"{row['limit']:.7g}" if row["limit"] else "never",
+            f"{row['samples_per_period']:.4g}" if row["limit"] else "–",
+            row["leaves_by"] or "–",
+            row["r1_squared_minus_1"],
+            row["frequency_deviation"],
+        )
+        for row in chart.summary()
+    ]
+    show.table(
+        "Stability of the undamped oscillator, Φ = ω₀·dt",
+        ("method", "stable for Φ <>", "steps a period >>", "past that", "r₁² − 1", "Ψ/Φ − 1"),
+        rows,
+        [f"no map of {method(name).title}: {reason}" for name, reason in refused.items()] + written.notes(),
+    )
+    written.close()
+
+
+def _write(chart: Stability, folder: Path, kinds: list[str], top: float | None, written: show.Written) -> dict[str, str]:
+    """Write what was asked for; returns which methods have no map and why."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for kind in kinds:
+        if kind in KINDS:
+            written.write(folder / f"stability-{kind}.png", partial(chart.plot, kind=kind))
+    written.write(folder / "stability.csv", chart.to_csv)
+    refused = {}
+    for locus in chart.loci if "map" in kinds else ():
+        try:
+            drawn = stability_map(locus.method) if top is None else stability_map(locus.method, phi=(0.0, top))
+        except UnsupportedError as error:
+            refused[locus.method.name] = str(error)
+            continue
+        written.write(folder / f"stability-map-{locus.method.name}.png", drawn.plot)
+    for locus in chart.loci if "powers" in kinds else ():
+        written.write(folder / f"powers-{locus.method.name}.png", powers(locus.method).plot)
+    return refused

@@ -1,0 +1,34 @@
+"""How a run ended, in words."""
+
+from __future__ import annotations
+
+from ...runs.result import Status
+from ..charts import RunPicture
+from ..charts.runs_finding import MIN_GROWTH, MIN_GROWTH_UNKNOWN, growth_of, tenfold
+
+#: Why a run with a tolerance stopped.
+STOPPED = {
+    Status.DIVERGED: "left the finite numbers",
+    Status.BUDGET: "used up the most steps that are allowed",
+    Status.UNDERFLOW: "would need steps too short to change the time",
+    Status.NOT_FINITE: "no step gave a finite state",
+}
+
+
+def verdict(picture: RunPicture) -> str:
+    """Whether the run stayed with its motion: a word or two, and the number that says so."""
+    run = picture.run
+    if run.status:
+        step = int(run.first_bad_step)
+        if run.paces is None:
+            return f"diverged at step {step} (t = {run.t0 + step * run.dt:.6g}): unstable"
+        return f"stopped at t = {float(run.paces.t):.6g}: {STOPPED[Status(int(run.status))]}"
+    growth, known = growth_of(picture)
+    if growth >= (MIN_GROWTH if known else MIN_GROWTH_UNKNOWN):
+        return f"grew by {tenfold(growth)}: unstable"
+    error = picture.summary()["largest_state_error"]
+    if error is None:
+        return "finite to the end; the true motion is not known, so neither is the error"
+    if error > 1.0:
+        return f"bounded, but wrong: the state error is up to {error:.2g}, where 1 is as large as the solution"
+    return f"bounded; the state error is at most {error:.2g}"

@@ -1,0 +1,202 @@
+"""A scene as the page has it: numbers and texts, and its steps by every method, packed."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import re
+import warnings
+import zlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...errors import StepwellError, UnsupportedError
+from ...model.methods import Method
+from ...runs.integration import integrate
+from ...scenes import Scene
+from ...scenes import scene as find_scene
+from ...scenes.taylor import Orbit
+from ...source.exports import export
+from ..charts.style import look
+from . import sliders, systems
+
+#: The methods that may make the run with small steps that errors are measured by, the first that can step the scene.
+TRUTH_METHODS = ("dop853", "rk4", "standard_heun")
+
+#: The class in an exported module; what the page needs from all of them.
+CLASS = "step"
+
+#: How many states give the size of a motion, the most steps of the run that finds them, and the share of extreme values to
+#: either side for which pictures have no room.
+SAMPLES, MAX_SIZE_STEPS, SHARE_LEFT_OUT = 1000, 20_000, 0.005
+
+#: The longest step that goes into a page, in characters.
+MAX_SOURCE = 400_000
+
+
+def of_method(method: Method) -> dict[str, Any]:
+    """What the page tells of a method, and its colour in all pictures."""
+    told = {name: getattr(method, name) for name in ("name", "title", "order", "evaluations", "limit", "carry", "section")}
+    return told | {"colour": look(method)["color"]}
+
+
+def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
+    """What the page has of a scene.
+
+    Raises:
+        UnsupportedError: if none of the methods can step it, or its steps are too long for a page.
+    """
+    sources, names, refused, truth_by = _sources(scene, methods)
+    parameters = parameters_of(sources[next(iter(names.values()))])
+    offer = sliders.OFFERS.get(scene.name, sliders.Offer())
+    known = built_in(scene)
+    own = offer.sliders if known else sliders.generic(scene.system, parameters, scene.control is not None)
+    truth = offer.truth if known else None
+    v, y = ([float(each) for each in block.reshape(-1)] for block in (scene.v, scene.y))
+    energy = systems.energy(scene.system)
+    values = {"m": parameters, "e": energy or {}, "v": v, "y": y}
+    return {
+        "name": scene.name,
+        "title": scene.title,
+        "section": scene.section,
+        "description": scene.description,
+        "dt": scene.dt,
+        "horizon": scene.horizon,
+        "rate": (offer.rate if known else None) or scene.horizon / 20.0,
+        "v": v,
+        "y": y,
+        "motion": systems.motion(scene.system),
+        "energy": energy,
+        "phases": systems.phase_planes(scene.system),
+        "phase": offer.phase if known else 0,
+        "linear": scene.system.linear,
+        "limit": offer.limit if known else None,
+        "truth": truth,
+        **sizes(scene),
+        "sliders": [told for each in own if (told := _slider(each, values)) is not None],
+        "steps": names,
+        "truth_by": truth_by,
+        "refused": refused,
+        "packed": packed(sources),
+    }
+
+
+def built_in(scene: Scene) -> bool:
+    """Whether it is a built-in scene as made without arguments, for which the sliders are meant."""
+    if scene.name not in sliders.OFFERS:
+        return False
+    return scene == (sliders.rope() if scene.name == "rope" else find_scene(scene.name))
+
+
+def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[str, int], dict[str, str], str | None]:
+    """The steps as JavaScript; the place of that of each method, and of the "truth"; why others are missing; what makes truth."""
+    sources: list[str] = []
+    places: dict[str, int] = {}
+    refused: dict[str, str] = {}
+    given: dict[str, Any] = {"dt": scene.dt, "v": scene.v, "y": scene.y, "name": CLASS}
+    for method in methods:
+        try:
+            source = export(scene.system, method, "javascript", control=scene.control, **given).source
+        except StepwellError as error:
+            refused[method.name] = str(error)
+            continue
+        if len(source) > MAX_SOURCE:
+            refused[method.name] = f"a step of {len(source)} characters is too long for a page"
+            continue
+        places[method.name] = len(sources)
+        sources.append(source)
+    if not places:
+        why = next(iter(refused.values()))
+        raise UnsupportedError(f"scenes: no method steps {scene.name} in a page: {why}")
+    truth_by = None
+    for name in TRUTH_METHODS:
+        if scene.control is None and name in places:
+            truth_by, places["truth"] = name, places[name]
+            break
+        try:
+            source = export(scene.system, name, "javascript", **given).source
+        except StepwellError:
+            continue
+        if len(source) <= MAX_SOURCE:
+            truth_by, places["truth"] = name, len(sources)
+            sources.append(source)
+            break
+    return sources, places, refused, truth_by
+
+
+PARAMETER = re.compile(r"^    this\.(\w+) = (.*?);", re.MULTILINE | re.DOTALL)
+
+
+def parameters_of(source: str) -> dict[str, Any]:
+    """The parameters of an exported step, with their values in its text."""
+    begin = source.index("  constructor(")
+    text = source[begin : source.index("    for (const name of", begin)]
+    return {name: json.loads(re.sub(r",\s*\]", "]", value)) for name, value in PARAMETER.findall(text)}
+
+
+def packed(sources: list[str]) -> str:
+    """Texts as the page unpacks them: JSON, deflated, in base 64."""
+    text = json.dumps(sources, ensure_ascii=False, separators=(",", ":")).encode()
+    return base64.b64encode(zlib.compress(text, 9)).decode()
+
+
+def sizes(scene: Scene) -> dict[str, Any]:
+    """How large the motion is: of the exact solution where there is a formula, else of a run by Runge-Kutta.
+
+    ``scales`` are the largest lengths of v and y, in which errors are measured; ``ranges`` the least and largest value of each
+    number of a block, for the axes of pictures.
+    """
+    if scene.exact is not None and scene.until >= scene.horizon and not isinstance(scene.exact, Orbit):
+        lengths = list(scene.scales)
+        blocks = scene.exact(np.linspace(0.0, scene.horizon, SAMPLES))
+    else:
+        steps = min(scene.steps_for(scene.dt), MAX_SIZE_STEPS)
+        given: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": scene.dt, "steps": steps, "control": scene.control}
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a size need not be exact
+            run = integrate(scene.system, "rk4", **given, every=max(1, steps // SAMPLES))
+        blocks = run.v, run.y
+        rows = (block.reshape(len(block), -1) for block in blocks)
+        lengths = [float(_finite(np.sqrt((row * row).sum(axis=1))).max(initial=0.0)) for row in rows]
+    ranges = {}
+    for name, block in zip("vy", blocks, strict=True):
+        columns = block.reshape(len(block), -1).T
+        ranges[name] = [np.quantile(_finite(each), [SHARE_LEFT_OUT, 1.0 - SHARE_LEFT_OUT]).tolist() for each in columns]
+    return {"scales": lengths, "ranges": ranges}
+
+
+def _finite(values: Array) -> Array:
+    found = values[np.isfinite(values)]
+    return found if len(found) else np.zeros(1)
+
+
+def _slider(slider: sliders.Slider, values: dict[str, Any]) -> dict[str, Any] | None:
+    """A slider with its value at first; None if the scene has none of its numbers."""
+    value = 1.0 if slider.relative else None
+    if value is None:
+        for path, factor in slider.targets.items():
+            if (found := _at(values, path)) is not None:
+                value = found / factor
+                break
+    if value is None or not math.isfinite(value):
+        return None
+    low, high = min(slider.low, value), max(slider.high, value)
+    told = {"name": slider.name, "label": slider.label, "about": slider.about, "low": low, "high": high, "value": value}
+    return told | {"relative": slider.relative, "targets": dict(slider.targets)}
+
+
+def _at(values: dict[str, Any], path: str) -> float | None:
+    """The number at a path, or None."""
+    name, _, index = path.removesuffix("]").partition("[")
+    found: Any = values
+    for part in name.split("."):
+        if not isinstance(found, dict) or part not in found:
+            return None
+        found = found[part]
+    if isinstance(found, list):
+        found = found[0 if index == "*" else int(index)]
+    return float(found)

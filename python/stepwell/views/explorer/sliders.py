@@ -1,0 +1,245 @@
+"""What the page offers of each built-in scene: sliders, speed, the exact solution if the page has its formula.
+
+A slider sets numbers by their *paths*: ``m.omega`` a parameter of the exported step, ``m.Gm[1]`` an element of one, ``m.mass[*]``
+all of one; ``e.`` likewise of the energy, ``v`` and ``y`` of the start. Each is set to the slider's value times a factor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...model.systems import Springs
+from ...scenes import Scene
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A number that the page lets users slide.
+
+    Attributes:
+        name: its name in a link and in formulas of the page.
+        label: what is written beside it.
+        low: its least value.
+        high: its largest value.
+        targets: the paths of the numbers that it sets, each with a factor.
+        relative: whether it multiplies what these numbers are in the scene; it is 1 then at first.
+        about: a sentence, shown as a hint.
+    """
+
+    name: str
+    label: str
+    low: float
+    high: float
+    targets: Mapping[str, float]
+    relative: bool = False
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What the page offers of a scene.
+
+    Attributes:
+        sliders: what may be changed.
+        rate: units of time that pass in a second; None for a twentieth of the horizon.
+        truth: the exact solution among those that the page has formulas for, or None: a run with small steps.
+        limit: how the page finds the stability limit: "oscillator" and "chain" by the method's own, "scan" by the roots; or None.
+        phase: which phase plane is shown at first.
+    """
+
+    sliders: tuple[Slider, ...] = ()
+    rate: float | None = None
+    truth: str | None = None
+    limit: str | None = None
+    phase: int = 0
+
+
+def masses(n: int) -> tuple[Slider, ...]:
+    """A slider for the mass of each body."""
+    return tuple(
+        Slider(f"m{i + 1}", f"mass {i + 1}", 0.05, 6.0, {f"{path}[{i}]": 1.0 for path in ("m.Gm", "e.Gm", "e.masses")})
+        for i in range(n)
+    )
+
+
+SOFTENING = Slider("soft", "softening", 0.0, 0.5, {"m.softening": 1.0, "e.softening": 1.0}, about="ε in r² + ε²")
+SPEED = Slider("start", "speed at the start, ×", 0.5, 1.5, {"v[*]": 1.0}, relative=True)
+ROD_GRAVITY = Slider("gravity", "gravity", 0.0, 5.0, {"m.gravity": 1.0, "e.gravity[1]": -1.0})
+
+
+def rod_masses(n: int) -> tuple[Slider, ...]:
+    """A slider for each mass that hangs on a rod."""
+    return tuple(
+        Slider(f"m{i + 1}", f"mass {i + 1}", 0.05, 6.0, {f"m.masses[{i}]": 1.0, f"e.masses[{i}]": 1.0}) for i in range(n)
+    )
+
+
+OFFERS: dict[str, Offer] = {
+    "clover": Offer((*masses(3), SOFTENING), rate=3.0),
+    "oscillator": Offer(
+        (Slider("omega", "ω₀", 0.2, 6.0, {"m.omega": 1.0}), Slider("start", "y at the start", -2.0, 2.0, {"y[0]": 1.0})),
+        rate=3.0,
+        truth="oscillator",
+        limit="oscillator",
+    ),
+    "forced_oscillator": Offer(
+        (
+            Slider("omega", "ω₀", 0.2, 6.0, {"m.omega": 1.0, "e.omega": 1.0}),
+            Slider("damping", "damping D", 0.0, 0.99, {"m.damping": 1.0}),
+            Slider("amplitude", "amplitude of the drive", 0.0, 3.0, {"m.a_amplitude": 1.0}),
+            Slider("drive", "frequency of the drive", 0.05, 3.0, {"m.a_omega": 1.0}),
+        ),
+        rate=3.0,
+        truth="forced_oscillator",
+        limit="scan",
+    ),
+    "pendulum": Offer(
+        (
+            Slider("omega", "ω₀ of small swings", 0.2, 6.0, {"m.omega": 1.0, "e.omega": 1.0}),
+            Slider("start", "angle at the start", -3.14, 3.14, {"y[0]": 1.0}),
+            Slider("push", "angular velocity at the start", -3.0, 3.0, {"v[0]": 1.0}),
+        ),
+        rate=2.0,
+        limit="oscillator",
+    ),
+    "chain": Offer(
+        (
+            Slider("stiffness", "stiffness", 0.1, 6.0, {"m.stiffness[*]": 1.0, "e.stiffness[*]": 1.0}),
+            Slider("mass", "masses", 0.1, 6.0, {"m.mass[*]": 1.0, "e.mass[*]": 1.0}),
+        ),
+        rate=5.0,
+        limit="chain",
+    ),
+    "energy_control": Offer((Slider("gain", "gain C of the control", 0.0, 1.0, {"m.control_gain": 1.0}),), rate=3.0),
+    "kepler": Offer((*masses(2), SPEED), rate=1.5),
+    "figure_eight": Offer((*masses(3), SPEED), rate=1.5),
+    "pythagorean": Offer((*masses(3), SOFTENING), rate=2.0),
+    "arenstorf": Offer((SPEED,), rate=1.0),
+    "double_pendulum": Offer((*rod_masses(2), ROD_GRAVITY), rate=2.0),
+    "conical_pendulum": Offer(
+        (Slider("gravity", "gravity", 0.0, 5.0, {"m.gravity": 1.0, "e.gravity[2]": -1.0}), SPEED), rate=1.0
+    ),
+    "rope": Offer(
+        (
+            Slider("stiffness", "stiffness", 20.0, 2000.0, {"m.stiffness[*]": 1.0, "e.stiffness[*]": 1.0}),
+            Slider("load", "mass at the end", 0.1, 10.0, {"m.masses[5]": 1.0, "e.masses[5]": 1.0}),
+            Slider("gravity", "gravity", 0.0, 20.0, {"m.gravity[1]": -1.0, "e.gravity[1]": -1.0}),
+        ),
+        rate=1.0,
+        phase=10,
+    ),
+    "bouncing_ball": Offer(
+        (
+            Slider("restitution", "restitution e", 0.0, 1.0, {"m.contact_0_restitution": 1.0}),
+            Slider("gravity", "gravity", 1.0, 20.0, {"m.gravity[1]": -1.0, "e.gravity[1]": -1.0}),
+        ),
+        rate=0.5,
+        truth="bouncing_ball",
+        phase=1,
+    ),
+    "sliding_block": Offer(
+        (
+            Slider("friction", "friction μg", 0.5, 15.0, {"m.friction_limit": 1.0}),
+            Slider("start", "speed at the start", 0.0, 6.0, {"v[0]": 1.0}),
+        ),
+        rate=0.2,
+        truth="sliding_block",
+    ),
+    "sticking_block": Offer(
+        (Slider("friction", "friction μN", 0.02, 0.6, {"m.friction_limit": 1.0}),), rate=2.0, truth="sticking_block"
+    ),
+    "dzhanibekov": Offer(
+        tuple(
+            Slider(f"J{i + 1}", f"inertia {i + 1}", 0.3, 4.0, {f"m.inertia[{i}]": 1.0, f"e.inertia[{i}]": 1.0}) for i in range(3)
+        ),
+        rate=3.0,
+    ),
+    "heavy_top": Offer((Slider("weight", "weight", 0.0, 12.0, {"m.weight": 1.0, "e.weight": 1.0}),), rate=1.0),
+}
+
+
+def rope() -> Scene:
+    """Six particles and five stiff springs, level at first, held at one end, with a load at the other."""
+    n = 6
+    y = np.stack([np.linspace(0.0, 1.0, n), np.zeros(n)], axis=1)
+    pairs = np.stack([np.arange(n - 1), np.arange(1, n)], axis=1)
+    loads = np.append(np.ones(n - 1), 2.0)
+    system = Springs(pairs, stiffness=np.full(n - 1, 600.0), layout=y, masses=loads, fixed=[0], gravity=(0.0, -9.81))
+    return Scene(
+        name="rope",
+        title="Rope of springs",
+        section="beyond the document",
+        description="A rope of five stiff springs falls from level, with a load at its end: the springs limit the step.",
+        system=system,
+        v=np.zeros_like(y),
+        y=y,
+        dt=0.005,
+        horizon=8.0,
+    )
+
+
+#: Which numbers of the energy belong to a parameter of a step, by the system's kernel: path and factor; {} stands for an index.
+LINKS: dict[str, dict[str, tuple[tuple[str, float], ...]]] = {
+    "chain": {"stiffness": (("e.stiffness{}", 1.0),), "mass": (("e.mass{}", 1.0),)},
+    "nbody": {"Gm": (("e.Gm{}", 1.0), ("e.masses{}", 1.0)), "softening": (("e.softening", 1.0),)},
+    "oscillator": {"omega": (("e.omega", 1.0),)},
+    "particles": {"masses": (("e.masses{}", 1.0),), "gravity": (("e.gravity{}", 1.0),)},
+    "pendulum": {"omega": (("e.omega", 1.0),)},
+    "pendulum_3d": {"gravity": (("e.gravity[2]", -1.0),)},
+    "restricted_three_body": {"mu": (("e.mu", 1.0),)},
+    "rigid_body": {"inertia": (("e.inertia{}", 1.0),), "weight": (("e.weight", 1.0),), "centre": (("e.centre{}", 1.0),)},
+    "rods": {"masses": (("e.masses{}", 1.0),)},
+    "springs": {name: ((f"e.{name}{{}}", 1.0),) for name in ("stiffness", "rest", "masses", "gravity")},
+}
+
+#: The longest list of which each element has a slider, and the most sliders that are made without being asked for.
+MAX_ELEMENTS, MAX_SLIDERS = 4, 12
+
+
+def generic(system: Any, parameters: Mapping[str, Any], controlled: bool) -> tuple[Slider, ...]:
+    """Sliders for the parameters of any step: numbers, elements of short lists, and long lists as a whole.
+
+    Under a control only its gain can be slid: the energy that it keeps is that of the start with the other parameters as they
+    are.
+    """
+    links = _links(system)
+    found: list[Slider] = []
+    for name, value in parameters.items():
+        if name in ("dt", "t0", "control_target") or (controlled and name != "control_gain"):
+            continue
+        label = name.replace("_", " ")
+
+        def targets(index: str, scalar: bool = False, name: str = name) -> dict[str, float]:
+            others = {path.format("[*]" if scalar else index): factor for path, factor in links.get(name, ())}
+            return {f"m.{name}{index}": 1.0} | others
+
+        if not isinstance(value, list):
+            found.append(_around(name, label, value, targets("", scalar=True)))
+        elif any(isinstance(each, list) for each in value):
+            continue
+        elif len(value) <= MAX_ELEMENTS:
+            found += [_around(f"{name}_{i}", f"{label} {i + 1}", x, targets(f"[{i}]")) for i, x in enumerate(value)]
+        else:
+            found.append(Slider(name, f"{label}, ×", 0.0, 2.0, targets("[*]"), relative=True))
+    return tuple(found[:MAX_SLIDERS])
+
+
+def _links(system: Any) -> dict[str, tuple[tuple[str, float], ...]]:
+    """Those of a system; G·m is not a mass where G is not 1, and in canonical form ω₀ is not in the energy."""
+    own = LINKS.get(system.kernel, {})
+    if system.kernel == "nbody":
+        return own | {"Gm": (("e.Gm{}", 1.0), ("e.masses{}", 1.0 / float(system.G) if system.G else 0.0))}
+    if system.kernel == "oscillator" and system.form == "canonical":
+        return {}
+    if system.kernel == "rods":
+        return own | {"gravity": ((f"e.gravity[{system.y_shape[1] - 1}]", -1.0),)}
+    return own
+
+
+def _around(name: str, label: str, value: float, targets: dict[str, float]) -> Slider:
+    low, high = (min(0.0, 2.0 * value), max(0.0, 2.0 * value)) if value else (-1.0, 1.0)
+    return Slider(name, label, low, high, targets)

@@ -1,0 +1,161 @@
+"""The document (Hoffmann 2002), section by section: where each of its statements is in stepwell, and the statement run.
+
+A section is a module here. Each of its functions is one statement: an algorithm, a formula, a program, a figure, a piece of
+advice. It is run, and what it finds is compared with what the document says. ``docs/theory/paper.md`` and the command
+``stepwell paper`` are made from these entries, and the tests run them all.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from ...base import checks
+from ...errors import ArgumentError
+
+#: The modules, in the order of the document.
+MODULES = ("introduction", "transform", "methods", "constraints", "series", "programs", "bodies", "aircraft")
+
+#: The kinds of statement.
+KINDS = ("demand", "formula", "algorithm", "program", "figure", "advice", "warning")
+
+
+class Finding(NamedTuple):
+    """What running a statement gives.
+
+    Attributes:
+        holds: whether stepwell gives what the entry says; where the document is wrong, what the entry says instead.
+        found: the numbers, in a few words.
+    """
+
+    holds: bool
+    found: str
+
+
+class Entry(NamedTuple):
+    """A statement of the document.
+
+    Attributes:
+        section: as the document numbers it: ``§7``, ``App. C``.
+        kind: one of ``KINDS``.
+        says: the statement, in our words.
+        here: where it is in stepwell.
+        corrected: what is right instead, where the document is wrong or says too much; empty where it holds as it stands.
+        check: runs it.
+        picture: the name of its picture, or empty.
+        draw: draws the picture to a path, or None.
+    """
+
+    section: str
+    kind: str
+    says: str
+    here: str
+    corrected: str
+    check: Callable[[], Finding]
+    picture: str
+    draw: Callable[[Path], object] | None
+
+    @property
+    def name(self) -> str:
+        """Of the function that runs it."""
+        return self.check.__name__
+
+    def run(self) -> Finding:
+        """Run it. Runs that are meant to fail do not warn."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return self.check()
+
+
+class Section:
+    """Collects the entries of a section; an instance decorates the functions of a module.
+
+    Args:
+        section: as the document numbers it.
+    """
+
+    def __init__(self, section: str) -> None:
+        self.section = section
+
+    def __call__(
+        self, kind: str, says: str, here: str, corrected: str = "", draw: Callable[[Path], object] | None = None
+    ) -> Callable[[Callable[[], Finding]], Callable[[], Finding]]:
+        """Make an entry of a function."""
+        assert kind in KINDS, kind
+
+        def add(check: Callable[[], Finding]) -> Callable[[], Finding]:
+            place = re.sub(r"[^0-9A-Z]", "", self.section.replace("App.", "")).rjust(2, "0")
+            picture = "" if draw is None else f"{place}-{check.__name__.replace('_', '-')}.png"
+            _ENTRIES.append(Entry(self.section, kind, says, here, corrected, check, picture, draw))
+            return check
+
+        return add
+
+
+_ENTRIES: list[Entry] = []
+
+
+def entries(section: str | None = None) -> tuple[Entry, ...]:
+    """The document's statements, in its order.
+
+    Args:
+        section: ``"§7"`` or ``"App. C"`` for those of one section; all if None.
+
+    Returns:
+        An ``Entry`` for each.
+
+    Raises:
+        ArgumentError: if there is no such section.
+
+    Example:
+        >>> [entry.kind for entry in sw.paper.entries("§5")]
+        ['algorithm', 'formula', 'figure']
+    """
+    for module in MODULES:
+        importlib.import_module(f"{__name__}.{module}")
+    made = sorted(_ENTRIES, key=lambda entry: _order(entry.section))  # sorting keeps the order within a section
+    if section is None:
+        return tuple(made)
+    known = list(dict.fromkeys(entry.section for entry in made))
+    section = checks.known("section", section, known)
+    return tuple(entry for entry in made if entry.section == section)
+
+
+def _order(section: str) -> tuple[int, str]:
+    if section.startswith("§"):
+        return int(section[1:]), ""
+    return 100, section
+
+
+def draw(folder: str | Path, section: str | None = None) -> list[Path]:
+    """Draw every figure of the document, or those of a section, into a folder.
+
+    Args:
+        folder: where to; it is made if it is not there.
+        section: as ``entries`` takes it.
+
+    Returns:
+        The paths, in the order of the document.
+
+    Raises:
+        ArgumentError: if nothing can be written there, or there is no such section.
+        UnsupportedError: if matplotlib is missing.
+    """
+    from ...base.pictures import new_figure
+
+    chosen = [entry for entry in entries(section) if entry.draw is not None]
+    if not chosen:
+        raise ArgumentError(f"section: {section} has no figure")
+    place = checks.folder("folder", folder, [entry.picture for entry in chosen])
+    new_figure(1.0, 1.0)  # before the folder is made: it may be that nothing can be drawn
+    place.mkdir(parents=True, exist_ok=True)
+    for entry in chosen:
+        assert entry.draw is not None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            entry.draw(place / entry.picture)
+    return [place / entry.picture for entry in chosen]

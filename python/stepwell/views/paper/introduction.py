@@ -1,0 +1,145 @@
+"""§1 to §3: what a method is judged by, the names, and how a system is written."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from ...analysis.stability import analyse, criteria
+from ...model.surfaces import Floor
+from ...model.systems import LinearSystem, Oscillator, Particles, Sampled
+from ...runs.integration import integrate
+from ...scenes import scene
+from ..charts import run_picture
+from . import Finding, Section
+
+section_1, section_2, section_3 = Section("§1"), Section("§2"), Section("§3")
+
+
+@section_1(
+    "demand",
+    "A simple method is judged by four criteria: stability of an oscillator, deviation of its frequency, calculations per step, "
+    "and the smallest step that is allowed.",
+    "`sw.criteria`; `stepwell criteria`",
+    "The last is a limit from above: the longest step that is stable.",
+)
+def four_criteria() -> Finding:
+    """Every method has the four answers."""
+    found = criteria()
+    whole = all(c.operations.additions + c.operations.multiplications > 0 and len(c.at) > 0 and c.limit >= 0 for c in found)
+    best = max(found, key=lambda c: float(c.limit) / c.method.evaluations)
+    return Finding(
+        whole, f"{len(found)} methods; the longest step per function evaluation has {best.method.title}: Φ < {best.limit:.4g}"
+    )
+
+
+def _draw_reflection(path: Path) -> object:
+    ball = scene("bouncing_ball")
+    return run_picture(ball, ball.run("leapfrog", every=1)).plot(path)
+
+
+@section_1(
+    "demand",
+    "An elastic reflection may have a wrong frequency, but must not add energy, even if the step is not small.",
+    "`sw.Floor`, `sw.Sphere`: `Particles(floor=…)`; `sw.scenes.bouncing_ball()`",
+    "A one-sided spring, and a velocity that is turned over, do not hold that for every phase, step and method; the default of "
+    "`Floor` does.",
+    draw=_draw_reflection,
+)
+def elastic_reflection() -> Finding:
+    """The largest energy after an impact over that before it, over a hundred phases, by a spring and by the default."""
+    heights = np.linspace(0.0, 1.0, 100, endpoint=False)
+    grown = []
+    for floor in (Floor(way="spring", omega=1.5), Floor()):
+        system = Particles(gravity=0.0, floor=floor)
+        y = np.stack([np.zeros(100), heights])[np.newaxis]
+        v = np.array([0.0, -1.0])[np.newaxis, :, np.newaxis]
+        runs = [integrate(system, name, v=v, y=y, dt=1.0, steps=12) for name in ("false_euler", "leapfrog", "rk4")]
+        grown.append(max(float((run.v[-1, 0, 1] ** 2).max()) for run in runs))
+    return Finding(
+        grown[0] > 1.4 and abs(grown[1] - 1.0) < 1e-14,
+        f"the worst of 100 phases and 3 methods, Φ = 1.5: energy × {grown[0]:.2f} by a spring, × {grown[1]:.6f} by `Floor()`",
+    )
+
+
+@section_2(
+    "formula",
+    "Φ = ω₀T is the true angle of a step, Ψ = Ω₀T that of the numerical solution.",
+    "`analyse(…).true_angle`, `.angle`, `.omega`",
+)
+def angles() -> Finding:
+    """Both angles of False Euler at Φ = 1."""
+    found = analyse(Oscillator(omega=2.0), "false_euler", dt=0.5)
+    holds = math.isclose(found.true_angle, 1.0) and math.isclose(found.angle, found.omega * 0.5)
+    return Finding(holds, f"ω₀ = 2, T = 0.5: Φ = {found.true_angle:.4f}, Ψ = {found.angle:.4f}, Ω₀ = {found.omega:.4f}")
+
+
+@section_3(
+    "formula",
+    "A linear system is ẏ = A·y + B·x with auxiliary outputs z = C·y + D·x.",
+    "`sw.LinearSystem(A, B, C, D, x=…)`, `run.z`",
+)
+def state_space() -> Finding:
+    """A lead element, whose transfer function (1 + 2s)/(1 + s) has numerator and denominator of the same degree."""
+    system = LinearSystem([[-1.0]], [[1.0]], [[-1.0]], [[2.0]], x=[1.0], velocities=0)
+    run = integrate(system, "rk4", v=0.0, y=0.0, dt=0.01, steps=100, every=100)
+    z = np.asarray(run.z).ravel()
+    first, last = float(z[0]), float(z[-1])
+    holds = first == 2.0 and abs(last - (1.0 + math.exp(-1.0))) < 1e-9
+    return Finding(holds, f"a unit step in at (1 + 2s)/(1 + s): z = {first:.4f} at once, {last:.6f} at t = 1")
+
+
+@section_3(
+    "formula",
+    "The oscillator in physical form and in canonical form, with the scaled velocity v/ω₀, is one and the same.",
+    '`Oscillator(omega, damping, form="physical")`, `form="canonical"`',
+)
+def forms() -> Finding:
+    """Both forms, from the same start."""
+    canonical = integrate(Oscillator(2.0, 0.1), "rk4", v=0.5, y=1.0, dt=0.01, steps=500)
+    physical = integrate(Oscillator(2.0, 0.1, form="physical"), "rk4", v=1.0, y=1.0, dt=0.01, steps=500)
+    apart = abs(float(canonical.y[-1] - physical.y[-1]))
+    return Finding(apart < 1e-14, "the same y after 500 steps, to rounding")
+
+
+@section_3(
+    "advice",
+    "D = 0.707 is a good damping of a filter: its step response overshoots by 4 %.",
+    "`Oscillator(damping=…, x=…)`",
+)
+def overshoot() -> Finding:
+    """The largest y of the step response; exact is exp(−π·D/√(1 − D²)) = exp(−π)."""
+    system = Oscillator(damping=math.sqrt(0.5), x=1.0)
+    y = integrate(system, "rk4", v=0.0, y=0.0, dt=0.001, steps=8000, every=1).y
+    over = float(y.max()) - 1.0
+    return Finding(abs(over - math.exp(-math.pi)) < 1e-6, f"{100 * over:.2f} %")
+
+
+@section_3(
+    "advice",
+    "The damping term serves two purposes: true drag, and an artificial damping that stabilises an unstable method.",
+    "`Oscillator(damping=…)`; `damped_euler`",
+)
+def two_dampings() -> Finding:
+    """Standard Euler on an undamped oscillator grows; with D = Φ/2 its amplitude stays."""
+    phi = 0.1
+    plain = analyse(Oscillator(), "standard_euler", dt=phi).radius
+    damped = analyse(Oscillator(damping=0.5 * phi), "standard_euler", dt=phi).radius
+    return Finding(
+        plain > 1.0 and abs(damped - 1.0) < 1e-12, f"Standard Euler at Φ = 0.1: r₁ = {plain:.6f}, with D = Φ/2 {damped:.6f}"
+    )
+
+
+@section_3(
+    "formula",
+    "Inputs are the point to which the spring pulls, x(t), and an acceleration a(t).",
+    "`Oscillator(x=…, a=…)` with numbers, `sw.Sinusoid` or `sw.Sampled`",
+)
+def inputs() -> Finding:
+    """A held input moves the oscillator as a constant does while it lasts."""
+    held = Oscillator(x=Sampled([1.0, 1.0], 100.0))
+    one, other = (float(integrate(each, "rk4", v=0.0, y=0.0, dt=0.01, steps=300).y[-1]) for each in (held, Oscillator(x=1.0)))
+    exact = 1.0 - math.cos(3.0)
+    return Finding(one == other and abs(one - exact) < 1e-9, f"y(3) = {one:.9f}, exactly 1 − cos 3 = {exact:.9f}")

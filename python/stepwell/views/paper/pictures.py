@@ -1,0 +1,53 @@
+"""The pictures of the document that no chart draws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...base.arrays import Array
+from ...base.pictures import drawn, new_figure
+from ..charts.style import FONT, GREY
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Of three bodies: hues that differ in lightness, too, so that they survive grey.
+BODIES = ("#0072b2", "#e69f00", "#222222")
+
+
+def paths(path: Path, title: str, about: str, panels: Sequence[tuple[str, Array]], reach: float) -> object:
+    """Paths of bodies in the plane, panels side by side to the same scale.
+
+    Args:
+        path: the file.
+        title: what is to be seen.
+        about: how it was made.
+        panels: for each its title and the places, shape (saved, bodies, 2).
+        reach: how far from the middle a panel shows.
+    """
+
+    def draw() -> Figure:
+        width, height = 6.2 * len(panels) + 0.6, 7.6
+        figure = new_figure(width, height)
+        from matplotlib import rc_context
+
+        with rc_context(FONT):
+            places = {"left": 0.06, "right": 0.985, "bottom": 0.95 / height, "top": 1.0 - 1.7 / height, "wspace": 0.12}
+            row = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False, gridspec_kw=places)[0]
+            for axes, (said, y) in zip(row, panels, strict=True):
+                for body, colour in zip(range(y.shape[1]), BODIES, strict=False):
+                    axes.plot(*y[:, body].T, color=colour, linewidth=0.5)
+                    axes.plot(*y[0, body], "o", color=colour, markersize=9, markeredgecolor="white", zorder=5)
+                axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel="x", aspect="equal")
+                axes.set_title(said, loc="left", size=15, weight="bold")
+            row[0].set_ylabel("y")
+            figure.text(0.015, 1.0 - 0.5 / height, title, size=20, weight="bold")
+            figure.text(0.015, 1.0 - 0.9 / height, about, size=13, color=GREY)
+            figure.text(
+                0.015, 0.2 / height, "Dots: the start. One colour a body; lengths in units of the start's.", size=12, color=GREY
+            )
+        return figure
+
+    return drawn(path, draw)

@@ -1,0 +1,127 @@
+"""§4: the transition matrix, its eigenvalues, and what they say of the samples."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from ...analysis.stability import analyse
+from ...analysis.stability.analysis import KINDS
+from ...model.systems import LinearSystem, Oscillator
+from ...runs.integration import integrate
+from ..charts import figures
+from . import Finding, Section
+
+section = Section("§4")
+
+#: The angles of the document's harmonic cases, in degrees.
+HARMONIC = (30.0, 90.0, 150.0)
+
+
+def phi_of(psi: float) -> float:
+    """The Φ at which False Euler turns by the angle Ψ a step: cos Ψ = 1 − Φ²/2."""
+    return 2.0 * math.sin(0.5 * psi)
+
+
+@section(
+    "formula",
+    "A step is y ← P·y + Q·x; the roots of det(Iz − P) = 0 decide how the samples behave.",
+    "`analyse(…).P`, `.Q`, `.polynomial`, `.eigenvalues`; `stepwell stability`",
+)
+def transition_matrix() -> Finding:
+    """P of Standard Euler for ẏ = A·y is I + T·A."""
+    A = np.array([[-0.3, -2.0], [1.0, 0.0]])
+    P = analyse(LinearSystem(A), "standard_euler", dt=0.1).P
+    return Finding(bool(np.allclose(P, np.eye(2) + 0.1 * A, rtol=0, atol=1e-15)), "Standard Euler: P = I + T·A to rounding")
+
+
+@section(
+    "formula",
+    "z² − 2pz + q = 0 is met again and again; of a conjugate pair r₁² = q, so q = 1 is the harmonic case.",
+    "`analyse(…).p`, `.q`, `.radius`",
+)
+def p_and_q() -> Finding:
+    """Both for six methods at Φ = 0.5, where all have a pair."""
+    names = ("standard_euler", "damped_euler", "false_euler", "standard_heun", "false_heun", "semi_false_heun")
+    found = [analyse(Oscillator(), name, dt=0.5) for name in names]
+    worst = max(abs(a.q - a.radius**2) for a in found)
+    return Finding(worst < 1e-14, "r₁² = q for six methods at Φ = 0.5, to rounding")
+
+
+@section(
+    "formula",
+    "By the eigenvalues samples are monotonic or oscillate, and are stable, constant or unstable.",
+    "`analyse(…).kind`; `stepwell.stability.KINDS`",
+    "A single negative eigenvalue and a double pair are listed here, too.",
+)
+def kinds() -> Finding:
+    """One growing, one constant and one decaying mode by Standard Euler."""
+    found = [analyse(LinearSystem([[rate]]), "standard_euler", dt=0.1).kind for rate in (-1.0, 0.0, 1.0)]
+    wanted = ["monotonic stable", "constant", "monotonic unstable"]
+    return Finding(found == wanted and set(wanted) <= set(KINDS), ", ".join(found))
+
+
+@section(
+    "formula",
+    "Ψ₁ = arctan(b₁/a₁) is the angle of a step, from 0 to π.",
+    "`analyse(…).angle`",
+    "The arctan of the quotient is wrong past π/2; atan2(b₁, a₁) is right.",
+)
+def angle() -> Finding:
+    """False Euler at the Φ at which Ψ is 150°."""
+    found = analyse(Oscillator(), "false_euler", dt=phi_of(math.radians(150.0)))
+    z = found.eigenvalues[0]
+    wrong = math.degrees(math.atan(abs(z.imag) / z.real))
+    return Finding(abs(math.degrees(found.angle) - 150.0) < 1e-9, f"atan2 {math.degrees(found.angle):.1f}°, arctan {wrong:.1f}°")
+
+
+def _draw_harmonic(path: Path) -> object:
+    return figures().plot_harmonic(path)
+
+
+@section(
+    "figure",
+    "Harmonic samples with 30°, 90° and 150° a step have 12, 4 and 2.4 samples per period.",
+    "`analyse(…).samples_per_period`; `sw.charts.figures().plot_harmonic()`",
+    draw=_draw_harmonic,
+)
+def harmonic_cases() -> Finding:
+    """False Euler, whose samples are harmonic for every Φ below 2."""
+    found = [analyse(Oscillator(), "false_euler", dt=phi_of(math.radians(psi))) for psi in HARMONIC]
+    samples = [f.samples_per_period for f in found]
+    holds = all(abs(s - 360.0 / psi) < 1e-9 for s, psi in zip(samples, HARMONIC, strict=True))
+    return Finding(holds and all(f.kind == "harmonic" for f in found), ", ".join(f"{s:.1f}" for s in samples))
+
+
+@section(
+    "warning",
+    "A double eigenvalue +1 or −1 is unstable: a pair that meets at −1 on the unit circle does not end as a harmonic one.",
+    "`analyse(…).kind`",
+    "Only if the two have one eigenvector in common; RK-Merson at Φ = 2√3 has two, and is bounded.",
+)
+def double_eigenvalue() -> Finding:
+    """False Euler at Φ = 2 grows linearly; Merson at 2√3 does not grow."""
+    phi = (2.0, 2.0 * math.sqrt(3.0))
+    runs = [
+        integrate(Oscillator(), name, v=0.3, y=1.0, dt=dt, steps=1000)
+        for name, dt in zip(("false_euler", "merson"), phi, strict=True)
+    ]
+    grown = [float(np.hypot(run.v[-1], run.y[-1]) / math.hypot(0.3, 1.0)) for run in runs]
+    return Finding(
+        grown[0] > 100.0 and abs(grown[1] - 1.0) < 1e-9, f"1000 steps: False Euler × {grown[0]:.0f}, Merson × {grown[1]:.4f}"
+    )
+
+
+@section(
+    "formula",
+    "The eigenvalues of the transition matrix predict the stability of a sample sequence.",
+    "`sw.stability_limit`, against runs in `sw.charts.stability_map`",
+)
+def eigenvalues_predict() -> Finding:
+    """Samples just inside and just outside False Euler's limit."""
+    largest = [float(np.abs(figures(["false_euler"], phi=phi, periods=300).samples[0].y).max()) for phi in (1.999, 2.001)]
+    return Finding(
+        largest[0] < 100.0 < 1e6 < largest[1], f"largest |y|: {largest[0]:.3g} at Φ = 1.999, {largest[1]:.3g} at 2.001"
+    )
