@@ -4,6 +4,9 @@
 PYTHON ?= python3
 OUT    ?= out
 BIN    := .venv/bin
+# The tools of development have the same versions everywhere; `make pins` brings them up to date.
+PINS   := .ci/constraints.txt
+PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --constraint $(PINS)
 # Tests run compilers, which would look for the jobs of this make.
 PYTHON_TEST := env -u MAKEFLAGS -u MFLAGS $(BIN)/python -m pytest -q
 # On every core; a file stays on one, for its tests share what takes time to make. The order of files is that of tests/conftest.py.
@@ -18,7 +21,7 @@ LISTED := $(shell find rust/core/src/model/steppers rust/core/src/model/systems 
 WHEELS := x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-long test-wheels campaign wheel wheels release dev bench format clean
+.PHONY: help demo docs test test-long test-wheels campaign wheel wheels release dev bench format pins clean
 .PHONY: lint lint-rust lint-python rust-build rust-test python-test python-beside
 
 help: ## list the targets
@@ -114,6 +117,9 @@ format: .venv/test ## format Rust and Python
 	$(BIN)/ruff format --quiet .
 	$(BIN)/python docs/generate.py
 
+pins: .venv/bin/python ## bring the tools of development up to date in .ci/constraints.txt; `make test` then shows what they say
+	$(BIN)/python .ci/pins.py
+
 clean: ## remove everything that was built
 	rm -rf .venv dist target out docs/gallery
 
@@ -124,8 +130,8 @@ clean: ## remove everything that was built
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "stepwell needs Python 3.11 or later; set PYTHON="; exit 1; }
 	$(PYTHON) -m venv .venv
 
-.venv/maturin: .venv/bin/python
-	$(BIN)/pip install --quiet --disable-pip-version-check 'maturin>=1.13,<2'
+.venv/maturin: .venv/bin/python $(PINS)
+	$(PIP) 'maturin>=1.13,<2'
 	@touch $@
 
 .venv/wheel: .venv/maturin $(SOURCES)
@@ -134,11 +140,11 @@ clean: ## remove everything that was built
 	@touch $@
 
 .venv/release: .venv/maturin
-	$(BIN)/pip install --quiet --disable-pip-version-check 'twine>=6'
+	$(PIP) 'twine>=6'
 	@touch $@
 
 .venv/zig: .venv/maturin
-	$(BIN)/pip install --quiet --disable-pip-version-check 'ziglang>=0.13'
+	$(PIP) 'ziglang>=0.13'
 	@touch $@
 
 .venv/wheels: .venv/zig $(SOURCES)
@@ -156,12 +162,12 @@ clean: ## remove everything that was built
 NEEDS = import tomllib; extras = tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]; \
         print(*(need for extra in "$(EXTRA)".split(",") for need in extras[extra]), sep="\n")
 
-.venv/demo.needs .venv/docs.needs .venv/test.needs .venv/bench.needs: .venv/maturin pyproject.toml
+.venv/demo.needs .venv/docs.needs .venv/test.needs .venv/bench.needs: .venv/maturin pyproject.toml $(PINS)
 	$(BIN)/python -c '$(NEEDS)' > $@.txt
-	$(BIN)/pip install --quiet --disable-pip-version-check -r $@.txt
+	$(PIP) -r $@.txt
 	@touch $@
 
 .venv/demo .venv/docs .venv/test .venv/bench: .venv/%: .venv/%.needs .venv/wheel
-	$(BIN)/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[$(EXTRA)]"
-	$(BIN)/pip install --quiet --disable-pip-version-check --force-reinstall --no-deps dist/*.whl
+	$(PIP) "$$(ls dist/*.whl)[$(EXTRA)]"
+	$(PIP) --force-reinstall --no-deps dist/*.whl
 	@touch $@

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 from installed import tried
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -34,6 +36,23 @@ def test_every_extra_that_a_page_or_a_message_names_is_there() -> None:
     named = {name for file in files for name in re.findall(r"stepwell\[(\w+)\]", file.read_text(encoding="utf-8"))}
     assert "chart" in named
     assert named <= set(PROJECT["optional-dependencies"])
+
+
+def test_tools_of_development_have_one_version_everywhere() -> None:
+    lines = (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = dict(line.split("==") for line in lines if not line.startswith("#"))
+    assert set(pins) == {canonicalize_name(name) for name in pins}
+    extras = {name: [Requirement(need) for need in needs] for name, needs in PROJECT["optional-dependencies"].items()}
+    tools = [need for extra in ("test", "docs") for need in extras.pop(extra)]
+    # A user may have any version of what the other extras install.
+    users = {canonicalize_name(need.name) for needs in extras.values() for need in needs}
+    assert {canonicalize_name(need.name) for need in tools} - users <= set(pins)
+    for need in tools:
+        version = pins.get(canonicalize_name(need.name))
+        assert version is None or need.specifier.contains(version, prereleases=True), f"{need} and {version}"
+    recipes = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert recipes.count("pip install") == 1
+    assert "pip install --quiet --disable-pip-version-check --constraint $(PINS)" in recipes
 
 
 def test_a_release_is_one_command() -> None:
