@@ -22,7 +22,7 @@ WHEELS := x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
 
 .DEFAULT_GOAL := help
 .PHONY: help demo docs test test-long test-wheels campaign wheel wheels release dev bench format pins clean
-.PHONY: lint lint-rust lint-python rust-build rust-test python-test python-beside
+.PHONY: hooks lint lint-rust lint-python check-rust check-python rust-build rust-test python-test python-beside
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -58,6 +58,10 @@ test-wheels: .venv/wheels ## build them, and run this machine's in a clean envir
 dev: .venv/test ## install in place, for work on the code; run again after a change in rust/
 	$(BIN)/maturin develop --release --quiet
 
+hooks: .venv/test ## check format, lints, types and tables before each commit; .pre-commit-config.yaml has the list
+	$(PIP) pre-commit
+	$(BIN)/pre-commit install
+
 bench: .venv/bench ## time every language on the same work, in one run, into benches/RESULTS.md
 	$(BIN)/python -m benches.compare
 
@@ -66,17 +70,24 @@ lint: lint-rust lint-python
 
 # After the build, which has both cores already.
 lint-rust: rust-build
-	cargo fmt --all --check
-	rustfmt --edition 2024 --check $(LISTED)
+	@$(MAKE) --no-print-directory check-rust
 	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
 
 lint-python: .venv/test
+	@$(MAKE) --no-print-directory check-python
+	$(BIN)/python -m mypy.stubtest stepwell._core --concise
+
+# The part of `lint` that needs no build: it reads the sources, not what is installed. The hooks before a commit run it.
+check-rust:
+	cargo fmt --all --check
+	rustfmt --edition 2024 --check $(LISTED)
+
+check-python:
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy --no-error-summary
-	$(BIN)/lint-imports --no-cache > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
-	$(BIN)/python -m mypy.stubtest stepwell._core --concise
+	PYTHONPATH=python $(BIN)/lint-imports --no-cache > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
 
 # The wheel comes first: both are built in one folder, and have the core in common.
 rust-build: .venv/wheel
