@@ -48,6 +48,7 @@ nb_merge_streams = True
 INCLUDED = {
     "CHANGELOG.md": "developing/changelog.md",
     "CONTRIBUTING.md": "developing/contributing.md",
+    "SECURITY.md": "developing/security.md",
     "benches/CONTROL.md": "benchmarks/control.md",
     "benches/RESULTS.md": "benchmarks/results.md",
     "examples/GALLERY_HEADER.rst": "gallery/index.rst",

@@ -14,7 +14,8 @@ import pytest
 import stepwell as sw
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + sorted((ROOT / "docs").rglob("*.md"))
+AT_THE_ROOT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")
+PAGES = [ROOT / name for name in AT_THE_ROOT] + sorted((ROOT / "docs").rglob("*.md"))
 #: Where a page may find the files that it names, by their last parts.
 FOLDERS = ["benches", "docs", "examples", "python", "rust", "tests"]
 

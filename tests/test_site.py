@@ -36,7 +36,7 @@ except ImportError:  # what is skipped then needs no names
 
 ROOT = Path(__file__).resolve().parents[1]
 #: What a fresh clone has of the site: what was built in docs/ before is left out.
-NEEDED = ("docs", "examples", "benches", "README.md", "CHANGELOG.md", "CONTRIBUTING.md")
+NEEDED = ("docs", "examples", "benches", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
 LEFT_OUT = shutil.ignore_patterns("gallery", "__pycache__", "control")
 #: A proxy at which nobody listens: whatever asks for a page of the web fails.
 NOWHERE = "http://127.0.0.1:9"
