@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import ADAPTIVE, SYSTEMS, fits
 from stepwell.errors import ArgumentError, StepwellError, UnsupportedError
 from stepwell.reference import series_pace
 from stepwell.runs import engine
 from stepwell.runs.result import Status
+from support.cases import ADAPTIVE, SYSTEMS, fits
 
 ABLE = [m.name for m in sw.methods() if m.error_order is not None]
 MEMBERS = 21

@@ -10,7 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from advised import (  # noqa: F401
+from stepwell.studies.advice import by_cost_and_error
+from stepwell.studies.advice.candidates import Candidate
+from stepwell.studies.advice.result import about
+from stepwell.studies.advice.search import Search
+from stepwell.studies.advice.trials import Times, Trial, cost_noise
+from support.advised import (  # noqa: F401
     RATIO,
     WORTH,
     _times_are_measured_once,
@@ -23,11 +28,6 @@ from advised import (  # noqa: F401
     tried,
     unmeasured,
 )
-from stepwell.studies.advice import by_cost_and_error
-from stepwell.studies.advice.candidates import Candidate
-from stepwell.studies.advice.result import about
-from stepwell.studies.advice.search import Search
-from stepwell.studies.advice.trials import Times, Trial, cost_noise
 
 from benches.advice import Brute
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from advised import _times_are_measured_once, scene_of, unmeasured  # noqa: F401
 from stepwell.scenes import Scene
 from stepwell.studies.advice import Row
 from stepwell.studies.advice.motion import motion_of
 from stepwell.studies.advice.trials import Times, Trials, single_name
 from stepwell.views import cli
+from support.advised import _times_are_measured_once, scene_of, unmeasured  # noqa: F401
 
 METHODS = ["leapfrog", "rk4", "pefrl", "dop853"]
 

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from advised import _times_are_measured_once, brute_of, scene_of, unmeasured  # noqa: F401
 from stepwell.errors import ArgumentError, DivergenceWarning, DTypeError
 from stepwell.scenes import Scene
 from stepwell.views import cli
-from truths import CLOSED_FORMS
+from support.advised import _times_are_measured_once, brute_of, scene_of, unmeasured  # noqa: F401
+from support.truths import CLOSED_FORMS
 
 
 def error_of(scene: Scene, method: str, dt: float, steps: int) -> float:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from advised import RATIO, _times_are_measured_once, assert_cheap, assert_true, linear, pendulum, tried, unmeasured  # noqa: F401
 from stepwell.errors import ArgumentError, DTypeError
 from stepwell.scenes import Scene
+from support.advised import RATIO, _times_are_measured_once, assert_cheap, assert_true, linear, pendulum, tried, unmeasured  # noqa: F401
 
 from benches.advice import Brute
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import assert_same
 from stepwell import _core
 from stepwell.errors import ArgumentError, ShapeError, UnknownNameError, UnsupportedError
 from stepwell.model.systems import aircraft_equations, attitude
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from test_graphs import assert_one_graph
+from support.cases import assert_same
+from support.graphs import assert_one_graph
 
 ZERO = np.zeros(3)
 FREE: dict[str, Any] = {"damping": ZERO, "gains": ZERO, "controllers": False}

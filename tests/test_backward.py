@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS, Case, assert_same, cases, thinned
 from stepwell.errors import ArgumentError, UnsupportedError
+from support.cases import SYSTEMS, Case, assert_same, cases, thinned
 
 METHODS = [m.name for m in sw.methods()]
 #: Symmetric methods: the step of −h undoes that of h.

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import number
+from support.cases import number
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))

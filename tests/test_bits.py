@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS, Case, assert_same, cases, thinned
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from stepwell.base.immutable import changed
+from support.cases import SYSTEMS, Case, assert_same, cases, thinned
 
 ALL = list(cases())
 DIRECT = [c for c in ALL if c.form == "direct"]

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 import stepwell as sw
-from charted import LADDER, METHODS, SCENES, the_charts, the_small, the_whole  # noqa: F401
 from stepwell.errors import ArgumentError, UnknownNameError
 from stepwell.runs import engine
 from stepwell.studies.measuring import data, known, measure, peers
+from support.charted import LADDER, METHODS, SCENES, the_charts, the_small, the_whole  # noqa: F401
 
 UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None]
 

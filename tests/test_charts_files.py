@@ -8,10 +8,10 @@ import sys
 import numpy as np
 import pytest
 import stepwell as sw
-from charted import METHODS, SCENES, the_charts, the_small  # noqa: F401
 from stepwell.errors import ArgumentError, DTypeError, UnknownNameError, UnsupportedError
 from stepwell.studies.measuring import data, measure, peers
 from stepwell.views.charts import style
+from support.charted import METHODS, SCENES, the_charts, the_small  # noqa: F401
 
 
 def read(path):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import contacts
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import assert_same
-from contacts import LAG, PARABOLIC, G
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
+from support import contacts
+from support.cases import assert_same
+from support.contacts import LAG, PARABOLIC, G
 
 METHODS = [m.name for m in sw.methods()]
 every_method = pytest.mark.parametrize("method", METHODS)

@@ -7,17 +7,13 @@ test_graphs.py.
 from __future__ import annotations
 
 import itertools
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-import contacts
 import pytest
 from stepwell.model.systems import base
-from stepwell.reference import contact
 from stepwell.runs.engine import direct
-
-SOURCE = Path(contact.__file__).read_text(encoding="utf-8")
+from support import contacts
+from support.contact_mutants import changed
 
 #: What stands there, and what a mistake would make of it.
 MISTAKES = [
@@ -73,15 +69,6 @@ MISTAKES = [
 
 #: One method of each kind: carried, on the parabola, the two kinds of the Euler family.
 METHODS = ("standard_euler", "false_euler", "leapfrog", "rk4")
-
-
-def changed(old: str, new: str) -> ModuleType:
-    """The reference's contact with a change in its text."""
-    assert SOURCE.count(old) == 1, f"the text is not there, or more than once: {old}"
-    module = ModuleType("stepwell.reference.contact")
-    module.__package__ = "stepwell.reference"
-    exec(compile(SOURCE.replace(old, new), "contact with a mistake", "exec"), vars(module))
-    return module
 
 
 def is_noticed() -> bool:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import assert_same
 from stepwell.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, UnknownNameError, UnsupportedError
+from support.cases import assert_same
 
 FORMS = ("limited", "printed")
 FORCES = ("logarithmic", "newton", "printed")

@@ -7,13 +7,13 @@ import re
 from typing import Any
 
 import numpy as np
-import own_systems as own
 import pytest
 import stepwell as sw
-from cases import assert_same
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference import adaptive
 from stepwell.reference.acceptance import Acceptance
+from support import own_systems as own
+from support.cases import assert_same
 
 ABLE = [m.name for m in sw.methods() if m.error_order is not None and not m.has_series]  # a series is not pushed within a step
 CONTROLS: dict[str, Any] = {

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from differences import central
 from stepwell import _core
 from stepwell.analysis.derivatives import Evaluation, directional, gradient, jacobian
 from stepwell.errors import UnsupportedError
 from stepwell.reference import bits, marks, trig
 from stepwell.reference.log import log
 from stepwell.reference.tape import rules
+from support.differences import central
 
 EPS = np.finfo(float).eps
 #: Long doubles where the machine has them, else doubles: the differences' bound knows which.

@@ -9,10 +9,10 @@ import re
 from typing import Any
 
 import numpy as np
-import own_systems as own
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, TraceError, UnknownNameError, UnsupportedError
+from support import own_systems as own
 
 
 def run(system: Any, method: str = "rk4", **given: Any) -> sw.Run:

@@ -9,22 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS, Case, assert_same, cases, thinned
 from stepwell.runs import engine
 from stepwell.runs.events import collected, driver, trials
 from stepwell.runs.events.members import Members
 from stepwell.runs.events.traced import Quantity
 from stepwell.runs.events.trials import Trials, one_step
-
-
-def first(*state: Any) -> Any:
-    """Of the coordinates the first, or else of the velocities."""
-    y = state[-1] if np.shape(state[-1]) != (0,) else state[0]
-    return y.ravel()[0] if np.ndim(y) else y
-
-
-def crossing(t: Any, v: Any, y: Any) -> Any:
-    return y - 0.1 * v - 0.05 * t
+from support.cases import SYSTEMS, Case, assert_same, cases, thinned
+from support.events import assert_same_events, check_a_state_at_zero_counts_once_and_not_at_the_start, crossing, first
 
 
 def nearly_first(case: Case) -> Any:
@@ -32,18 +23,6 @@ def nearly_first(case: Case) -> Any:
     if SYSTEMS[case.system](np.random.default_rng(0), 1).v_shape == (0,):
         return sw.Event(lambda t, y: first(y) - 0.1, name="tenth")
     return sw.Event(lambda t, v, y: first(v, y) - 0.1, name="tenth")
-
-
-def assert_same_events(a: sw.Run, b: sw.Run) -> None:
-    """All that was found is the same, to the last bit."""
-    assert a.events.keys() == b.events.keys()
-    for name, mine in a.events.items():
-        assert mine == b.events[name], name
-    if a.stopped_at is None or b.stopped_at is None:
-        assert a.stopped_at is b.stopped_at
-    else:
-        np.testing.assert_array_equal(a.stopped_at, b.stopped_at)
-    np.testing.assert_array_equal(a.status, b.status)
 
 
 DIRECT = [case for case in cases() if case.form == "direct"]
@@ -288,16 +267,7 @@ def test_directions() -> None:
 
 
 def test_a_state_at_zero_counts_once_and_not_at_the_start() -> None:
-    """y = k exactly: at step 3 y − 3 is 0, at step 0 y is."""
-
-    @sw.system(order=1)
-    def ascending(t: Any, y: Any) -> Any:
-        return 1.0 + 0.0 * y
-
-    events = [sw.Event(lambda t, y: y - 3.0, name="three"), sw.Event(lambda t, y: y, name="start")]
-    run = sw.integrate(ascending(), "standard_euler", y=0.0, dt=1.0, steps=8, events=events)
-    assert run.events["three"].t.tolist() == [3.0]
-    assert run.events["start"].count == 0
+    check_a_state_at_zero_counts_once_and_not_at_the_start()
 
 
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")

@@ -8,11 +8,11 @@ import mpmath
 import numpy as np
 import pytest
 import stepwell as sw
-import test_events_adaptive as bits
 from stepwell.runs.events import adaptive, attempts, collected
 from stepwell.runs.events.trials import AdaptiveTrials
-from test_events_adaptive import ABLE, U
-from test_events_located import error_of_bounces, low_end, straight
+from support import events_adaptive as bits
+from support.events_adaptive import ABLE, U
+from support.events_located import error_of_bounces, low_end, straight
 
 #: A quarter of the period of a pendulum that begins at 1 rad, at rest: π/2/agm(1, cos ½) (Gauss).
 QUARTER = float(mpmath.pi / 2 / mpmath.agm(1, mpmath.cos(0.5)))
@@ -111,7 +111,7 @@ def test_mistake_the_length_of_another_step_is_noticed(method: str, monkeypatch:
     series = sw.method(method).has_series
     monkeypatch.setattr(attempts.Attempts, "lengths", lambda self, plan: self.h[:-1] if series else self.h[1:])
     with pytest.raises(AssertionError):
-        bits.test_a_trial_is_the_state_that_is_saved_within_a_step(method, "pendulum")
+        bits.check_a_trial_is_the_state_that_is_saved_within_a_step(method, "pendulum")
 
 
 def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,14 +129,14 @@ def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(adaptive, "_Driver", Wrong)
     with pytest.raises(AssertionError):
-        bits.test_the_ends_of_a_run()
+        bits.check_the_ends_of_a_run()
 
 
 def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     look = adaptive._Driver._look
     monkeypatch.setattr(adaptive._Driver, "_look", lambda self, *given: look(self, *given[:-1], False))
     with pytest.raises(AssertionError):
-        bits.test_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter("merson", False)
+        bits.check_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter("merson", False)
 
 
 def test_mistake_attempts_after_the_end_of_a_member_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,7 +148,7 @@ def test_mistake_attempts_after_the_end_of_a_member_are_noticed(monkeypatch: pyt
 
     monkeypatch.setattr(adaptive._Driver, "stepped", wrong)
     with pytest.raises(AssertionError):
-        bits.test_what_comes_after_a_terminal_event_is_not_computed("merson", monkeypatch)
+        bits.check_what_comes_after_a_terminal_event_is_not_computed("merson", monkeypatch)
 
 
 def test_mistake_one_attempt_too_few_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,4 +160,4 @@ def test_mistake_one_attempt_too_few_is_noticed(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(adaptive._Driver, "stepped", wrong)
     with pytest.raises(AssertionError):
-        bits.test_a_member_that_stopped_stays_where_it_was_and_cannot_go_on()
+        bits.check_a_member_that_stopped_stays_where_it_was_and_cannot_go_on()

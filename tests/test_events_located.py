@@ -12,6 +12,7 @@ import stepwell as sw
 from stepwell.reference import events
 from stepwell.runs.events import collected
 from stepwell.runs.events.trials import Trials
+from support.events_located import error_of_bounces, low_end, straight
 
 U = 2.0**-53
 
@@ -190,29 +191,6 @@ def test_a_driven_motion_passes_with_the_order_of_the_method(method: str) -> Non
     assert order_of(driven, method, STEP[order]) > order - 0.3
 
 
-def error_of_bounces(method: str, t: float = 0.0, **steps: Any) -> float:
-    """Falling from 1 under gravity 1, bouncing with half of the speed: at √2·(1, 1 + 1, 1 + 1 + 1/2, …).
-
-    Times asked for with ``at`` count from the bounce before.
-    """
-
-    @sw.system
-    def ball(t: Any, v: Any, y: Any, *, gravity: float = 1.0) -> Any:
-        return -gravity
-
-    ground = sw.Event(lambda t, v, y: y, direction=-1, terminal=True, name="ground")
-    v, y, times = 0.0, 1.0, []
-    for _ in range(6):
-        ask = steps | ({"at": [t + each for each in steps["at"]]} if "at" in steps else {})
-        run = sw.integrate(ball(), method, v=v, y=y, t0=t, events=ground, **ask)
-        assert run.stopped_at is not None
-        v, y, t = -0.5 * float(run.v[-1]), float(run.y[-1]), float(run.stopped_at)
-        assert -1e-13 < y <= 0.0  # at or past the ground
-        times.append(t)
-    expected = 2**0.5 * (1.0 + 2.0 * np.concatenate([[0.0], np.cumsum(0.5 ** np.arange(1, 6))]))
-    return float(np.abs(np.array(times) - expected).max())
-
-
 def test_bounces() -> None:
     """RK4 is exact for a parabola; each flight adds some roundings of numbers up to 4, and those of the speed are halved."""
     assert error_of_bounces("rk4", dt=0.01, steps=400) < 1000 * 4 * U
@@ -334,19 +312,6 @@ def test_a_way_from_rest_takes_its_time_in_any_unit(unit: float, steps: dict[str
 # ---- mistakes
 
 
-def straight(trial: Any, low: Any, high: Any, before: Any, after: Any, v: Any, y: Any) -> Any:
-    """Mistake: by a straight line between both ends of the step."""
-    share = before / (before - after)
-    return (share, *trial(np.arange(len(before)), share)[1:])
-
-
-def low_end(trial: Any, low: Any, high: Any, before: Any, after: Any, v: Any, y: Any) -> Any:
-    """Mistake: the end of the bracket that is before the event."""
-    share, *_ = events.located(trial, low, high, before, after, v, y)
-    share = share * (1.0 - 2.0 * events.SPACING)
-    return (share, *trial(np.arange(len(before)), share)[1:])
-
-
 def test_mistake_a_straight_line_has_order_two(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(collected, "located", straight)
     assert order_of(driven, "rk4", STEP[4]) < 3.5
@@ -380,7 +345,7 @@ def test_mistake_trials_from_the_carry_of_the_full_step_are_noticed(monkeypatch:
 
 
 def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from test_events import test_a_state_at_zero_counts_once_and_not_at_the_start as check
+    from support.events import check_a_state_at_zero_counts_once_and_not_at_the_start as check
 
     def twice(look: Any, parts: Any) -> Any:
         found, stuck = events.parted(look, parts)

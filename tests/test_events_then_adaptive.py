@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.runs.events import adaptive
-from test_events_then import GRAVITY, WALLS, U, ball, bumper, free, ground, times_of_bounces
+from support.events_then import GRAVITY, WALLS, U, ball, bumper, free, ground, times_of_bounces
 
 METHODS = [method.name for method in sw.methods() if method.error_order is not None]
 

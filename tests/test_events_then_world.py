@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from test_events_then import GRAVITY, U, ball, ground
+from support.events_then import GRAVITY, U, ball, ground
 
 METHODS = ["rk4", "leapfrog", "verlet", "false_euler", "standard_heun"]
 

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-import test_explain
-from cases import SYSTEMS, drawn
 from stepwell import _core
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference.tape.single import fma
@@ -18,8 +16,10 @@ from stepwell.runs import engine
 from stepwell.source.explanation import listing
 from stepwell.source.explanation.formula import ALL_SINGLE_BITS, number
 from stepwell.views import cli
-from test_explain import evaluate, leaves, lines
-from test_tracing import MEMBERS, METHODS, H, T, fits, made
+from support import explain
+from support.cases import SYSTEMS, drawn, fits
+from support.explain import evaluate, leaves, lines
+from support.tracing import MEMBERS, METHODS, H, T, made
 
 F = np.float32
 
@@ -35,14 +35,14 @@ def _on_bits(f: Any) -> Any:
     return lambda *of: np.asarray(f(*map(_as_bits, of))).view(F)
 
 
-FUNCTIONS = test_explain.FUNCTIONS | {"fma": fma} | {name: _on_bits(f) for name, f in test_explain.ON_BITS.items()}
+FUNCTIONS = explain.FUNCTIONS | {"fma": fma} | {name: _on_bits(f) for name, f in explain.ON_BITS.items()}
 
 
 @pytest.fixture(autouse=True)
 def _in_float32(monkeypatch: pytest.MonkeyPatch) -> None:
     """Listings are evaluated so."""
-    monkeypatch.setattr(test_explain, "NUMBER", F)
-    monkeypatch.setattr(test_explain, "FUNCTIONS", FUNCTIONS)
+    monkeypatch.setattr(explain, "NUMBER", F)
+    monkeypatch.setattr(explain, "FUNCTIONS", FUNCTIONS)
 
 
 def explained(system: sw.System, method: Any, **how: Any) -> sw.Explanation | None:

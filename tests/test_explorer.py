@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import stepwell as sw
-from explored import CHANGED, STEPS, data_of, expected, in_node, needs_node, page, races, scene_of
 from stepwell.views import cli
 from stepwell.views.explorer import sliders
 from stepwell.views.explorer.data import of_scene
 from stepwell.views.explorer.page import MODULES, WEB, script
+from support.explored import CHANGED, STEPS, data_of, expected, in_node, needs_node, page, races, scene_of
 
 # ---- steps
 

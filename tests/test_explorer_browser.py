@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from abroad import bits
-from explored import STEPS, expected, page, scene_of
+from support.abroad import bits
+from support.explored import STEPS, expected, page, scene_of
 
 CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from explored import data_of, in_node, needs_node, scene_of
 from stepwell.views.explorer import sliders
 from stepwell.views.explorer.data import of_scene
+from support.explored import data_of, in_node, needs_node, scene_of
 
 # ---- roots
 

@@ -14,73 +14,19 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from abroad import C_FLAGS, PATIENCE, RUST_FLAGS, Journey, executed, missing, run, same
-from cases import SYSTEMS, number
 from stepwell import _core
 from stepwell.reference import bits, log, trig
 from stepwell.reference.tape.fused import Evaluated
 from stepwell.reference.traced import Tracer
 from stepwell.source.exports.functions import FUNCTIONS, argument
-from stepwell.source.exports.head import EXAMPLE, STEPS
+from stepwell.source.exports.head import STEPS
 from stepwell.source.exports.names import camel, plain, prefix, snake
-from test_tracing import CONTROLS, METHODS, fits
+from support.abroad import C_FLAGS, PATIENCE, RUST_FLAGS, Journey, executed, missing, run, same
+from support.cases import SYSTEMS, fits, number
+from support.export import LANGUAGES, MEMBER, assert_same, journey, journeys, languages, shown
+from support.tracing import CONTROLS, METHODS
 
 WRONG: Any = "yes"
-LANGUAGES = ["c", "javascript", "python", "rust"]
-MEMBERS, MEMBER = 3, 1
-
-#: Of a batch in which parameters differ, one member is exported.
-languages = pytest.mark.parametrize(
-    "language",
-    [
-        pytest.param(each, marks=pytest.mark.skipif(missing(each), reason=f"there is no compiler or interpreter of {each} here"))
-        for each in LANGUAGES
-    ],
-)
-
-
-def journey(name: str, method: sw.Method, start: str | None = None, control: Any = None, **more: Any) -> Journey:
-    """Some steps of a member of a batch, from a random state."""
-    rng = np.random.default_rng(number(name, method.name))
-    system = SYSTEMS[name](rng, MEMBERS)
-    v, y = (0.5 * rng.normal(size=(*shape, MEMBERS)) for shape in (system.v_shape, system.y_shape))
-    options = {key: value for key, value in {"start": start, "control": control, **more}.items() if value is not None}
-    return Journey(system, method.name, v, y, member=MEMBER, options=options)
-
-
-#: Of all pairs of a system and a method each language is tried with one in so many, each with others. Compilers take longest.
-SHARE = {"c": 29, "javascript": 9, "python": 7, "rust": 23}
-
-#: Systems whose steps are long; they are tried with the methods whose steps are short.
-LONG = ("eight bodies", "chain of nineteen", "linear, seventeen states")
-#: One that compilers take half a minute for.
-LONGEST = "thirty-five bodies in space, newton"
-SHORT = ("false_euler", "verlet", "leapfrog", "standard_heun")
-
-
-def journeys(language: str) -> list[Journey]:
-    """Every method and every system, and each pair of them in some language."""
-    chosen: list[tuple[str, sw.Method, str | None]] = []
-    systems: set[str] = set()
-    methods: set[str] = set()
-    for name in SYSTEMS:
-        system = SYSTEMS[name](np.random.default_rng(1), 1)
-        long = name in LONG
-        if name == LONGEST:
-            continue
-        for method in METHODS:
-            if not fits(system, method) or (long and method.name not in SHORT):
-                continue
-            for start in method.starts or (None,):
-                drawn = number(language, name, method.name, start) % SHARE[language] == 0
-                if drawn or (method.name not in methods and not long):
-                    chosen.append((name, method, start))
-                    systems.add(name)
-                    methods.add(method.name)
-    for name in SYSTEMS:  # those that were not drawn
-        if name not in systems and (name != LONGEST or language == "python"):
-            chosen.append((name, sw.method("false_euler"), None))
-    return [journey(*each) for each in chosen]
 
 
 def controlled(language: str) -> list[Journey]:
@@ -125,14 +71,6 @@ def changed() -> list[Journey]:
             twin=sw.Oscillator(1.0, x=sw.Sampled([1.0, 2.0, 3.0], 0.7, 0.9)),
         ),
     ]
-
-
-def assert_same(journeys: list[Journey], found: list[list[float]]) -> None:
-    """To the bit."""
-    assert len(journeys) == len(found)
-    for each, numbers in zip(journeys, found, strict=True):
-        assert len(numbers) == len(each.expected), (each.system, each.method)
-        assert all(map(same, numbers, each.expected)), (each.system, each.method, each.options, numbers, each.expected)
 
 
 @languages
@@ -455,41 +393,6 @@ def test_bits_of_numbers(language: str, tmp_path: Path, monkeypatch: pytest.Monk
 
 
 # ---- the head of a file
-
-
-def example(step: sw.ExportedStep) -> str:
-    """The program that the head of a file shows."""
-    comment = "#" if step.language == "Python" else "//"
-    lines = step.source.splitlines()
-    begin = lines.index(f"{comment} {EXAMPLE}") + 2
-    end = next(i for i, line in enumerate(lines) if not line.startswith(comment))
-    shown = [line.removeprefix(comment) for line in lines[begin:end]]
-    assert all(not line or line.startswith(" " * 5) for line in shown)
-    return "\n".join(line[5:] for line in shown) + "\n"
-
-
-def shown(step: sw.ExportedStep, folder: Path) -> float:
-    """What it prints, run as the head of the file says."""
-    match step.language:
-        case "C":
-            step.save(folder / f"{step.name}.c")
-            (folder / "example.c").write_text(example(step), encoding="utf-8")
-            executed(["cc", *C_FLAGS, "example.c", "-lm", "-o", "example"], folder)
-            command: list[Any] = [folder / "example"]
-        case "JavaScript":
-            step.save(folder / f"{step.name}.mjs")
-            (folder / "example.mjs").write_text(example(step), encoding="utf-8")
-            command = ["node", "example.mjs"]
-        case "Rust":
-            step.save(folder / f"{step.name}.rs")
-            (folder / "example.rs").write_text(example(step), encoding="utf-8")
-            executed(["rustc", *RUST_FLAGS, "example.rs", "-o", "example_rust"], folder)
-            command = [folder / "example_rust"]
-        case _:
-            step.save(folder / f"{step.name}.py")
-            (folder / "example.py").write_text(example(step), encoding="utf-8")
-            command = [sys.executable, "example.py"]
-    return float(executed(command, folder))
 
 
 @languages

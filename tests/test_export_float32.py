@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from abroad import Journey, run
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.views import cli
-from test_export import LANGUAGES, assert_same, languages, shown
+from support.abroad import Journey, run
+from support.export import LANGUAGES, assert_same, languages, shown
 
 F = np.float32
 BODIES: dict[str, Any] = {"v": np.array([[0.0, 0.5], [0.0, -0.5]]), "y": np.array([[1.0, 0.1], [-1.0, 0.0]])}

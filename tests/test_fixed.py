@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS
 from stepwell.base.immutable import Fixed, changed
 from stepwell.errors import FixedError, StepwellError
+from support.cases import SYSTEMS
 
 MADE: dict[str, Callable[[], Any]] = {
     "a sinusoid": lambda: sw.Sinusoid([1.0, 2.0], 3.0),

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS, Case, assert_same, cases, thinned
 from hypothesis import given
 from hypothesis import strategies as st
 from stepwell import _core
@@ -22,8 +21,9 @@ from stepwell.reference.tape.fused import odd_sum
 from stepwell.reference.tape.single import evaluated, fma
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from test_graphs import assert_one_graph, methods
-from test_tracing import made
+from support.cases import SYSTEMS, Case, assert_same, cases, thinned
+from support.graphs import assert_one_graph, methods
+from support.tracing import made
 
 F = np.float32
 SOME = {"direct": 1}

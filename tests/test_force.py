@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS
 from stepwell import _core
 from stepwell.errors import ArgumentError, DTypeError, FixedError, ShapeError, UnsupportedError
 from stepwell.reference import around
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from test_graphs import assert_one_graph, methods
-from test_tracing import made
+from support.cases import SYSTEMS
+from support.graphs import assert_one_graph, methods
+from support.tracing import made
 
 PUSHED = [name for name, make in SYSTEMS.items() if make(np.random.default_rng(0), 1).v_shape != (0,)]
 METHODS = [method.name for method in sw.methods()]

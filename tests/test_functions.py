@@ -32,7 +32,7 @@ from stepwell.reference.functions import (
     rounding,
     trigonometric,
 )
-from true_functions import OF_ONE, OF_TWO, PRECISION, SPECIALS, TRUE, arguments, errors, same, sizes
+from support.true_functions import OF_ONE, OF_TWO, PRECISION, SPECIALS, TRUE, arguments, errors, same, sizes
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "theory" / "functions.md").read_text(encoding="utf-8")

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-import symbols
 from stepwell import _core
 from stepwell.errors import TraceError
 from stepwell.reference import functions as fn
 from stepwell.reference.tape.fused import MEANING, Evaluated, fused
 from stepwell.reference.tape.operations import Operation
-from true_functions import COMPARE, OF_ONE, OF_TWO, SPECIALS, TRUE, arguments, errors, same
+from support import symbols
+from support.true_functions import COMPARE, OF_ONE, OF_TWO, SPECIALS, TRUE, arguments, errors, same
 
 NAMES = [*OF_ONE, *OF_TWO]
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SOME, SYSTEMS, drawn
 from hypothesis import given
 from hypothesis import strategies as st
 from stepwell import _core
@@ -20,7 +19,8 @@ from stepwell.reference.tape.increments import increments_last
 from stepwell.reference.tape.operations import Operation, needed
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from test_tracing import ABLE, CONTROLS, METHODS, fits, made
+from support.cases import SOME, SYSTEMS, drawn, fits
+from support.tracing import ABLE, CONTROLS, METHODS, made
 
 WRONG: Any = "yes"
 ANY = st.floats(allow_nan=True, allow_infinity=True)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS
 from stepwell.base.immutable import changed
 from stepwell.errors import ArgumentError
 from stepwell.runs.continuation import identity
+from support.cases import SYSTEMS
 
 METHODS = [m.name for m in sw.methods()]
 

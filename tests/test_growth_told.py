@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import Case
+from support.cases import Case
 
 
 @sw.system

@@ -7,14 +7,14 @@ import pickle
 from typing import Any
 
 import numpy as np
-import own_systems as own
 import pytest
 import stepwell as sw
 from stepwell import _core
 from stepwell.errors import ArgumentError, UnknownNameError, UnsupportedError
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from test_graphs import assert_one_graph
+from support import own_systems as own
+from support.graphs import assert_one_graph
 
 START: dict[str, Any] = {"v": np.array([0.0, 0.5]), "y": np.array([1.0, -2.0]), "dt": 0.05, "steps": 40, "every": 5}
 QUATERNION = {"v": np.array([1.0, 0.1, 0.2]), "y": np.array([1.0, 0.0, 0.0, 0.0]), "dt": 0.05, "steps": 40, "every": 5}

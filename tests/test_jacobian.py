@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from differences import central
 from stepwell.analysis.derivatives import traced
 from stepwell.analysis.derivatives.traced import Traced
 from stepwell.analysis.stability import maps
 from stepwell.errors import UnsupportedError
+from support.differences import central
 
 EPS = np.finfo(float).eps
 

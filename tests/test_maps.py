@@ -13,7 +13,7 @@ import stepwell as sw
 from stepwell.analysis.stability import series
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnknownNameError, UnsupportedError
 from stepwell.views.charts.maps import ROUNDING
-from truths import CLOSED_FORMS
+from support.truths import CLOSED_FORMS
 
 METHODS = sw.methods()
 DAMPED = [method for method in METHODS if not method.needs_acceleration]

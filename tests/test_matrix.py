@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import Case, cases
+from support.cases import Case, cases
 
 MATRIX = [c for c in cases() if c.form == "matrix"]
 EPS = np.finfo(float).eps

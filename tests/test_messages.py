@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS
-from own_systems import duffing
 from stepwell.base.immutable import same
+from support.cases import SYSTEMS
+from support.own_systems import duffing
 
 
 def received(what: Any, *, first: int = 1, writeable: bool = False) -> Any:

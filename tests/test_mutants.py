@@ -14,8 +14,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import assert_same, cases, number
-from truths import CLOSED_FORMS, forced_error, matrix_of, quadrature_error, slope
+from support.cases import assert_same, cases, number
+from support.truths import CLOSED_FORMS, forced_error, matrix_of, quadrature_error, slope
 
 #: method: what to replace, by what, and what kind of mistake it is.
 MUTANTS = [

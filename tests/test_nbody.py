@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import assert_same
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from stepwell.reference.systems.nbody import partners
+from support.cases import assert_same
 
 EPS = float(np.finfo(float).eps)
 METHODS = [m.name for m in sw.methods()]

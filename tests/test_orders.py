@@ -9,12 +9,12 @@ from decimal import Decimal
 from types import ModuleType
 from typing import Any
 
-import dop853
 import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import UnsupportedError
 from stepwell.reference import tableau
+from support import dop853
 
 #: Sixteen digits show orders up to 5: of higher ones the error is rounding before its first power rules.
 METHODS = [m for m in sw.methods() if m.order <= 5]

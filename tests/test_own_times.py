@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS, Case, assert_same, cases, thinned
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
+from support.cases import SYSTEMS, Case, assert_same, cases, thinned
 
 METHODS = [m.name for m in sw.methods()]
 

@@ -9,10 +9,10 @@ import time
 import numpy as np
 import pytest
 import stepwell as sw
-from abroad import executed
-from explored import needs_node
 from stepwell.views.charts import page_animation, run_picture
 from stepwell.views.charts.runs import own_picture
+from support.abroad import executed
+from support.explored import needs_node
 
 DECODING = """
 const { readFileSync } = require("node:fs");

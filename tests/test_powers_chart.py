@@ -14,7 +14,7 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.views.charts import powers
 from stepwell.views.charts.powers import FORMS
-from truths import CLOSED_FORMS
+from support.truths import CLOSED_FORMS
 
 
 def of_tableau(steps: Any, phi: Fraction) -> Any:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-import tops
 from stepwell.analysis.stability.expansion import polynomials
-from truths import CLOSED_FORMS
+from support import tops
+from support.truths import CLOSED_FORMS
 
 #: A series has no stages: what is said of them is not of it, and a test of its own has its growth.
 METHODS = [m.name for m in sw.methods() if not (m.needs_acceleration or m.has_series)]

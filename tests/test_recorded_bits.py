@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-import recorded
 import stepwell as sw
+from support import recorded
 
 RUNS = recorded.runs()
 WRITTEN = recorded.written()

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS
 from stepwell.base import reprs
 from stepwell.views import charts
+from support.cases import SYSTEMS
 
 #: The longest line.
 MOST = 200

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-import tops
-from cases import assert_same
 from stepwell import _core
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.model import quaternion
 from stepwell.reference.systems import rigid_body as reference
 from stepwell.reference.traced import Tracer
 from stepwell.scenes.free_top import FreeTop
-from test_graphs import assert_one_graph, model
+from support import tops
+from support.cases import assert_same
+from support.graphs import assert_one_graph, model
 
 METHODS = [m for m in sw.methods() if not m.needs_acceleration]
 KEEPERS = [sw.NormControl([1.0, 2.0, 0.5]), sw.NormControl(0.7), sw.Projection("norm")]

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS, assert_same
 from stepwell.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, UnsupportedError
 from stepwell.reference.systems import pendulum_3d, rods
-from test_rods import CONTROL, RESETTING, TWO, apart_from_angles, cone, hanging, quiet
+from support.cases import SYSTEMS, assert_same
+from support.rods import CONTROL, RESETTING, TWO, apart_from_angles, cone, hanging, quiet
 
 # ---- what is refused, and what is doubted
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rod_contacts
 import stepwell as sw
-from cases import assert_same
-from rod_contacts import METHODS, RESETTING, ROUNDING, G, dumb_bell, tilted
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.reference import joined, rod_contact
+from support import rod_contacts
+from support.cases import assert_same
+from support.rod_contacts import METHODS, RESETTING, ROUNDING, G, dumb_bell, tilted
 
 KEPT = {"free": None, "control": sw.LengthControl(0.5), "resetting": RESETTING}
 

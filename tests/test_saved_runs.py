@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import own_systems as own
 import pytest
 import stepwell as sw
-from cases import SYSTEMS, cases, representative
 from stepwell.errors import ArgumentError, DTypeError, UnsupportedError
+from support import own_systems as own
+from support.cases import SYSTEMS, cases, representative
 
 METHODS = [m.name for m in sw.methods()]
 ADAPTIVE_METHODS = [m.name for m in sw.methods() if m.error_order is not None]

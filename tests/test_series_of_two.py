@@ -11,7 +11,7 @@ import stepwell as sw
 from stepwell import _core
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from test_graphs import assert_one_graph
+from support.graphs import assert_one_graph
 
 TAYLOR = sw.method("taylor")
 

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import assert_same
 from stepwell.errors import DTypeError, ShapeError, UnsupportedError
 from stepwell.model.systems import base
 from stepwell.reference import contact
 from stepwell.runs.engine import direct
-from test_contact_mutants import changed
+from support.cases import assert_same
+from support.contact_mutants import changed
 
 G = 9.81
 

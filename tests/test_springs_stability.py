@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import UnsupportedError
-from test_springs import lattice, tangled
+from support.springs import lattice, tangled
 
 LOSSES: list[dict[str, Any]] = [{}, {"damping": 0.6}, {"drag": 0.8}, {"damping": np.linspace(0.0, 1.5, 9), "drag": 0.3}]
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stability_cases import EPS, METHODS, known
 from stepwell.analysis.stability import KINDS, operations
-from truths import CLOSED_FORMS
+from support.stability_cases import EPS, METHODS, known
+from support.truths import CLOSED_FORMS
 
 #: FACTS of the undamped oscillator: q = r₁², p, limit.
 Q: dict[str, Any] = {

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stability_cases import EPS
 from stepwell.analysis.stability import eigen, limit_search
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnsupportedError
+from support.stability_cases import EPS
 
 
 def test_small_growth_is_seen_beside_what_is_on_the_circle() -> None:

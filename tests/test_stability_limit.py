@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
-import other_methods as other
 import pytest
 import stepwell as sw
-from stability_cases import LIMITS, METHODS, known
 from stepwell.errors import DTypeError, ShapeError, UnsupportedError
+from support import other_methods as other
+from support.stability_cases import LIMITS, METHODS, known
 
 DAMPABLE = [m for m in METHODS if not sw.method(m).needs_acceleration]
 

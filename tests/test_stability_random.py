@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.analysis.stability import maps, operations, series
-from truths import DOP853_TAIL
+from support.truths import DOP853_TAIL
 
 SECOND_ORDER = [m.name for m in sw.methods() if m.needs_acceleration]
 

@@ -8,15 +8,15 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import other_methods as other
 import pytest
 import stepwell as sw
-from stability_cases import EPS, METHODS
 from stepwell.analysis.stability import eigen, maps, operations, series
 from stepwell.analysis.stability.numbers import Polynomial
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.reference.systems.oscillator import Oscillator as Reference
-from truths import CLOSED_FORMS
+from support import other_methods as other
+from support.stability_cases import EPS, METHODS
+from support.truths import CLOSED_FORMS
 
 # ---- series and counts
 

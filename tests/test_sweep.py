@@ -19,7 +19,7 @@ from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.studies.sweeps import axes as of_axes
 from stepwell.studies.sweeps import crossings, observed, outcomes
 from stepwell.studies.sweeps.task import Stopped
-from sweeping import AXES, OUTCOMES, duffing, power, small, unlike
+from support.sweeping import AXES, OUTCOMES, duffing, power, small, unlike
 
 Oscillator = sw.Oscillator
 

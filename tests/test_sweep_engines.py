@@ -28,7 +28,7 @@ from stepwell.studies.sweeps import portable
 from stepwell.studies.sweeps.axes import Chunk
 from stepwell.studies.sweeps.ensemble import _outcomes
 from stepwell.studies.sweeps.task import Task
-from sweeping import AXES, OUTCOMES, duffing, ends, small, unlike
+from support.sweeping import AXES, OUTCOMES, duffing, ends, small, unlike
 
 #: Of Dask and its loops, at their own end.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, UnsupportedError
-from sweeping import AXES, OUTCOMES, duffing, ends, power, small, unlike
+from support.sweeping import AXES, OUTCOMES, duffing, ends, power, small, unlike
 
 F = np.float32
 #: Those that go with float32.

@@ -20,7 +20,7 @@ import stepwell as sw
 import xarray
 from stepwell.errors import ArgumentError
 from stepwell.studies.sweeps import engines, stores
-from sweeping import small, unlike
+from support.sweeping import small, unlike
 
 KINDS = pytest.mark.parametrize("ending", ["zarr", "nc"])
 
@@ -227,7 +227,7 @@ SLOW = """
     sys.path.insert(0, {tests!r})
     from functools import partial
     import stepwell as sw
-    from sweeping import duffing, AXES
+    from support.sweeping import duffing, AXES
 
     def slow(run):
         time.sleep(0.15)

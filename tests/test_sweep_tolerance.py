@@ -15,7 +15,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
 from stepwell.studies.sweeps import task
-from sweeping import AXES, duffing, ends, power, unlike
+from support.sweeping import AXES, duffing, ends, power, unlike
 
 METHODS = ("merson", "fehlberg", "fehlberg_5", "dop853", "taylor")
 GAMMA, Y0 = (values for _, values in AXES.values())

@@ -6,10 +6,10 @@ import sys
 from typing import Any
 
 import numpy as np
-import own_systems as own
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
+from support import own_systems as own
 
 OMEGA = np.array([1.0, 2.0, 3.0])
 

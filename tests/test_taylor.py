@@ -19,8 +19,8 @@ from stepwell.errors import ToleranceWarning, UnsupportedError
 from stepwell.reference import series, series_pace
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from test_graphs import assert_one_graph
-from truths import DRIVE, END, FORCE, OMEGA, forced_exact
+from support.graphs import assert_one_graph
+from support.truths import DRIVE, END, FORCE, OMEGA, forced_exact
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 

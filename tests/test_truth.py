@@ -12,7 +12,7 @@ import math
 import numpy as np
 import pytest
 import stepwell as sw
-from truths import CLOSED_FORMS, PROGRAMS, WEIGHTS, forced_error, matrix_of, quadrature_error, slope
+from support.truths import CLOSED_FORMS, PROGRAMS, WEIGHTS, forced_error, matrix_of, quadrature_error, slope
 
 METHODS = [m.name for m in sw.methods()]
 PHIS = (1e-3, 0.1, 0.7, 1.2, 1.9)

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS
 from stepwell.base.immutable import Value, same
 from stepwell.views import charts
+from support.cases import SYSTEMS
 
 FREE = sw.Oscillator(omega=2.0)
 QUATERNION: dict[str, Any] = {"v": np.ones(3), "y": np.array([1.0, 0.0, 0.0, 0.0]), "dt": 0.1, "steps": 1}

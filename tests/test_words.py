@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from private_words import ALLOWED, NAMES, PHRASES
+from support.private_words import ALLOWED, NAMES, PHRASES
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = sorted(

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS, cases
 from stepwell.errors import FixedError
+from support.cases import SYSTEMS, cases
 
 DIRECT = [c for c in cases() if c.form == "direct"]
 

@@ -14,7 +14,7 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
 from stepwell.views.charts import style, zplane_picture
 from stepwell.views.charts.zplane import ladder, largest
-from truths import CLOSED_FORMS
+from support.truths import CLOSED_FORMS
 
 METHODS = sw.methods()
 

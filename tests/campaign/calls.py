@@ -14,11 +14,11 @@ from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
-import own_systems as own
 import stepwell as sw
-from cases import ADAPTIVE, SYSTEMS, fits
 from stepwell.views.cli import main
-from test_wrong_calls import CALLS, OF_METHODS, passage
+from support import own_systems as own
+from support.cases import ADAPTIVE, SYSTEMS, fits
+from support.wrong_calls import CALLS, OF_METHODS, passage
 
 #: Where files are written, in the process that makes the calls.
 FOLDER = Path(mkdtemp(prefix="stepwell-campaign-"))

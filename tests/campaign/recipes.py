@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
-from test_wrong_calls import CALLS, JUNK
+from support.wrong_calls import CALLS, JUNK
 
 #: A list whose first element says what it is.
 Recipe = list[Any]

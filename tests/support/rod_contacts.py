@@ -21,7 +21,7 @@ G = 9.81
 RESETTING = sw.Projection("length")
 METHODS = [m.name for m in sw.methods() if not m.needs_acceleration]
 
-#: Methods whose velocity is not at the same time as y (tests/contacts.py).
+#: Methods whose velocity is not at the same time as y (tests/support/contacts.py).
 LAGGING = ("standard_euler", "damped_euler", "false_euler", "false_heun")
 
 

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import own_systems as own
 import pytest
 import stepwell as sw
 from stepwell._core import Tape
 from stepwell.reference.series import expanded
 from stepwell.reference.traced import Tracer
+
+from support import own_systems as own
 
 Make = Callable[[np.random.Generator, int], sw.System]
 

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from abroad import bits, executed
 from stepwell.views.explorer import sliders
 from stepwell.views.explorer.page import WEB
+
+from support.abroad import bits, executed
 
 #: Steps that are compared to the bit: some impacts of the ball and the stop of the sliding block are among them.
 STEPS = 60

@@ -1,9 +1,9 @@
 """Runs whose bits are written down in ``recorded_bits.json``, so that a core that is built anew can be held against the old one.
 
-    python tests/recorded.py --write            # writes the JSON with the core that is installed
-    python tests/recorded.py                    # says which runs are other than written
-    python tests/recorded.py --backend numpy    # the same of the NumPy reference
-    python tests/recorded.py --dump FILE [WORD] # the arrays of runs with WORD in their name, as .npz, to see where they differ
+    python tests/support/recorded.py --write            # writes the JSON with the core that is installed
+    python tests/support/recorded.py                    # says which runs are other than written
+    python tests/support/recorded.py --backend numpy    # the same of the NumPy reference
+    python tests/support/recorded.py --dump FILE [WORD] # the arrays of runs with WORD in their name, as .npz
 
 Every number that goes into a run is made here by operations that round the same way everywhere: no library's random numbers, no
 matrix product, no power, no sine.
@@ -23,7 +23,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import stepwell as sw
-from cases import SYSTEMS, Case, cases, number, representative
+
+from support.cases import SYSTEMS, Case, cases, number, representative
 
 PATH = Path(__file__).with_name("recorded_bits.json")
 

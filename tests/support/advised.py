@@ -15,7 +15,7 @@ import stepwell as sw
 from stepwell.scenes import Scene
 from stepwell.studies.advice.trials import single_name
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from benches.advice import Brute
 

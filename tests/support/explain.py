@@ -1,0 +1,136 @@
+"""What tests of explain share."""
+
+from __future__ import annotations
+
+import ast
+import re
+from typing import Any
+
+import numpy as np
+import stepwell as sw
+from stepwell import _core
+from stepwell.reference.tape.fused import fma
+from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
+from stepwell.source.explanation import listing
+
+from support.tracing import MEMBERS, H, T
+
+
+def lines(explained: sw.Explanation) -> list[str]:
+    return [line.strip() for line in explained.listing.splitlines()]
+
+
+def _as_bits(x: Any) -> Any:
+    if isinstance(x, int):
+        return np.uint64(x)
+    x = np.asarray(x)
+    return np.where(x, np.uint64(2**64 - 1), np.uint64(0)) if x.dtype == bool else x.astype(np.float64).view(np.uint64)
+
+
+def _on_bits(f: Any) -> Any:
+    return lambda *of: np.asarray(f(*map(_as_bits, of))).view(np.float64)
+
+
+#: What is done with bits.
+ON_BITS = {
+    "and_bits": np.bitwise_and,
+    "or_bits": np.bitwise_or,
+    "xor_bits": np.bitwise_xor,
+    "add_bits": np.add,
+    "shift_up": np.left_shift,
+    "shift_down": np.right_shift,
+}
+
+
+FUNCTIONS = {"sqrt": np.sqrt, "floor": np.floor, "fma": fma} | {name: _on_bits(f) for name, f in ON_BITS.items()}
+
+
+#: The type of constants; the tests of float32 take another, and other functions.
+NUMBER: Any = np.float64
+
+
+COMPARED = {ast.Lt: np.less, ast.LtE: np.less_equal, ast.Eq: np.equal}
+
+
+DONE = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
+
+
+def _value(node: Any, known: dict[str, Any]) -> Any:
+    """Of Python's grammar, but that a choice takes one of two arrays number by number."""
+    of = lambda each: _value(each, known)  # noqa: E731
+    match node:
+        case ast.Constant():
+            return NUMBER(node.value)
+        case ast.Name():
+            return known[node.id]
+        case ast.UnaryOp(op=ast.USub()):
+            return np.negative(of(node.operand))
+        case ast.UnaryOp(op=ast.Not()):
+            return np.logical_not(of(node.operand))
+        case ast.BinOp():
+            return DONE[type(node.op)](of(node.left), of(node.right))
+        case ast.Compare(ops=[op], comparators=[right]):
+            return COMPARED[type(op)](of(node.left), of(right))
+        case ast.BoolOp(values=truths):
+            return (np.logical_and if isinstance(node.op, ast.And) else np.logical_or).reduce(
+                np.broadcast_arrays(*map(of, truths))
+            )
+        case ast.IfExp():
+            return np.where(of(node.test), of(node.body), of(node.orelse))
+        case ast.Call() if node.func.id.endswith("_bits") or node.func.id.startswith("shift"):  # whose constants are bits
+            return FUNCTIONS[node.func.id](*(each.value if isinstance(each, ast.Constant) else of(each) for each in node.args))
+        case ast.Call():
+            return known.get(node.func.id, FUNCTIONS.get(node.func.id))(*map(of, node.args))
+    raise AssertionError(ast.dump(node))
+
+
+#: A name in a formula, with a place in an array behind it, or, of a sampled input, with the name of the number of a sample.
+NAME = re.compile(r"(?<![\w.])([^\W\d][\w.]*'?(?:\[\d+(?:,\d+)*\])?(?:\.\w+)*)(?:\[([^\W\d]\w*)\])?")
+
+
+SIGNS = (("·", "*"), ("−", "-"), ("√", "sqrt"), ("≤", "<="), (" = ", " == "), ("∞", "1e999"))
+
+
+def evaluate(explained: sw.Explanation, known: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
+    """The values of all lines, by name, from the texts of their formulas."""
+    values, out = dict(known), {}
+    values |= {
+        f"look up {name}": lambda at, samples=samples: samples[np.asarray(at, dtype=int)] for name, samples in tables.items()
+    }
+    places = {name: f"name_{i}" for i, name in enumerate(values)}
+
+    def plain(found: re.Match[str]) -> str:
+        name, of = found.groups()
+        return places.get(name, name) if of is None else f"{places[f'look up {name}']}({places[of]})"
+
+    numbered = {places[name]: value for name, value in values.items()}
+    with np.errstate(all="ignore"):
+        for section in explained.sections:
+            for line in section.lines:
+                text = NAME.sub(plain, line.formula)
+                for sign, python in SIGNS:
+                    text = text.replace(sign, python)
+                assert line.name not in places, f"{line.name} twice"
+                places[line.name] = f"name_{len(places)}"
+                out[line.name] = numbered[places[line.name]] = _value(ast.parse(text, mode="eval").body, numbered)
+    return out
+
+
+def leaves(plan: engine.Plan) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What stands behind the names of parameters, and samples by the name of their table; a row of each for every member."""
+    names, tables = listing.parameters(plan)
+    tracer = Tracer(plan.system, _core.Tape())
+    tracer.scaled(H)
+    known = dict(zip(names, tracer.numbers, strict=True)) | {"h": H, "t": T}
+    samples, before = {}, 0
+    for name, table in zip(tables, tracer.tables, strict=True):
+        values = np.asarray(table.values)
+        known |= {f"{name}.start": table.start, f"{name}.interval": table.interval, f"{name}.last": len(values) - 1.0}
+        known |= {f"{name}.first": float(before)}
+        samples[name] = values
+        before += len(values)
+    wide = [np.broadcast_to(each.reshape(len(each), -1), (len(each), MEMBERS)) for each in samples.values()]
+    every = np.concatenate(wide) if wide else np.zeros((0, MEMBERS))
+    known |= {"lanes": 1.0, "sample": lambda at: every[np.broadcast_to(at, MEMBERS).astype(int), np.arange(MEMBERS)]}
+    return known, samples
