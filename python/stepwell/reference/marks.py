@@ -98,7 +98,7 @@ def differentiable(name: str, *, general: bool = True) -> Callable[[Function], F
     """Decorate a function over arrays and symbols, all arguments numbers, so that its values are marked.
 
     Args:
-        name: the function's name in the table of derivatives, ``stepwell.derivatives.rules``.
+        name: the function's name in the table of derivatives, ``stepwell.reference.tape.rules``.
         general: whether derivatives of functions in other files may be written with this one.
     """
 
