@@ -5,10 +5,13 @@ Run ``.venv/bin/python docs/pictures.py`` after a change to a chart or a method,
 
 from __future__ import annotations
 
+import ast
 import io
 import re
 import runpy
 import tempfile
+import textwrap
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -307,7 +310,58 @@ def cloth() -> Figure:
     return figure
 
 
+ROOT = DOCS.parent
+
+
+def layers_of_package() -> list[tuple[str, str]]:
+    """The layers of the linter's contract, from the top, each with the first line of its docstring."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+    names = next(contract["layers"] for contract in contracts if contract["type"] == "layers")
+    source = ROOT / "python" / "stepwell"
+    texts = [ast.get_docstring(ast.parse((source / name / "__init__.py").read_text(encoding="utf-8"))) or "" for name in names]
+    return [(name, text.splitlines()[0]) for name, text in zip(names, texts, strict=True)]
+
+
+def layers_of_core() -> list[tuple[str, str]]:
+    """The layers of the test of imports, from the top, each with the first line of its file."""
+    core = ROOT / "rust" / "core"
+    order = re.search(r"const LAYERS: .*?\[([^\]]*)\];", (core / "tests" / "layers.rs").read_text(encoding="utf-8"))
+    assert order is not None
+    layers = []
+    for name in reversed(re.findall(r"\w+", order[1])):
+        files = [core / "src" / name / "mod.rs", core / "src" / f"{name}.rs"]
+        first = next(file for file in files if file.exists()).read_text(encoding="utf-8").splitlines()[0]
+        layers.append((name, first.removeprefix("//! ")))
+    return layers
+
+
+def layers() -> Figure:
+    """The layers of the package and of the core: each imports from those below it only."""
+    from matplotlib.figure import Figure
+    from matplotlib.patches import FancyBboxPatch
+
+    columns = {"Package: python/stepwell/": layers_of_package(), "Core: rust/core/src/": layers_of_core()}
+    figure = Figure(figsize=(14, 7.4))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set(xlim=(0, 100), ylim=(0, 53))
+    for x, (title, rows) in zip((1.5, 51.5), columns.items(), strict=True):
+        axes.text(x, 52, title, fontsize=15, va="top")
+        height = 47.0 / len(rows)
+        for i, (name, text) in enumerate(rows):
+            y = 48.0 - height * (i + 1)
+            shape = "round,pad=0,rounding_size=0.6"
+            axes.add_patch(
+                FancyBboxPatch((x, y + 0.35), 47, height - 0.7, boxstyle=shape, facecolor="#f2f2f2", edgecolor="#333333")
+            )
+            sentence = text.replace("``", "").partition(". ")[0].removesuffix(".")
+            axes.text(x + 1, y + height / 2, name, fontsize=12.5, weight="bold", va="center")
+            axes.text(x + 9, y + height / 2, textwrap.fill(sentence, 60), fontsize=11, va="center", linespacing=1.3)
+    return figure
+
+
 if __name__ == "__main__":
+    write("layers.png", layers())
     write("contact.png", contact())
     write("contact-rods.png", tumbling())
     write("tape.png", tape())
