@@ -153,10 +153,10 @@ def test_a_state_does_not_depend_on_what_else_is_asked_for(method: str, backend:
     else:
         assert (alone.paces.evaluations < many.paces.evaluations).all()
     # The step in which a run ends starts where the step before it ended: the state there is the one that is asked for there.
-    assert alone.stand is not None
+    assert alone.controller_state is not None
     for member, t in enumerate(alone.paces.t):
         there = sw.integrate(system, method, at=[t], **ask)
-        assert np.array_equal(there.y[0][..., member], alone.stand.y[..., member])
+        assert np.array_equal(there.y[0][..., member], alone.controller_state.y[..., member])
 
 
 @pytest.mark.parametrize("backend", ["rust", "numpy"])

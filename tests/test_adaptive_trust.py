@@ -356,7 +356,7 @@ def test_attempts_are_one_graph(method: str, backward: bool, acceptance: Accepta
         return -k * np.roll(y, 1) + np.cos(t) * v
 
     plan = engine.Plan(
-        springs().sized(np.zeros(3), np.zeros(3)), sw.method(method), (), 1.0, acceptance=acceptance, backward=backward
+        springs().for_state_shapes(np.zeros(3), np.zeros(3)), sw.method(method), (), 1.0, acceptance=acceptance, backward=backward
     )
     for what in ("attempt", "begin"):
         tape = _core.Tape()

@@ -245,7 +245,7 @@ class Made:
     def within_limit(self, k: int) -> int:
         return k
 
-    def said(self, k: int) -> str:
+    def described(self, k: int) -> str:
         return str(k)
 
 

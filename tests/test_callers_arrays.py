@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.base.immutable import Fixed, FixedDict, Value, frozen
+from stepwell.base.immutable import FixedDict, Immutable, ValueEquality, frozen
 
 TWO = np.ones(2)
 
@@ -97,7 +97,7 @@ def arrays(what: Any) -> list[Any]:
         return [each for part in what for each in arrays(part)]
     if isinstance(what, dict):
         return arrays(list(what.values()))
-    return arrays(vars(what)) if isinstance(what, Value) else []
+    return arrays(vars(what)) if isinstance(what, ValueEquality) else []
 
 
 def of_caller(what: Any) -> list[Any]:
@@ -123,8 +123,8 @@ def write(what: Any) -> None:
 
 
 def test_no_public_class_is_left_out() -> None:
-    public = {each for each in vars(sw).values() if inspect.isclass(each) and issubclass(each, Fixed)} | {
-        getattr(sw, name) for name in dir(sw) if inspect.isclass(getattr(sw, name)) and issubclass(getattr(sw, name), Fixed)
+    public = {each for each in vars(sw).values() if inspect.isclass(each) and issubclass(each, Immutable)} | {
+        getattr(sw, name) for name in dir(sw) if inspect.isclass(getattr(sw, name)) and issubclass(getattr(sw, name), Immutable)
     }
     assert public - set(MAKERS) == {sw.System, sw.Method, sw.Event}  # an abstract one, a record, a function
 

@@ -294,7 +294,7 @@ def test_explain_says_what_explain_says(capsys, tmp_path):
 
 def test_explain_takes_a_scene_with_its_control(capsys):
     scene = sw.scenes.energy_control()
-    wanted = sw.explain(scene.system.sized(scene.v, scene.y), "rk4", members=8, control=scene.control, fused=True)
+    wanted = sw.explain(scene.system.for_state_shapes(scene.v, scene.y), "rk4", members=8, control=scene.control, fused=True)
     assert told(capsys, "explain", "energy_control", "rk4", "--members", "8", "--fused") == (0, f"{wanted}\n", "")
     code, out, _ = told(capsys, "explain", "Pendulum", "merson", "--attempt")
     assert code == 0

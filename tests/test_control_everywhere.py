@@ -109,7 +109,7 @@ def test_invariants_of_own_systems_with_a_tolerance(control: Any) -> None:
     ]
     assert_same(*runs)
     free = sw.integrate(own.pendulum(), "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[5.0, 20.0])
-    start = own.pendulum().sized(0.0, 0.0).energy(np.zeros(2), np.array([1.0, 2.0]))
+    start = own.pendulum().for_state_shapes(0.0, 0.0).energy(np.zeros(2), np.array([1.0, 2.0]))
     assert (abs(runs[0].energy - start).max() < 0.2 * abs(free.energy - start).max()).all()
 
 
@@ -203,7 +203,7 @@ def test_a_world_and_an_explanation_of_pefrl_under_control() -> None:
     world = sw.World(system, "pefrl", v=start["v"].copy(), y=start["y"].copy(), dt=0.01, control=control)
     world.step(7)
     np.testing.assert_array_equal(world.y, run.y[-1])
-    assert "work" in str(sw.explain(system.sized(start["v"], start["y"]), "pefrl", control=control).listing)
+    assert "work" in str(sw.explain(system.for_state_shapes(start["v"], start["y"]), "pefrl", control=control).listing)
 
 
 # ---- when h·C·K passes 1

@@ -155,7 +155,7 @@ def test_a_long_one_is_stepped_by_its_rates() -> None:
     """A ring of 600 springs in space is past what becomes one tape for a step."""
     rng = np.random.default_rng(0)
     y = rng.normal(size=(600, 3))
-    assert "not one tape" in str(sw.explain(own.springs().sized(None, y), "rk4"))
+    assert "not one tape" in str(sw.explain(own.springs().for_state_shapes(None, y), "rk4"))
     run(own.springs(), v=0.0, y=y, steps=2, every=None)
 
 

@@ -197,7 +197,7 @@ def test_sliders_of_any_step_move_its_energy_too(forgotten: bool, tmp_path: Path
             system = sw.RigidBody(inertia)
         v, y = rng.normal(size=scene.v.shape), rng.normal(size=scene.y.shape)
         asked.append([found, values, np.ravel(v).tolist(), np.ravel(y).tolist()])
-        wanted.append(float(system.sized(v, y).energy(v, y)))
+        wanted.append(float(system.for_state_shapes(v, y).energy(v, y)))
     told = in_node(
         """
 told = given.map(([scene, values, v, y]) => ENERGIES[scene.energy.kind](settings(scene, values, {}).e, v, y));

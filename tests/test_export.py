@@ -268,7 +268,7 @@ class Tangled:
         twice = v * 8388608.0 + 6755399441055744.0  # whose last bit turns two signs
         turned = bits.turn_sign(v, twice) + bits.turn_sign(y, twice) - bits.turn_sign(logarithm, y + v)
         chosen = bits.where(near & slow, cut, bits.where(near | slow, logarithm, odd))
-        other = bits.where(~slow, turned, bits.held(chosen, -0.25, 0.5))
+        other = bits.where(~slow, turned, bits.clamp(chosen, -0.25, 0.5))
         mixed = bits.add_bits(bits.where(near, bits.add_bits(v, 3), y), 0xFFFF_FFFF_FFFF_FFFE)
         return -self.h * (chosen + other + mixed + trig.sin(t) * trig.cos(self.omega * v))
 

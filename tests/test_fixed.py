@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.base.immutable import Fixed, changed
+from stepwell.base.immutable import Immutable, changed
 from stepwell.errors import FixedError, StepwellError
 from support.cases import SYSTEMS
 
@@ -42,7 +42,7 @@ def arrays(what: Any) -> list[Any]:
         return [each for part in what for each in arrays(part)]
     if isinstance(what, dict):
         return arrays(list(what.values()))
-    if isinstance(what, Fixed):
+    if isinstance(what, Immutable):
         return arrays([value for name, value in vars(what).items() if not name.startswith("_")])
     return []
 

@@ -120,14 +120,17 @@ def test_a_world_equals_pieces_of_a_run(method: str, backend: str) -> None:
         (sw.Chain(1500), 2),
         (sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80), 1),
         (sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80), 9),
-        (SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().sized(None, np.zeros((300, 3))), 2),  # type: ignore[attr-defined]
+        (
+            SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().for_state_shapes(None, np.zeros((300, 3))),
+            2,
+        ),  # type: ignore[attr-defined]
     ],
     ids=repr,
 )
 def test_large_systems(system: sw.System, members: int, method: str) -> None:
     """By kernels written by hand and by tapes of the rates, with more numbers than are copied."""
     rng = np.random.default_rng(2)
-    system = system.sized(np.zeros(system.v_shape or 1), np.zeros(system.y_shape)) if system.v_shape else system
+    system = system.for_state_shapes(np.zeros(system.v_shape or 1), np.zeros(system.y_shape)) if system.v_shape else system
     shape, shape_y = ((*each, members) if members > 1 else each for each in (system.v_shape, system.y_shape))
     if not able(system, method):
         pytest.skip("the method needs an acceleration")

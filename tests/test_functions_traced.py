@@ -145,9 +145,9 @@ def test_interp_is_numpys() -> None:
         def table(t: Any, y: Any) -> Any:
             return np.interp(t, places, values, **outside)  # noqa: B023  # it is run in this turn of the loop
 
-        system = table().sized(None, np.empty(()))
+        system = table().for_state_shapes(None, np.empty(()))
         for t in at:
-            found = system.alone(1.0, ()).rates(t, np.empty(0), np.empty(()))[1]
+            found = system.reference_at_step(1.0, ()).rates(t, np.empty(0), np.empty(()))[1]
             # A slope, a time since, a product and a sum, of values up to 3 and slopes up to 13.
             assert abs(found - np.interp(t, places, values, **outside)) < 40 * 2.0**-52
 

@@ -181,9 +181,9 @@ def test_members_that_stopped_go_on_from_where_they_stopped(method: str) -> None
     rest = sw.integrate(spring(k=rate**2), method, at=[6.0], **first.resume)
     np.testing.assert_array_equal(rest.y[-1], whole.y[-1])
     slower = sw.integrate(spring(k=4.0), method, at=[6.0], **first.resume)
-    assert first.stand is not None
+    assert first.controller_state is not None
     at = float(first.paces.t[1])
-    alone = {"v": first.stand.v[1], "y": first.stand.y[1], "t0": at, "tolerance": 1e-6}
+    alone = {"v": first.controller_state.v[1], "y": first.controller_state.y[1], "t0": at, "tolerance": 1e-6}
     np.testing.assert_array_equal(slower.y[-1, 1], sw.integrate(spring(k=4.0), method, at=[6.0], **alone).y[-1])
 
 
@@ -245,7 +245,7 @@ def test_a_system_is_known_by_all_of_its_numbers(name: str) -> None:
     system, again = (make(np.random.default_rng(1), 3) for _ in range(2))
     drawn = np.random.default_rng(2)
     state = [drawn.normal(size=(*shape, 3)) for shape in (system.v_shape, system.y_shape)]
-    system, again = (each.sized(*state) for each in (system, again))
+    system, again = (each.for_state_shapes(*state) for each in (system, again))
     state = [drawn.normal(size=(*shape, 3)) for shape in (system.v_shape, system.y_shape)]
     known = identity(system, (3,), *state)
     assert identity(again, (3,), *state) == known

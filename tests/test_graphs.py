@@ -57,7 +57,7 @@ def test_an_attempt_and_a_step_of_pefrl_under_control(name: str, control: str) -
 
 @pytest.mark.parametrize("control", [sw.Control("energy", 0.3), sw.Control("energy", 0.3, "printed"), sw.Projection("energy")])
 def test_an_attempt_under_a_control_of_an_invariant(control: Any) -> None:
-    system = own_systems.pendulum().sized().under(control, ())
+    system = own_systems.pendulum().for_state_shapes().under(control, ())
     for method in ABLE:
         if not fits(system, method):
             continue
@@ -95,7 +95,7 @@ def test_the_start_of_a_run_with_a_tolerance(name: str) -> None:
 
 @pytest.mark.parametrize("control", [sw.Control("energy", 0.3), sw.Control("energy", 0.3, "printed"), sw.Projection("energy")])
 def test_the_start_under_a_control_of_an_invariant(control: Any) -> None:
-    system = own_systems.pendulum().sized().under(control, ())
+    system = own_systems.pendulum().for_state_shapes().under(control, ())
     tape = _core.Tape()
     assert_one_graph(tape, tape.trace(model(system, ABLE[0]), "begin"), Tracer(system, tape).begin(ABLE[0]))
 

@@ -180,7 +180,7 @@ def test_what_grows_by_itself_or_not_at_all_is_not_told(system: sw.System, given
 
 
 def shapes(system: sw.System, given: dict[str, Any]) -> list[tuple[str, Any]]:
-    sized = system.sized(given.get("v"), given["y"])
+    sized = system.for_state_shapes(given.get("v"), given["y"])
     return [(name, shape) for name, shape in (("v", sized.v_shape), ("y", sized.y_shape)) if name in given]
 
 

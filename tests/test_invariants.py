@@ -49,7 +49,7 @@ def test_an_invariant_is_recorded() -> None:
 )
 def test_the_core_and_the_reference_are_one_graph_under_control(method: str, control: Any) -> None:
     system = own.pendulum(omega=np.array([0.8, 1.3]))
-    held = system.sized(START["v"], START["y"]).controlled(control, START["v"], START["y"], 0.05)
+    held = system.for_state_shapes(START["v"], START["y"]).controlled(control, START["v"], START["y"], 0.05)
     plan = engine.Plan(held, sw.method(method), held.batch, 0.05)
     tape = _core.Tape()
     assert_one_graph(tape, tape.trace(engine.model(plan), "step"), Tracer(held, tape).step(sw.method(method)))

@@ -87,7 +87,7 @@ SYSTEMS: dict[str, tuple[sw.System, Any, Any]] = {
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_jacobians_against_differences(name: str) -> None:
     system, v, y = SYSTEMS[name]
-    system = system.sized(v, y)
+    system = system.for_state_shapes(v, y)
     found = sw.jacobian(system, v=v, y=y, t=0.3)
     members = found.matrix.shape[2:]
     n_v, n_y = maps.size(system)
@@ -173,7 +173,7 @@ def test_states_are_given_in_one_way() -> None:
 def test_a_large_state_has_the_same_jacobian_by_the_complex_step() -> None:
     n = 20  # 80 numbers
     v, y = np.zeros((n, 2)), np.random.default_rng(0).normal(size=(n, 2))
-    system = sw.NBody(np.ones(n), softening=0.3).sized(v, y)
+    system = sw.NBody(np.ones(n), softening=0.3).for_state_shapes(v, y)
     found = sw.jacobian(system, v=v, y=y)
     tape = Traced(system, "rates")
     assert tape.length == 80

@@ -342,7 +342,7 @@ class Lorenz(System):
     second_order = False
     v_shape, y_shape = (0,), (3,)
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         return []
 
     def given(self, batch: tuple[int, ...]) -> dict[str, Any]:

@@ -299,7 +299,7 @@ def test_members_that_move_are_searched_some_at_a_time(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(checks, "_bounds", lambda: iter([(0.2e9, "memory of this machine")]))  # with all it was 0.26 GB
     monkeypatch.setattr(limit, "_of_some", some)
-    limit.limit_of(ring().sized(), sw.method("rk4"), np.zeros((60, 300)), np.ones((60, 300)))
+    limit.limit_of(ring().for_state_shapes(), sw.method("rk4"), np.zeros((60, 300)), np.ones((60, 300)))
     assert sum(searched) == 300
     assert max(searched) == 18
 

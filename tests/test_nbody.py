@@ -133,7 +133,7 @@ def test_false_eulers_energy_stays_in_a_band_over_a_million_steps() -> None:
 def test_force_is_minus_the_gradient_of_the_energy(force: str, dim: int) -> None:
     """h·v̇ of the reference against differences of the potential energy, with unequal masses and softening."""
     system, v, y = bodies(11, 5, dim, force)
-    system = system.sized(v, y)
+    system = system.for_state_shapes(v, y)
     a = system.scaled(1.0, ()).dv(0.0, v, y)
     rest, d = np.zeros_like(v), 1e-5
     for i in range(5):

@@ -168,11 +168,11 @@ def test_the_order_on_bodies_that_lose_mass_by_the_formula(method: sw.Method) ->
 def test_a_force_at_the_time_of_the_start_is_of_first_order() -> None:
     """So the test above can fail: Runge-Kutta 4 whose stages take the masses of the start of the step."""
     v, y = fading_orbit(2.3)
-    system = fading().sized(*fading_orbit(0.0))
+    system = fading().for_state_shapes(*fading_orbit(0.0))
 
     class Frozen:
         def __init__(self, h: float) -> None:
-            self.s, self.now = system.alone(h, ()), 0.0
+            self.s, self.now = system.reference_at_step(h, ()), 0.0
 
         def dv(self, t: float, v: Any, y: Any) -> Any:
             return self.s.dv(self.now, v, y)

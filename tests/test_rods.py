@@ -239,7 +239,7 @@ def test_resetting_is_exact(name: str) -> None:
     rng = np.random.default_rng(3)
     v, y = rng.normal(size=(20, *y.shape)), y + rng.normal(0.0, 0.004, (20, *y.shape))
     v, y = np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1)
-    s = system.under(RESETTING, ()).alone(0.1, (20,))
+    s = system.under(RESETTING, ()).reference_at_step(0.1, (20,))
     assert s.record("length_error", v, y).max() > 4e-3
     after_v, after_y = s.project(v, y)
     # |d|² is a sum of three products, each rounded, of coordinates of up to 3: some 10 roundings of a length.
@@ -254,7 +254,7 @@ def test_resetting_is_exact(name: str) -> None:
 
 def test_three_corrections_take_two_per_cent_to_rounding_and_two_do_not(monkeypatch: pytest.MonkeyPatch) -> None:
     """One rod: a correction of the length 1 + ε leaves ε²/2, so three of them ε⁸/128: 0.018⁸/128 = 2⁻⁵⁴, 0.04⁸/128 = 5e-14."""
-    rod = sw.Rods([1.0], [((0.0, 0.0), 0)], 1.0).under(RESETTING, ()).alone(0.1, ())
+    rod = sw.Rods([1.0], [((0.0, 0.0), 0)], 1.0).under(RESETTING, ()).reference_at_step(0.1, ())
     left = {}
     for corrections in (2, 3):
         monkeypatch.setattr(rods, "CORRECTIONS", corrections)

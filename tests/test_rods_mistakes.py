@@ -185,7 +185,7 @@ def true_by_the_reference() -> bool:
     triangle = sw.Rods([1.0, 2.0, 0.5], [(0, 1), (1, 2), (2, 0)], 1.0, gravity=0.0)
     y = np.array([[0, 0], [1, 0], [0.5, 0.75**0.5]])
     run = quiet(triangle, "rk4", v=np.array([[0.3, 0.1], [0.3, 0.9], [-0.4, 0.766]]), y=y, steps=100, **given)
-    s = triangle.sized(0.0, y).alone(0.01, ())
+    s = triangle.for_state_shapes(0.0, y).reference_at_step(0.01, ())
     off = [abs(float(rods.dot(d, u))) for d, u in zip(s.spans(run.y[-1]), s.closing(run.v[-1]), strict=True)]
     begun = [
         abs(float(rods.dot(d, u)))

@@ -42,7 +42,7 @@ def of(name: str) -> sw.System:
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_core_and_reference_are_one_graph(name: str) -> None:
-    system, tape = of(name).sized(0.0, 0.0), _core.Tape()
+    system, tape = of(name).for_state_shapes(0.0, 0.0), _core.Tape()
     for what, traced in (("step", Tracer(system, tape).step), ("attempt", Tracer(system, tape).attempt)):
         model = engine.model(engine.Plan(system, TAYLOR, (), 0.1))
         assert_one_graph(tape, tape.trace(model, what), traced(TAYLOR))

@@ -48,8 +48,8 @@ VARIANTS: list[dict[str, Any]] = [
 
 def off(system: sw.Springs, v: Any, y: Any) -> float:
     """How far the reference is from the formula, and the forces are from the energy's gradient if they have one."""
-    system = system.sized(v, y)
-    s = system.alone(1.0, ())
+    system = system.for_state_shapes(v, y)
+    s = system.reference_at_step(1.0, ())
     rates = s.dv(0.0, v, y)
     worst = float(np.abs(rates - accelerations(system, v, y)).max())
     if system.velocity_term is None:

@@ -118,7 +118,7 @@ def test_damped_jelly_comes_to_rest_on_the_floor(share: float, height: float) ->
     assert run.y[..., 2].min() >= 0.0  # at rest they lie at 0 exactly, and none of them starts behind the floor
     assert (run.y[-1, :, 2] == 0.0).sum() >= 3
     loose = sw.Springs(net.pairs, stiffness=100.0, rest=net.rest, masses=0.02, gravity=(0.0, 0.0, -G))
-    force = 0.02 * loose.alone(1.0, ()).dv(0.0, run.v[-1], run.y[-1])
+    force = 0.02 * loose.reference_at_step(1.0, ()).dv(0.0, run.v[-1], run.y[-1])
     lies = run.y[-1, :, 2] == 0.0
     assert np.abs(force[~lies]).max() < 1e-4 * 0.02 * G
     assert -force[lies, 2].sum() == pytest.approx(27 * 0.02 * G, rel=1e-4)  # its weight

@@ -60,8 +60,8 @@ def test_stiffness_is_named_by_its_rate(method: str, members: tuple[int, ...]) -
     """The fastest rate of Robertson's reaction is there −(1e4·y₃ + 6e7·y₂ + 0.04) to within a part in a thousand."""
     y = np.array([1.0, 0.0, 0.0]).reshape(3, *(1,) * len(members)) * np.ones(members)
     run, text = stopped(robertson(), method, y=y, tolerance=(1e-6, 1e-9), at=[1e4], max_steps=20_000)
-    assert run.stand is not None
-    state = run.stand.y[:, 0] if members else run.stand.y
+    assert run.controller_state is not None
+    state = run.controller_state.y[:, 0] if members else run.controller_state.y
     found = re.search(r"the fastest rate there, 1/([\d.e-]+), lets no steps beyond ([\d.e-]+) be stable \(stiff", text)
     assert found is not None
     # Both are told with two digits.

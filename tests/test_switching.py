@@ -17,7 +17,7 @@ PAIRS = ["merson", "fehlberg", "fehlberg_5", "dop853"]
 
 def times_of(function: Callable[..., Any], end: float = 60.0, **parameters: Any) -> Any:
     """The switching times from 0 to ``end`` of a system of first order with one number for a state."""
-    times = np.sort(sw.system(order=1)(function)(**parameters).sized((0,), ()).switching_times(0.0, end), axis=0)
+    times = np.sort(sw.system(order=1)(function)(**parameters).for_state_shapes((0,), ()).switching_times(0.0, end), axis=0)
     return times[(times >= 0.0) & (times <= end)] if times.ndim == 1 else times
 
 
@@ -65,8 +65,8 @@ def test_times_are_solved(what: str) -> None:
 def test_rates_switch_there(what: str) -> None:
     """A time that is solved is one at which another piece is taken, or a kink: both one-sided slopes or values differ."""
     function = SOLVED[what][0]
-    system = sw.system(order=1)(function)().sized((0,), ())
-    rates = system.alone(1.0, ())
+    system = sw.system(order=1)(function)().for_state_shapes((0,), ())
+    rates = system.reference_at_step(1.0, ())
     for time in times_of(function):
         h = 1e-6
         values = [rates.dy(np.float64(time + k * h), np.empty(0), np.float64(0.0)) for k in (-2, -1, 1, 2)]

@@ -73,12 +73,12 @@ def of_time(name: str) -> sw.System:
     def rate(t: Any, y: Any) -> Any:
         return function(polynomial(t)) + 0.0 * y
 
-    return rate().sized(None, np.zeros(()))
+    return rate().for_state_shapes(None, np.zeros(()))
 
 
 def coefficients(system: sw.System, order: int, v: Any, y: Any) -> list[Any]:
     with np.errstate(all="ignore"):
-        return series.coefficients(system.alone(1.0, ()), order, 0.0, 1.0, np.asarray(v), np.asarray(y))
+        return series.coefficients(system.reference_at_step(1.0, ()), order, 0.0, 1.0, np.asarray(v), np.asarray(y))
 
 
 def assert_known(name: str) -> None:
@@ -277,7 +277,7 @@ def squared() -> sw.System:
     def growth(t: Any, y: Any) -> Any:
         return y * y
 
-    return growth().sized(None, np.zeros(()))
+    return growth().for_state_shapes(None, np.zeros(()))
 
 
 @pytest.mark.parametrize("order", [4, 8, 12, 20])
@@ -477,7 +477,7 @@ def test_functions_are_no_pieces_however_they_are_signed(name: str) -> None:
         p = polynomial(t)
         return -of_p(p) + 0.0 * (0.0 - of_p(p)) + -1.0 * of_p(0.0 - (-p)) + 0.0 * y
 
-    assert not sw.system(order=1)(signed)().sized(None, np.zeros(())).chooses
+    assert not sw.system(order=1)(signed)().for_state_shapes(None, np.zeros(())).chooses
 
 
 def fall(power: float, below: float) -> sw.System:

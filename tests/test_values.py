@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.base.immutable import Value, same
+from stepwell.base.immutable import ValueEquality, same
 from stepwell.views import charts
 from support.cases import SYSTEMS
 
@@ -215,8 +215,8 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]).paces,
     ],
     "AdaptiveState": [
-        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]).stand,
-        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]).stand,
+        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]).controller_state,
+        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]).controller_state,
     ],
     "Mode": [
         lambda: sw.stability_limit(FREE, "false_euler").mode,
@@ -320,7 +320,7 @@ def test_every_public_class_is_here() -> None:
     elsewhere |= {name for name in public if issubclass(getattr(sw, name, int), sw.System)}  # each is among the cases
     assert public - elsewhere - parts - {"RunPicture"} <= set(MAKERS)
     for name in parts | {"RunPicture"}:
-        assert issubclass(getattr(charts, name), Value)
+        assert issubclass(getattr(charts, name), ValueEquality)
 
 
 def test_a_method_is_one_of_its_kind() -> None:

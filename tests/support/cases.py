@@ -227,25 +227,27 @@ SYSTEMS: dict[str, Make] = {
         [1.0, 2.0, 0.5, 1.0], [(0, 1), (3, 2)], 1.0, gravity=2.0, floor=sw.Sphere((0.1, 0.0), r.uniform(1.0, 1.5, b), inside=True)
     ),
     "rods, a triangle": lambda r, b: sw.Rods(r.uniform(0.5, 2.0, (3, b)), [(0, 1), (1, 2), (2, 0)], 1.0, dim=3),
-    "own: Duffing": lambda r, b: own.duffing(beta=r.uniform(0.1, 1.0, b), omega=_omega(r, b)).sized(),
-    "own: Lorenz": lambda r, b: own.lorenz(rho=r.uniform(0.5, 1.5, b)).sized(),
-    "own: pendulum": lambda r, b: own.pendulum(omega=_omega(r, b)).sized(),
-    "own: springs in space": lambda r, b: own.springs(k=r.uniform(0.5, 1.0, b)).sized(None, np.zeros((5, 3))),
-    "own: masses that attract": lambda r, b: own.attracted(masses=r.uniform(0.1, 1.0, (3, b))).sized(None, np.zeros((3, 2))),
-    "own: top": lambda r, b: own.top(inertia=r.uniform(1.0, 3.0, (3, b))).sized(np.zeros(3), np.zeros(4)),
-    "own: sinusoid": lambda r, b: own.pushed(k=_omega(r, b), x=_sine(r, b)).sized(),
-    "own: samples": lambda r, b: own.pushed(x=_held(r, b)).sized(),
-    "own: a function of the time": lambda r, b: own.pushed(k=_omega(r, b), x=own.turning).sized(),
-    "own: a choice": lambda r, b: own.bouncing(gravity=r.uniform(0.5, 1.0, b)).sized(),
-    "own: a matrix": lambda r, b: own.network(weights=r.normal(size=(3, 3, b))).sized(),
-    "own: as SciPy has it": lambda r, b: own.scipys().sized(),
+    "own: Duffing": lambda r, b: own.duffing(beta=r.uniform(0.1, 1.0, b), omega=_omega(r, b)).for_state_shapes(),
+    "own: Lorenz": lambda r, b: own.lorenz(rho=r.uniform(0.5, 1.5, b)).for_state_shapes(),
+    "own: pendulum": lambda r, b: own.pendulum(omega=_omega(r, b)).for_state_shapes(),
+    "own: springs in space": lambda r, b: own.springs(k=r.uniform(0.5, 1.0, b)).for_state_shapes(None, np.zeros((5, 3))),
+    "own: masses that attract": lambda r, b: own.attracted(masses=r.uniform(0.1, 1.0, (3, b))).for_state_shapes(
+        None, np.zeros((3, 2))
+    ),
+    "own: top": lambda r, b: own.top(inertia=r.uniform(1.0, 3.0, (3, b))).for_state_shapes(np.zeros(3), np.zeros(4)),
+    "own: sinusoid": lambda r, b: own.pushed(k=_omega(r, b), x=_sine(r, b)).for_state_shapes(),
+    "own: samples": lambda r, b: own.pushed(x=_held(r, b)).for_state_shapes(),
+    "own: a function of the time": lambda r, b: own.pushed(k=_omega(r, b), x=own.turning).for_state_shapes(),
+    "own: a choice": lambda r, b: own.bouncing(gravity=r.uniform(0.5, 1.0, b)).for_state_shapes(),
+    "own: a matrix": lambda r, b: own.network(weights=r.normal(size=(3, 3, b))).for_state_shapes(),
+    "own: as SciPy has it": lambda r, b: own.scipys().for_state_shapes(),
     "linear, seventeen states": lambda r, b: sw.LinearSystem(0.5 * _gentle(r, 17), r.normal(size=17), x=_sine(r, b)),
 }
 
 
 def _adaptive(system: sw.System) -> bool:
     """Whether it goes with adaptive steps: friction depends on the step, and a step that meets a surface is no estimate."""
-    return system.rubbing is None and not system.contacts
+    return system.stick_friction is None and not system.contacts
 
 
 ADAPTIVE = [name for name, make in SYSTEMS.items() if _adaptive(make(np.random.default_rng(0), 1))]

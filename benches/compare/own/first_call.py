@@ -91,7 +91,7 @@ def ours(equation: Equation, repeats: int) -> tuple[float, float, float]:
     shapes = (state if order == 2 else None, state)
 
     def made() -> sw.System:
-        return equation.system(**own).sized(*shapes)
+        return equation.system(**own).for_state_shapes(*shapes)
 
     python = min(seconds(made) for _ in range(repeats))
     model = engine.model(engine.Plan(made(), sw.method("rk4"), (MEMBERS,), equation.dt))

@@ -95,7 +95,13 @@ def growth(
         before = np.where(before > 0.0, before, 1.0)
         many = np.isfinite(after) & (after / before > GROWN)
     n = math.prod(system.v_shape) + math.prod(system.y_shape)
-    if not many.any() or n * n > MOST_NUMBERS or system.contacts or system.rubbing is not None or isinstance(system, NBody):
+    if (
+        not many.any()
+        or n * n > MOST_NUMBERS
+        or system.contacts
+        or system.stick_friction is not None
+        or isinstance(system, NBody)
+    ):
         return None
     suspects = np.flatnonzero(many)[: MOST_NUMBERS // (n * n)]
     try:

@@ -24,8 +24,8 @@ PART = 2.0**-26
 def held_by_stability(run: Run, index: Shape, attempts: int) -> str:
     """Whether the fastest rate where a member stopped lets no longer step be stable; empty if that is not so."""
     assert run.paces is not None
-    assert run.stand is not None
-    numbers = run.stand.v.size + run.stand.y.size
+    assert run.controller_state is not None
+    numbers = run.controller_state.v.size + run.controller_state.y.size
     n = numbers // run.status.size
     if attempts < ATTEMPTS or n > MOST_RATES or n * numbers > MOST_NUMBERS:
         return ""
@@ -52,9 +52,9 @@ def held_by_stability(run: Run, index: Shape, attempts: int) -> str:
 
 def _derivative(run: Run, index: Shape, n: int) -> Array:
     """How the rates of a member change with its state, by differences."""
-    assert run.stand is not None
+    assert run.controller_state is not None
     assert run.paces is not None
-    paces, blocks = run.paces, (run.stand.v, run.stand.y)
+    paces, blocks = run.paces, (run.controller_state.v, run.controller_state.y)
     flat = [block.reshape(-1, *run.status.shape) for block in blocks]
 
     def at(state: Array) -> Array:

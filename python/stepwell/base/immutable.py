@@ -22,7 +22,7 @@ DONE = "_done"
 LARGE = 1 << 24
 
 
-class Value:
+class ValueEquality:
     """Equal to another of its class if all that it holds is equal, arrays number by number; NaN equals NaN.
 
     What has no repr of its own is shown in one line; that of a dataclass would print all of its arrays.
@@ -99,7 +99,7 @@ def takes(kind: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
         raise DTypeError(f"{kind.__name__}: {error}; expected {kind.__name__}{inspect.Signature(bare)}") from None
 
 
-class Maker(ABCMeta):
+class ImmutableMeta(ABCMeta):
     """Makes objects that cannot be changed once ``__init__`` is over."""
 
     if not TYPE_CHECKING:  # which takes the arguments from ``__init__``
@@ -121,7 +121,7 @@ class Maker(ABCMeta):
     @property
     def __signature__(cls) -> Any:
         """That of ``__init__``, for ``help`` and ``inspect``."""
-        import inspect  # which takes as long to import as much else together
+        import inspect  # slow to import
 
         init: Any = cls.__init__  # type: ignore[misc]
         if init is object.__init__:
@@ -130,7 +130,7 @@ class Maker(ABCMeta):
         return whole.replace(parameters=list(whole.parameters.values())[1:])
 
 
-class Fixed(metaclass=Maker):
+class Immutable(metaclass=ImmutableMeta):
     """An object that cannot be changed, since what was made of it would not see the change.
 
     Attributes cannot be assigned, except those that begin with ``_``. Its arrays are read-only, and copies of what it was given:
@@ -172,7 +172,7 @@ def changed(one: Object, **changes: Any) -> Object:
     """A copy of an object that cannot be changed, with other attributes."""
     kind: Any = type(one)
     other: Any
-    if issubclass(kind, Fixed):
+    if issubclass(kind, Immutable):
         other = object.__new__(kind)  # as ``copy.copy`` makes it, which takes ten times as long
         vars(other).update(vars(one) if getattr(kind, "__getstate__", None) is _STATE else one.__getstate__())
     else:

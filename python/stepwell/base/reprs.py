@@ -120,7 +120,7 @@ def share(some: int, shape: tuple[int, ...], size: int) -> str:
 
 
 def first_of(some: int, index: tuple[int, ...], size: int) -> str:
-    """What goes between what befell ``some`` members and when: the one of them, or the first; nothing if there is no other."""
+    """The phrase that names the member, or the first of several; empty for a single member."""
     if size == 1:
         return ""
     return f": {in_words(index)}" if some == 1 else f"; the first was {in_words(index)}"

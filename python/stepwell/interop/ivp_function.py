@@ -51,7 +51,7 @@ class RightHandSide:
             TraceError: if the function does what cannot be traced.
         """
         try:
-            return Definition(_named(self), 1, 1, ((0,), (self._size,)))().sized(None, np.empty(self._size))
+            return Definition(_named(self), 1, 1, ((0,), (self._size,)))().for_state_shapes(None, np.empty(self._size))
         except TraceError as error:
             raise TraceError(f"fun: {error}") from error
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..base import checks
-from ..base.immutable import Fixed, FixedDict
+from ..base.immutable import FixedDict, Immutable
 from ..errors import ArgumentError
 from ..model.equations.definition import Definition
 from ..model.equations.trace import Equations
@@ -41,8 +41,8 @@ RERUNS: dict[str, Callable[..., Any]] = {
 KIND = "is"
 
 
-def kinds(base: type[Any] = Fixed) -> dict[str, type[Any]]:
-    """Classes of stepwell below one, by name: below ``Fixed`` there are systems, controls, surfaces and inputs."""
+def kinds(base: type[Any] = Immutable) -> dict[str, type[Any]]:
+    """Classes of stepwell below one, by name: below ``Immutable`` there are systems, controls, surfaces and inputs."""
     found, todo = {}, [base]
     while todo:
         for each in todo.pop().__subclasses__():
@@ -104,7 +104,7 @@ class Writer:
             case dict():
                 kind = "parameters" if isinstance(value, FixedDict) else "dict"
                 return {KIND: kind, "parts": self._parts(value, name)}
-            case Fixed():
+            case Immutable():
                 return self._fixed(value, name)
             case _ if callable(value):
                 return {KIND: "of time", "name": name.rpartition(".")[2]}
@@ -113,7 +113,7 @@ class Writer:
     def _parts(self, values: dict[str, Any], name: str) -> dict[str, Any]:
         return {key: self._part(each, f"{name}.{key}") for key, each in values.items()}
 
-    def _fixed(self, value: Fixed, name: str) -> Any:
+    def _fixed(self, value: Immutable, name: str) -> Any:
         state: Any = value.__getstate__()
         if type(value) not in kinds().values():
             raise ArgumentError(f"run: expected a system of stepwell, or of your own equations, got {type(value).__name__}")

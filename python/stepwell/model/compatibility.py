@@ -103,7 +103,7 @@ def fits_own_times(system: System, single: bool) -> None:
 
 def goes_back(system: System, control: Any) -> None:
     """Raise if a system has no past that steps back in time could find."""
-    if system.rubbing is not None:
+    if system.stick_friction is not None:
         raise UnsupportedError(
             f"dt: below zero time runs back, and friction that sticks forgets how fast it was: {system!r} at rest has many "
             f"pasts; use dt above zero"

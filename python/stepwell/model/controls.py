@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import checks
 from ..base.arrays import Array, Shape
-from ..base.immutable import Fixed, Value, changed
+from ..base.immutable import Immutable, ValueEquality, changed
 from ..errors import ArgumentError, ControlWarning, DTypeError
 from ..reference import control as reference
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FORMS: tuple[ControlForm, ...] = ("limited", "printed")
 
 
-class EnergyControl(Fixed, Value):
+class EnergyControl(Immutable, ValueEquality):
     """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity.
 
     It pushes in every stage of a method; by PEFRL, in whose stages v and y belong to different times, after every step. With a
@@ -106,7 +106,7 @@ class EnergyControl(Fixed, Value):
         return changed(self, gain=one(np.asarray(self.gain)), target=one(np.asarray(self.target)))
 
 
-class Control(Fixed, Value):
+class Control(Immutable, ValueEquality):
     """Keeps an invariant I of a system near a target, by a push −gain·(I − target)·∇I/|∇I|² on both rates in every stage.
 
     The error of the invariant then decays as exp(−gain·t) (Baumgarte 1972). ∇I is derived from the operations of the invariant.
@@ -169,7 +169,7 @@ class Control(Fixed, Value):
         return {"control.gain": self.gain, "control.target": np.asarray(self.target)}
 
 
-class ConstraintControl(Fixed, Value):
+class ConstraintControl(Immutable, ValueEquality):
     """Adds to the rates of a system what returns its own constraint; the system has the equations.
 
     Attributes:
@@ -245,7 +245,7 @@ class NormControl(ConstraintControl):
 WAYS = ("scaling", "nacozy")
 
 
-class Projection(Fixed, Value):
+class Projection(Immutable, ValueEquality):
     """Projects the state back to the target energy, or to that of another invariant, after every step.
 
     ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the smallest change of the state

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base import checks
 from ..base.arrays import Array, Shape
-from ..base.immutable import Fixed, Value, changed
+from ..base.immutable import Immutable, ValueEquality, changed
 from ..base.reprs import brief
 from ..errors import ArgumentError, ShapeError
 from ..reference.signal import HOLD_SLACK, Constant, Curve, Held, Sine, Stepped
@@ -22,7 +22,7 @@ LAST_ANGLE = 2.0**50
 LAST_SINGLE_ANGLE = 2.0**21
 
 
-class Sinusoid(Fixed, Value):
+class Sinusoid(Immutable, ValueEquality):
     """amplitude · sin(omega·t + phase).
 
     Args:
@@ -67,7 +67,7 @@ class Sinusoid(Fixed, Value):
 INTERPOLATIONS: tuple[Interpolation, ...] = ("hold", "linear", "cubic")
 
 
-class Sampled(Fixed, Value):
+class Sampled(Immutable, ValueEquality):
     """Samples at equal intervals, and what is between them.
 
     | ``interpolation`` | between two samples | use |

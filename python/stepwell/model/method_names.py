@@ -25,7 +25,7 @@ MIN_SIMILARITY = 0.5
 #: Of two names whose similarities differ by no more than this, both may have been meant.
 AS_NEAR = 0.2
 
-#: The name by which a method is chosen is suggested, and not another of its names that is nearer by no more than this.
+#: A method's own name is suggested unless another of its names is closer by more than this.
 OWN_NAME_FIRST = 0.1
 
 #: Of a longer text only so many characters are compared.

@@ -10,7 +10,7 @@ from typing import Any, Protocol, cast
 from .. import _core
 from ..base import checks
 from ..base.arrays import Array, Blocks, Scaled
-from ..base.immutable import Fixed
+from ..base.immutable import Immutable
 from ..base.reprs import facts
 from ..errors import ArgumentError
 
@@ -28,7 +28,7 @@ class Steps(Protocol):
         """The velocity from the carry."""
 
 
-class Method(Fixed):
+class Method(Immutable):
     """A method with its metadata, read from its record in the core.
 
     Example:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import checks
 from ..base.arrays import Array, Shape
-from ..base.immutable import Fixed, Value, changed
+from ..base.immutable import Immutable, ValueEquality, changed
 from ..base.reprs import brief
 from ..errors import ArgumentError, DTypeError, ShapeError
 
@@ -23,7 +23,7 @@ VECTORS = ("normal", "centre")
 WAYS: tuple[ContactWay, ...] = ("safe", "restitution", "flip", "spring")
 
 
-class Surface(Fixed, Value, ABC):
+class Surface(Immutable, ValueEquality, ABC):
     """A plane or a sphere that points meet; see ``Floor`` and ``Sphere``."""
 
     #: What kind of surface it is, and the names of its arguments besides those that all have.

@@ -48,7 +48,7 @@ def where(truth: Any, yes: Any, no: Any) -> Any:
     return _asked("choose", truth, yes, no) if _objects(truth) else np.where(truth, yes, no)
 
 
-def held(x: Any, least: float, most: float) -> Any:
+def clamp(x: Any, least: float, most: float) -> Any:
     """X held between two constants; a NaN stays one."""
     x = where(less(x, least), least, x)
     return where(less(most, x), most, x)

@@ -88,7 +88,7 @@ class Controlled(Kept):
         else:
             twice = 2.0 * self.gain
             square = 1.0 - (twice * off) / (1.0 + twice * kinetic)
-            g = np.asarray(1.0 - np.sqrt(bits.held(square, MIN_SQUARE, MAX_SQUARE)))
+            g = np.asarray(1.0 - np.sqrt(bits.clamp(square, MIN_SQUARE, MAX_SQUARE)))
         self.work = self.work - (g * (2.0 - g)) * kinetic
         return g
 
@@ -108,7 +108,7 @@ class Projected(Kept):
         dv, kinetic, energy = self.s.energies(v, y)
         off = energy - self.target
         if self.way == "scaling":
-            factor = np.sqrt(bits.held(1.0 - off / kinetic, MIN_SQUARE, MAX_SQUARE))
+            factor = np.sqrt(bits.clamp(1.0 - off / kinetic, MIN_SQUARE, MAX_SQUARE))
             factor = bits.where(bits.at_most(kinetic, 0.0), 1.0, factor)
             self.work = self.work + (factor * factor - 1.0) * kinetic
             return v * factor, y

@@ -86,12 +86,12 @@ class Tracer:
         surfaces = {name: self.symbols(value, batch) for name, value in self.system.given_contacts(batch).items()}
         s, control = contact.around(self.system.reference(h, **given), h, surfaces), self._control()
         s = s if control is None else control.around(s, h)
-        rubbing, force = self.system.rubbing, self.force
-        if rubbing is not None:
-            rubbing = self.symbols(rubbing, rubbing.shape)
+        stick_friction, force = self.system.stick_friction, self.force
+        if stick_friction is not None:
+            stick_friction = self.symbols(stick_friction, stick_friction.shape)
         if force is not None:
             force = self.symbols(force, force.shape[len(self.system.v_shape) :])
-        return surrounded(s, h, force, rubbing)
+        return surrounded(s, h, force, stick_friction)
 
     def _control(self) -> Any:
         """The control with symbols for its numbers, which come behind those of the system; None without one."""

@@ -67,7 +67,7 @@ def adaptive_run(
     options: AdaptiveOptions,
     record: Any,
     t0: Any,
-    went: tuple[Any, Any, Any] | None,
+    continued_from: tuple[Any, Any, Any] | None,
     control: Any,
     fused: bool,
     threads: int | None,
@@ -77,9 +77,9 @@ def adaptive_run(
 ) -> tuple[Run, tuple[Array, Array] | None, Callable[[Whole], tuple[Array, Array, Array]]]:
     """The run with a tolerance, where it began, and a function that finds between which y some of its members have been.
 
-    It did not begin anywhere if it went on from ``went``: a carry, its method and what it is for.
+    It has none if it continues ``continued_from``: a carry, its method and what it is for.
     """
-    control = _steppable(system, how, a_control(control), options, went)
+    control = _steppable(system, how, a_control(control), options, continued_from)
     t0 = checks.numbers("t0", t0, unit="units of time")
     times = checks.numbers("at", options.at, unit="units of time")
     if times.ndim == 0 or times.size == 0:
@@ -102,8 +102,8 @@ def adaptive_run(
     numbers = prod(system.v_shape) + prod(system.y_shape)
     groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))
     carry = None
-    if went is not None:
-        carry = _paces_of(how, went, groups, numbers)
+    if continued_from is not None:
+        carry = _paces_of(how, continued_from, groups, numbers)
         acceptance = acceptance._replace(own=len(carry) == engine.PACE_NUMBERS + 3 * groups + numbers)
     first = most_step = None
     if carry is not None:
@@ -170,11 +170,11 @@ def adaptive_run(
         )  # fmt: skip
         at = np.ascontiguousarray(sign * times)
         pacing = engine.Pacing(at, budget, carry is None, None if jumps is None else np.sort(sign * jumps, axis=0))
-        if carry is None or went is None:
+        if carry is None or continued_from is None:
             assert tolerances is not None
             paces = engine.paces(plan, first, tolerances, most_step, pacing)
         else:
-            paces, v, y, begins = continuation.taken_up(plan, pacing, carry, str(went[2]), v, y)
+            paces, v, y, begins = continuation.taken_up(plan, pacing, carry, str(continued_from[2]), v, y)
             pacing = pacing._replace(begins=begins)
             if most_step is not None:
                 paces[engine.MOST_STEP] = most_step
@@ -200,7 +200,7 @@ def adaptive_run(
         steps=0,
         start=None,
         paces=Paces(sign * out.paces[engine.TIME], sign * out.paces[engine.STEP], accepted, rejected, evaluations),
-        stand=AdaptiveState(
+        controller_state=AdaptiveState(
             out.last_v,
             out.last_y,
             _aimed(out.paces, at[-1]),
@@ -231,12 +231,12 @@ def _visited(
     return extremes(plan, pacing, paces, v, y, index)
 
 
-def _steppable(system: System, how: Method, control: Any, options: AdaptiveOptions, went: Any) -> Any:
+def _steppable(system: System, how: Method, control: Any, options: AdaptiveOptions, continued_from: Any) -> Any:
     """The control, if the method can step the system with a tolerance; what has to be given is there."""
     if how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
-    if system.rubbing is not None:
+    if system.stick_friction is not None:
         raise UnsupportedError(
             f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
             f"estimated; use dt= and steps="
@@ -250,7 +250,7 @@ def _steppable(system: System, how: Method, control: Any, options: AdaptiveOptio
                 f"positive: {how.name} rejects no step for the sign of a component; use a method that does, such as dop853"
             )
     not_of_a_step(system.keeper if control is None else control)
-    if options.tolerance is not None and went is not None:
+    if options.tolerance is not None and continued_from is not None:
         raise ArgumentError("tolerance: given twice, for carry has that of the run that goes on")
     return control
 
@@ -337,9 +337,9 @@ def _relative(carry: Any, acceptance: Acceptance, groups: int) -> Array:
     return np.asarray(carry[engine.PACE_NUMBERS + groups : engine.PACE_NUMBERS + 2 * groups])
 
 
-def _paces_of(method: Method, went: tuple[Any, Any, Any], groups: int, of_state: int) -> Array:
+def _paces_of(method: Method, continued_from: tuple[Any, Any, Any], groups: int, of_state: int) -> Array:
     """The numbers that say where the members stand of a run with a tolerance that goes on, and their states there."""
-    carry, carried_by, carried_for = went
+    carry, carried_by, carried_for = continued_from
     for name, each, what in (("carried_by", carried_by, "the method"), ("carried_for", carried_for, "the digest")):
         if each is None:
             raise ArgumentError(f"{name}: expected {what} by which the run goes on, as run.resume has it")

@@ -74,8 +74,8 @@ def with_tolerance(run: Run) -> dict[str, Any]:
 
     Members that stopped have no state at the last time but where they stopped.
     """
-    assert run.stand is not None
-    at, pace, batch = run.stand, run.stand.pace, run.status.shape
+    assert run.controller_state is not None
+    at, pace, batch = run.controller_state, run.controller_state.pace, run.status.shape
     there = is_there(pace)
     v, y = (np.where(there, saved[-1], last) for saved, last in ((run.v, at.v), (run.y, at.y)))
     carry = np.concatenate([pace, *(block.reshape(-1, *batch) for block in (at.v, at.y))])

@@ -143,9 +143,9 @@ def is_heard(kind: type[Warning]) -> bool:
 
 
 def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
-    """Members of whom two bodies would meet within a step.
+    """Indices of members in which two bodies would pass each other within one step.
 
-    If they went on alone, from the start or from a saved state; or that did so, alone, before the end.
+    They would if the two went on alone from the start or from a saved state, or did so before the end.
     """
     n, members, made = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
     # Where time runs back, bodies are looked at that go the other way.

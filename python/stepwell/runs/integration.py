@@ -182,7 +182,7 @@ def integrate(
         array([ 1.      ,  0.283658, -0.839075])
     """
     how = find_method(method)
-    system = a_system(system).sized(v, y)
+    system = a_system(system).for_state_shapes(v, y)
     v = velocities(system, v)
     fits_together(system, how)
     fused = checks.flag("fused", fused)

@@ -90,7 +90,7 @@ def told(run: Run, start: State | None, visited: Visited | None = None) -> str |
 def _is_constant(run: Run, name: str) -> bool:
     """Whether an invariant is one: along the rates at the end, what its change by v and that by y add up to is nothing."""
     system, v, y = run.system, run.v[-1], run.y[-1]
-    alone = system.alone(1.0, run.status.shape)
+    alone = system.reference_at_step(1.0, run.status.shape)
     t = np.broadcast_to(run.t[-1], run.status.shape)
     rates = np.broadcast_to(alone.dv(t, v, y), v.shape), np.broadcast_to(alone.dy(t, v, y), y.shape)
     axes = [tuple(range(len(shape))) for shape in (system.v_shape, system.y_shape)]
@@ -213,9 +213,9 @@ def _sizes(run: Run, numbers: Array) -> State:
 
 def _longest(run: Run) -> Array:
     """The largest that each group has been at the end of a step."""
-    assert run.stand is not None
+    assert run.controller_state is not None
     groups = Acceptance(run.system.groups).counts(prod(run.system.v_shape), prod(run.system.y_shape))
-    return run.stand.pace[PACE_NUMBERS : PACE_NUMBERS + sum(groups)]
+    return run.controller_state.pace[PACE_NUMBERS : PACE_NUMBERS + sum(groups)]
 
 
 def _exchanged(run: Run, name: str, start: State, first: Array) -> tuple[Array, Array]:
@@ -291,8 +291,8 @@ def _of_terms(system: System, name: str, state: State, slopes: State) -> tuple[A
 
 def _of_a_step(run: Run, slopes: State) -> Array:
     """By how much an invariant may change in a step whose error is just tolerated, or by rounding."""
-    assert run.stand is not None
-    pace, longest, system = run.stand.pace, _longest(run), run.system
+    assert run.controller_state is not None
+    pace, longest, system = run.controller_state.pace, _longest(run), run.system
     groups = len(longest)
     relative, absolute = pace[RELATIVE], pace[ABSOLUTE]
     if len(pace) >= PACE_NUMBERS + 3 * groups:  # each group has tolerances of its own

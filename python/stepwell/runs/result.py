@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import checks, registry
 from ..base.arrays import Array, Whole
-from ..base.immutable import Value, by_value
+from ..base.immutable import ValueEquality, by_value
 from ..base.reprs import MAX_LINE, counted, facts, share, shortened
 from ..errors import UnsupportedError
 from ..model.methods import Method
@@ -93,7 +93,7 @@ class AdaptiveState(NamedTuple):
     options: dict[str, Any] = {}  # noqa: RUF012  # it is not written to
 
 
-class Run(Value):
+class Run(ValueEquality):
     """A run, with its saved states along the first axis.
 
     Attributes:
@@ -159,7 +159,7 @@ class Run(Value):
         recorded: dict[str, Array] | None = None,
         work: Array | None = None,
         paces: Paces | None = None,
-        stand: AdaptiveState | None = None,
+        controller_state: AdaptiveState | None = None,
         fused: bool = False,
         force: Array | None = None,
     ) -> None:
@@ -186,7 +186,7 @@ class Run(Value):
         self.work = work
         self.paces = paces
         #: The state of a run with a tolerance at ``paces.t``; None for other runs.
-        self.stand = stand
+        self.controller_state = controller_state
         self.fused = fused
         self.force = force
         self.events: dict[str, Occurrences] = {}
@@ -298,7 +298,7 @@ class Run(Value):
             told["dtype"] = self.dtype
         if self.changed_by:
             told["changed_by"] = self.changed_by
-        if self.stand is not None:
+        if self.controller_state is not None:
             return continuation.with_tolerance(self) | told
         state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
         state |= {"dt_before": self.dt, **told}

@@ -67,8 +67,11 @@ def _why(run: Run, index: Shape) -> str:
     if wrong := _of_rates_there(run, index):
         return f"{WHY_STOPPED[status]}: {wrong}"
     if status == Status.NOT_FINITE:
-        assert run.stand is not None
-        longest = max(float(np.abs(checks.member(block, index)).max(initial=0.0)) for block in (run.stand.v, run.stand.y))
+        assert run.controller_state is not None
+        longest = max(
+            float(np.abs(checks.member(block, index)).max(initial=0.0))
+            for block in (run.controller_state.v, run.controller_state.y)
+        )
         return f"{WHY_STOPPED[status]}: the state reached {longest:.3g}"
     if left := _left_for_below_zero(run, index):
         return f"{left} becomes negative in every step, however short, which positive= does not allow"
@@ -93,8 +96,8 @@ def start_of(run: Run, index: Shape) -> float:
 def _of_rates_beyond(run: Run, index: Shape) -> str:
     """Which rate is not finite some roundings of the time behind where a member stopped; empty if all are."""
     assert run.paces is not None
-    assert run.stand is not None
-    t, (v, y) = run.paces.t, (run.stand.v, run.stand.y)
+    assert run.controller_state is not None
+    t, (v, y) = run.paces.t, (run.controller_state.v, run.controller_state.y)
     ahead = BEYOND * np.where(run.paces.h < 0.0, -1.0, 1.0) * np.spacing(np.abs(t))
     dv, dy = rates_of(run.system, run.status.shape, t, (v, y))
     return _not_finite(rates_of(run.system, run.status.shape, t + ahead, (v + ahead * dv, y + ahead * dy)), index)
@@ -103,8 +106,8 @@ def _of_rates_beyond(run: Run, index: Shape) -> str:
 def _rates_there(run: Run) -> State:
     """v̇ and ẏ where members stopped."""
     assert run.paces is not None
-    assert run.stand is not None
-    return rates_of(run.system, run.status.shape, run.paces.t, (run.stand.v, run.stand.y))
+    assert run.controller_state is not None
+    return rates_of(run.system, run.status.shape, run.paces.t, (run.controller_state.v, run.controller_state.y))
 
 
 def _of_rates_there(run: Run, index: Shape) -> str:
@@ -129,12 +132,12 @@ def _left_for_below_zero(run: Run, index: Shape) -> str:
     """
     from ..reference.adaptive import OUTSIDE
 
-    assert run.stand is not None
-    if run.stand.pace[engine.ERROR][index] != OUTSIDE:
+    assert run.controller_state is not None
+    if run.controller_state.pace[engine.ERROR][index] != OUTSIDE:
         return ""
-    blocks, rates = (run.stand.v, run.stand.y), _rates_there(run)
+    blocks, rates = (run.controller_state.v, run.controller_state.y), _rates_there(run)
     state, rate = (np.concatenate([checks.member(block, index).reshape(-1) for block in each]) for each in (blocks, rates))
-    kept = np.array(places_of(run.system, run.stand.options["positive"]))
+    kept = np.array(places_of(run.system, run.controller_state.options["positive"]))
     with np.errstate(all="ignore"):
         left = np.where(rate[kept] < 0.0, state[kept] / -rate[kept], np.inf)
     return name_of(run.system, int(kept[left.argmin()]))
@@ -171,6 +174,6 @@ def rates_of(system: System, batch: Shape, t: Any, state: State) -> State:
     """v̇ and ẏ of states of all members, each at its own time."""
     v, y = state
     with np.errstate(all="ignore"):
-        alone = system.alone(1.0, batch)
+        alone = system.reference_at_step(1.0, batch)
         dv, dy = alone.dv(t, v, y), alone.dy(t, v, y)
     return np.broadcast_to(dv, v.shape), np.broadcast_to(dy, y.shape)

@@ -121,7 +121,7 @@ class World:
     ) -> None:
         how = find_method(method)
         changes_on(events, changed_by)
-        system = copy.deepcopy(a_system(system).sized(v, y))
+        system = copy.deepcopy(a_system(system).for_state_shapes(v, y))
         fits_together(system, how)
         dt = checks.step(dt)
         single = checks.is_single(dtype)

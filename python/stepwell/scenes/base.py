@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base import checks, registry
 from ..base.arrays import Array, Shape
-from ..base.immutable import Value, frozen
+from ..base.immutable import ValueEquality, frozen
 from ..base.progress import in_notebook
 from ..base.reprs import facts
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
@@ -34,7 +34,7 @@ TIME_ROUNDING = 2.0**-51
 
 
 @dataclass(frozen=True, eq=False)
-class Scene(Value):
+class Scene(ValueEquality):
     """A system with an initial state, a step and a time span over which methods are judged.
 
     ``Scene(system, v=0.0, y=1.0, horizon=30.0)`` suffices; all other arguments have defaults.
@@ -95,7 +95,7 @@ class Scene(Value):
         if self.y is None:
             raise ArgumentError("y: expected the coordinates at t = 0, got None")
         y = checks.numbers("y", self.y)
-        system = a_system(self.system).sized(None if self.v is None else checks.numbers("v", self.v), y)
+        system = a_system(self.system).for_state_shapes(None if self.v is None else checks.numbers("v", self.v), y)
         given = [checks.numbers("v", velocities(system, self.v)), y]
         if system.batch:
             raise ArgumentError(f"system: expected a system of one member, got parameters of shape {system.batch}")
@@ -244,7 +244,10 @@ class Scene(Value):
 
     def owns(self, run: Run) -> bool:
         """Whether a run is of this scene's system, controlled or not, and of one member; its start does not matter."""
-        return run.system.uncontrolled.sized(run.v[0], run.y[0]) == self.system.sized(self.v, self.y) and run.status.ndim == 0
+        return (
+            run.system.uncontrolled.for_state_shapes(run.v[0], run.y[0]) == self.system.for_state_shapes(self.v, self.y)
+            and run.status.ndim == 0
+        )
 
     def _check(self, run: Run) -> None:
         """Raise if a run is of another system."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.immutable import Value
+from ..base.immutable import ValueEquality
 from ..model import quaternion
 from .elliptic import elliptic, quarter
 
@@ -19,7 +19,7 @@ NEGLIGIBLE = 1e-18
 SAMPLES, MOST_SAMPLES = 128, 1 << 16
 
 
-class FreeTop(Value):
+class FreeTop(ValueEquality):
     """Both blocks of a free body as functions of time, from its start at t = 0, but for rounding.
 
     ω is by Jacobi's functions (Landau and Lifshitz, Mechanics, § 37). The angular momentum stands still in space, and its

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..base.arrays import Array, Shape
-from ..base.immutable import Value
+from ..base.immutable import ValueEquality
 
 Exact = Callable[[Array], tuple[Array, Array]]
 
@@ -55,7 +55,7 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
     return Table(starts, lengths, tables, [block.shape[2:] for block in (v, y)])
 
 
-class Table(Value):
+class Table(ValueEquality):
     """A motion from a table: a polynomial over each interval.
 
     Args:

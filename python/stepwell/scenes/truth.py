@@ -137,7 +137,7 @@ def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
     """
     if scene.exact is not None:
         return scene
-    if scene.system.contacts or scene.system.rubbing is not None:
+    if scene.system.contacts or scene.system.stick_friction is not None:
         what = "surfaces" if scene.system.contacts else "friction that sticks"
         raise ArgumentError(
             f"exact: needed by {scene.name}, whose system has {what}, got None: the reference solution of other scenes is a run "

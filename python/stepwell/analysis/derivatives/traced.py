@@ -105,7 +105,7 @@ def _roots(tracer: Tracer, what: str, method: Method | None) -> list[Symbol]:
     """The symbols of the rates at step 1, of a step's next slots, or of what finishes a slot."""
     found: list[Symbol]
     if method is None:
-        if tracer.system.rubbing is not None:
+        if tracer.system.stick_friction is not None:
             raise UnsupportedError(
                 f"rates: {tracer.system!r} has friction that sticks; what it does depends on the step, so there are no rates "
                 f"without one"

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Shape
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.reprs import counted
 from ...model.systems import System
 from ...model.systems.base import a_system
@@ -22,7 +22,7 @@ from ..stability.eigen import Complex
 MAX_TRACED_NUMBERS = 64
 
 
-class Jacobian(Value):
+class Jacobian(ValueEquality):
     """The derivative of the rates (v̇, ẏ) with respect to the state (v, y), for n numbers of a state and a batch of members.
 
     Attributes:
@@ -104,7 +104,7 @@ def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobi
         array([[ 0., -4.],
                [ 1.,  0.]])
     """
-    system = a_system(system).sized(v, y)
+    system = a_system(system).for_state_shapes(v, y)
     v = checks.block("v", velocities(system, v), system.v_shape, system.axes)
     y = checks.block("y", y, system.y_shape, system.axes)
     t = checks.number("t", t, unit="units of time")

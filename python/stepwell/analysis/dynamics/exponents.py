@@ -16,7 +16,7 @@ import numpy as np
 from ... import _core
 from ...base import checks
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.interrupts import POLL, available
 from ...base.reprs import counted, share
 from ...errors import ArgumentError, DivergenceWarning, ShapeError, ToleranceWarning, UnsupportedError
@@ -51,7 +51,7 @@ OPERATIONS_OF_A_THREAD, OPERATIONS_AT_ONCE = 2_000_000, 1 << 26
 MAX_TOGETHER = 20_000
 
 
-class Lyapunov(Value):
+class Lyapunov(ValueEquality):
     """Lyapunov exponents of a batch of motions.
 
     Attributes:
@@ -321,7 +321,7 @@ def adaptive_averages(
 
 def _start(system: System, method: Method, v: Any, y: Any) -> tuple[System, Array, Array]:
     """The system for a state, and its blocks."""
-    system = a_system(system).sized(v, y)
+    system = a_system(system).for_state_shapes(v, y)
     fits_together(system, method)
     v = checks.block("v", velocities(system, v), system.v_shape, system.axes)
     return system, v, checks.block("y", y, system.y_shape, system.axes)

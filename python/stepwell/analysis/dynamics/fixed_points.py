@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.reprs import MAX_LINE, brief, shortened, table
 from ...errors import ArgumentError, ShapeError
 from ...model.compatibility import fits_together
@@ -61,7 +61,7 @@ ZERO_RATE, LEFT = 1e-9, 2.0
 UNDECIDED = "undecided to first order"
 
 
-class Equilibrium(Value):
+class Equilibrium(ValueEquality):
     """A state at which both rates are zero.
 
     Attributes:
@@ -107,7 +107,7 @@ class Equilibrium(Value):
         return f"<equilibrium at v = {brief(self.v)}, y = {brief(self.y)}: {self.kind}{step}>"
 
 
-class Equilibria(Value):
+class Equilibria(ValueEquality):
     """Equilibria that were found, in the order of the starts; a sequence of ``Equilibrium``.
 
     Attributes:
@@ -174,7 +174,7 @@ def equilibria(
         >>> [each.kind for each in sw.equilibria(sw.Pendulum(), near=(0.0, [0.3, 3.0]))]
         ['centre', 'saddle']
     """
-    system = a_system(system).sized(*(near if isinstance(near, (tuple, list)) else ()))
+    system = a_system(system).for_state_shapes(*(near if isinstance(near, (tuple, list)) else ()))
     if system.batch:
         raise ShapeError(f"system: expected one member to find the equilibria of, got a batch of shape {system.batch}")
     v, y = state("near", system, near)

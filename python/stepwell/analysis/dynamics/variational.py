@@ -55,7 +55,7 @@ class Variational(System):
     second_order = False
 
     def __init__(self, system: System, disturbances: int) -> None:
-        if system.keeper is not None or system.contacts or system.rubbing is not None:
+        if system.keeper is not None or system.contacts or system.stick_friction is not None:
             raise UnsupportedError(
                 f"tolerance: Lyapunov exponents have none where there is a control, a surface or friction, got {system!r}; give "
                 f"dt= and steps="
@@ -75,7 +75,7 @@ class Variational(System):
         functions = derivatives_of_functions(traced.tape, traced.marks)
         self._core = traced.tape.equations(self._rates[:n_v], self._rates[n_v:], [], None, functions)
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """The system, and how many disturbances."""
         return [repr(self.of), str(self.disturbances)]
 
@@ -88,7 +88,7 @@ class Variational(System):
         given = {name: value for name, value in self.given(batch).items() if name != RATES and not callable(value)}
         return [(RATES, self._core), *flat(given, batch)]
 
-    def alone(self, h: float, batch: Shape) -> Any:
+    def reference_at_step(self, h: float, batch: Shape) -> Any:
         """The rates by NumPy."""
         tracer = Tracer(self.of, _core.Tape())
         for value in self.given(batch).values():

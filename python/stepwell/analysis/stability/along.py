@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...errors import ArgumentError, DTypeError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
@@ -39,7 +39,7 @@ STRIDE = 2
 HALVINGS = 48
 
 
-class StabilityAlong(Value):
+class StabilityAlong(ValueEquality):
     """Stability limits along a run.
 
     Attributes:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base import checks, registry
 from ...base.arrays import Array, Shape
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
 from ...base.reprs import facts
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
@@ -46,7 +46,7 @@ KINDS = (
 )
 
 
-class Analysis(Value):
+class Analysis(ValueEquality):
     """One step as a linear map. ``members`` is the shape to which dt, the parameters and the states broadcast.
 
     Attributes:
@@ -269,12 +269,12 @@ def analyse(
     """
     how = find_method(method)
     at = given_state(at, v, y)
-    system = a_system(system).sized(*(at if isinstance(at, (tuple, list)) else ()))
+    system = a_system(system).for_state_shapes(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
     if isinstance(at, Run):
         if type(at.system) is not type(system):
             raise ShapeError(f"at: expected a run of {system!r}, got one of {at.system!r}")
-        system = system.sized(at.v[0], at.y[0])
+        system = system.for_state_shapes(at.v[0], at.y[0])
         if dt is None and at.paces is not None:
             raise ArgumentError("dt: expected the step, in units of time, since the run has chosen its own, got None")
         dt = at.dt if dt is None else dt

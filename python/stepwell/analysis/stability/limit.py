@@ -87,7 +87,7 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     """
     how = find_method(method)
     at = given_state(at, v, y)
-    system = a_system(system).sized(*(at if isinstance(at, (tuple, list)) else ()))
+    system = a_system(system).for_state_shapes(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
     t = checks.number("t", t)
     if at is None and not system.linear:
@@ -166,7 +166,7 @@ def _linear_part(system: System, method: Method, v: Array, y: Array, t: float, m
     There is one where the derivative of the rates is the same in all stages of a step: of equations that are linear but for what
     drives them, and where nothing moves. Its eigenvalues are those of a step of a matrix, which are found however they meet.
     """
-    if not isinstance(system, OwnSystem) or system.control is not None or system.rubbing is not None or system.contacts:
+    if not isinstance(system, OwnSystem) or system.control is not None or system.stick_friction is not None or system.contacts:
         return None
     of = traced.reading(system)
     if not of.linear and of.time:

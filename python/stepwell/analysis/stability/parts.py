@@ -56,10 +56,10 @@ class Rates(NamedTuple):
 
 
 def rates(matrix: Array) -> Rates:
-    """The eigenvalues of a matrix of rates, to double precision if need be, without what is rounding of its elements only.
+    """The eigenvalues of a matrix of rates, refined to double precision where needed.
 
-    What comes from data is rounded: of 2/3 the last digit. What that may have made of a rate zero or of an imaginary one is
-    taken away again, if it is below a millionth.
+    Elements that come from data are rounded: of 2/3 the last digit. A real or imaginary part below a millionth that this rounding
+    explains is set to zero.
     """
     n = len(matrix)
     if n == 1:

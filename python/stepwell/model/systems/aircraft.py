@@ -165,7 +165,7 @@ class Aircraft(OwnSystem):
             return np.empty((0, *command.batch))
         return np.stack([np.broadcast_to(signal.at(each), command.batch) for each in times])
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr: those that are not the document's."""
         usual = {"inertia": INERTIA, "damping": DAMPING, "gains": GAINS, "roll": np.zeros(()), "pitch": np.zeros(())}
         said = [f"form={self.form!r}"]
@@ -177,7 +177,7 @@ class Aircraft(OwnSystem):
             said.append(f"{name}={tuple(value.tolist()) if short else shape}")
         return said if self.controllers else [*said, "controllers=False"]
 
-    def sized(self, *states: Any) -> Aircraft:
+    def for_state_shapes(self, *states: Any) -> Aircraft:
         """Itself: its size is fixed."""
         return self
 

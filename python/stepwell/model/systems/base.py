@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Shape
-from ...base.immutable import Fixed, Value, changed
+from ...base.immutable import Immutable, ValueEquality, changed
 from ...base.reprs import MAX_LINE, facts, shortened
 from ...errors import ArgumentError, DTypeError, UnsupportedError
 from ...reference import contact
@@ -38,7 +38,7 @@ CONTIGUOUS = (8,)
 TINY = 1e-200
 
 
-class System(Fixed, Value, ABC):
+class System(Immutable, ValueEquality, ABC):
     """Two blocks, velocities ``v`` and coordinates ``y``, and a rate for each.
 
     Attributes:
@@ -55,7 +55,7 @@ class System(Fixed, Value, ABC):
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
         control: the control or projection of its energy, or None; ``integrate`` sets it.
-        rubbing: by how much friction that sticks reduces each velocity in a unit of time, or None; broadcasts over the batch.
+        stick_friction: how much friction that sticks slows each velocity in a unit of time, or None; broadcasts over the batch.
         constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
         kept: that control or projection, or None; ``integrate`` sets it.
         contacts: surfaces that its points meet, if the rows of its blocks are points.
@@ -78,7 +78,7 @@ class System(Fixed, Value, ABC):
     input_names: tuple[str, ...] = ()
     batch: Shape = ()
     control: EnergyControl | Projection | None = None
-    rubbing: Array | None = None
+    stick_friction: Array | None = None
     constraint: ClassVar[str | None] = None
     kept: ConstraintControl | Projection | None = None
     contacts: tuple[Surface, ...] = ()
@@ -107,17 +107,18 @@ class System(Fixed, Value, ABC):
         return self if self._free is None else self._free
 
     @abstractmethod
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
 
     def __repr__(self) -> str:
-        said = self.said() + ([] if self.keeper is None else [repr(self.keeper)])
+        said = self.repr_arguments() + ([] if self.keeper is None else [repr(self.keeper)])
         return shortened(f"{type(self).__name__}({', '.join(said)})", 2 * MAX_LINE)
 
     def _repr_html_(self) -> str:
         """The same as a table, for notebooks, with what its states are."""
         arguments = [
-            (name, value) if equal else ("", name) for name, equal, value in (each.partition("=") for each in self.said())
+            (name, value) if equal else ("", name)
+            for name, equal, value in (each.partition("=") for each in self.repr_arguments())
         ]
         words = [value for name, value in arguments if not name]
         return facts(
@@ -147,7 +148,7 @@ class System(Fixed, Value, ABC):
         """The group of each number of v, then of y, whose errors count together; see ``reference/acceptance.py``."""
         return ()
 
-    def alone(self, h: float, batch: Shape) -> Any:
+    def reference_at_step(self, h: float, batch: Shape) -> Any:
         """The NumPy reference of this system, scaled to the step h, for states of that batch shape; control left out."""
         return self.reference(h, **self.given(batch))
 
@@ -156,9 +157,9 @@ class System(Fixed, Value, ABC):
 
         ``force`` is added to v̇.
         """
-        s = contact.around(self.alone(h, batch), h, self.given_contacts(batch))
+        s = contact.around(self.reference_at_step(h, batch), h, self.given_contacts(batch))
         s = s if self.control is None else self.control.around(s, h)
-        return s if force is None and self.rubbing is None else surrounded(s, h, force, self.rubbing)
+        return s if force is None and self.stick_friction is None else surrounded(s, h, force, self.stick_friction)
 
     def given_contacts(self, batch: Shape) -> dict[str, Any]:
         """The parameters of the surfaces that its points meet, by name."""
@@ -173,14 +174,14 @@ class System(Fixed, Value, ABC):
     def given_around(self) -> dict[str, Any]:
         """Parameters of what is around its equations, by name: control and friction."""
         given = {} if self.control is None else self.control.given()
-        return given if self.rubbing is None else given | {"friction.limit": self.rubbing}
+        return given if self.stick_friction is None else given | {"friction.limit": self.stick_friction}
 
     def all_given(self, batch: Shape) -> dict[str, Any]:
         """The parameters of this system, of its surfaces, its control and its friction, by name."""
         given = dict(self.given(batch))
         if self.contacts:
             given |= self.given_contacts(batch)
-        if self.control is not None or self.rubbing is not None:
+        if self.control is not None or self.stick_friction is not None:
             given |= self.given_around()
         return given
 
@@ -218,7 +219,7 @@ class System(Fixed, Value, ABC):
         """A quantity computed from the states of a run with that step, with the same bits as if it had been recorded."""
         if name not in self.quantities:
             return self.energy(v, y)
-        return np.asarray(self.alone(dt, y.shape[len(self.y_shape) :]).record(name, v, y))
+        return np.asarray(self.reference_at_step(dt, y.shape[len(self.y_shape) :]).record(name, v, y))
 
     def auxiliary(self, t: float, v: Array, y: Array) -> Array:
         """The auxiliary outputs z (§3) of states at time t, shape (outputs, *batch).
@@ -237,7 +238,7 @@ class System(Fixed, Value, ABC):
         """A message if the rates are meaningless at some of these coordinates, or None."""
         return None
 
-    def sized(self, *states: Any) -> System:
+    def for_state_shapes(self, *states: Any) -> System:
         """The same system for states of these shapes; this matters only for a system whose size is not fixed yet."""
         return self
 
@@ -251,7 +252,7 @@ class System(Fixed, Value, ABC):
             return self._kept_by(control)
         self._controllable(control)
         with np.errstate(all="ignore"):
-            _, kinetic, energy = self.alone(1.0, y.shape[len(self.y_shape) :]).energies(v, y)
+            _, kinetic, energy = self.reference_at_step(1.0, y.shape[len(self.y_shape) :]).energies(v, y)
         return self._held_by(control.aimed(kinetic, energy, dt))
 
     def under(self, control: Any, batch: Shape) -> Self:

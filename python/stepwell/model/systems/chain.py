@@ -46,7 +46,7 @@ class Chain(System):
         self.v_shape = self.y_shape = (self.n,)
         self.batch = checks.batch_shape({"stiffness": self.stiffness.shape[1:], "mass": self.mass.shape[1:]})
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         return [str(self.n)]
 

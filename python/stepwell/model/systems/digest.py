@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def digest(system: OwnSystem) -> str:
     """What the operations of an own system are known by: of its rates, its invariants, and the gradient of one that is kept."""
-    known: Any = system if system.equations is not None else system.sized()
+    known: Any = system if system.equations is not None else system.for_state_shapes()
     tape = _core.Tape()
     tracer = Tracer(changed(known, control=None), tape)
     v, y, _ = tracer.state()

@@ -101,7 +101,7 @@ class LinearSystem(System):
         )
         self.velocity_term = "velocities in the rows of v" if self.A[v][:, v].any() else None
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         m, r = (0 if self.B is None else self.B.shape[1]), (0 if self.C is None else len(self.C))
         v = self.v_shape[0]

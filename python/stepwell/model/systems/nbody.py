@@ -82,14 +82,14 @@ class NBody(System):
         shapes = {"masses": self.masses.shape[1:], "G": self.G.shape, "softening": self.softening.shape}
         self.batch = checks.batch_shape(shapes | surfaces.batches(self.contacts))
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         n = len(self.masses)
         masses = self.masses.tolist() if self.masses.ndim == 1 and n <= 5 else f"{n} bodies"
         softening = [f"softening={self.softening}"] * bool(self.softening.any())
         return [f"masses={masses}", f"force={self.force!r}", f"G={self.G}", *softening, *self.said_of_contacts()]
 
-    def sized(self, *states: Any) -> NBody:
+    def for_state_shapes(self, *states: Any) -> NBody:
         """The same bodies in as many dimensions as the states, v and y, have."""
         if self.dim is not None:
             return self
@@ -157,5 +157,5 @@ class NBody(System):
         """½·Σ m·v² and the potential of every pair; see the table above."""
         batch = np.broadcast_shapes(v.shape[2:], y.shape[2:])
         with np.errstate(all="ignore"):
-            energy: Array = self.alone(1.0, batch).energies(v, y)[2]
+            energy: Array = self.reference_at_step(1.0, batch).energies(v, y)[2]
         return energy

@@ -98,9 +98,9 @@ class Oscillator(System):
         self.batch = checks.batch_shape(shapes)
         if self.friction is not None:
             self.linear = self.complex_step = False
-            self.rubbing = self.friction if self.form == "physical" else np.asarray(self.friction / self.omega)
+            self.stick_friction = self.friction if self.form == "physical" else np.asarray(self.friction / self.omega)
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         terms = shown(omega=self.omega, damping=self.damping, x=self.x, a=self.a, friction=self.friction, drag=self.drag)
         return [*terms, f"form={self.form!r}"]

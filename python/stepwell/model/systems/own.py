@@ -92,12 +92,12 @@ class OwnSystem(System):
         """The name of the function."""
         return self.definition.name
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """The parameters."""
         return shown(**self.parameters_given)
 
     def __repr__(self) -> str:
-        said = self.said() + [repr(each) for each in (self.control, self.push) if each is not None]
+        said = self.repr_arguments() + [repr(each) for each in (self.control, self.push) if each is not None]
         return f"{self.definition.name}({', '.join(said)})"
 
     def _held(self) -> dict[str, Any]:
@@ -118,7 +118,7 @@ class OwnSystem(System):
 
     # ---- shapes
 
-    def sized(self, *states: Any) -> OwnSystem:
+    def for_state_shapes(self, *states: Any) -> OwnSystem:
         """The same system for the states v and y of these shapes; None is what was not given."""
         given = zip(("v", "y"), states, strict=False)
         shapes = {name: checks.shape_of(name, state) for name, state in given if state is not None}
@@ -274,7 +274,7 @@ class OwnSystem(System):
 
     def _known(self) -> OwnSystem:
         """The same system with known shapes of its blocks."""
-        return self if self.equations is not None else self.sized()
+        return self if self.equations is not None else self.for_state_shapes()
 
     @property
     def groups(self) -> tuple[int, ...]:
@@ -379,13 +379,13 @@ class OwnSystem(System):
                 f"energy: {self!r} has no invariant of that name; declare one: @{self.definition.name}.invariant above "
                 f"def energy({'v, y' if self.definition.has_v else 'y'}, *, …)"
             )
-        return np.asarray(self.alone(1.0, np.shape(y)[len(self.y_shape) :]).record("energy", v, y))
+        return np.asarray(self.reference_at_step(1.0, np.shape(y)[len(self.y_shape) :]).record("energy", v, y))
 
     def controlled(self, control: Any, v: Array, y: Array, dt: float) -> OwnSystem:
         """The same system with an invariant that is kept, at its value at the start if the control has no target."""
         name = self._invariant_of(control)
         with np.errstate(all="ignore"):
-            start = np.asarray(self.alone(1.0, np.shape(y)[len(self.y_shape) :]).record(name, v, y))
+            start = np.asarray(self.reference_at_step(1.0, np.shape(y)[len(self.y_shape) :]).record(name, v, y))
         return self._keeping(name, control.aimed(start, start, dt))
 
     def under(self, control: Any, batch: Shape) -> OwnSystem:

@@ -76,11 +76,11 @@ class Particles(System):
         )
         self.v_shape = self.y_shape = (self.points or 1, self.dim or 2)
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         return [*shown(masses=self.masses, gravity=self.gravity, drag=self.drag), *self.said_of_contacts()]
 
-    def sized(self, *states: Any) -> Particles:
+    def for_state_shapes(self, *states: Any) -> Particles:
         """The same for as many points in as many dimensions as the states, v and y, have."""
         points, dim = self.points, self.dim
         for name, state in zip(("v", "y"), states, strict=False):

@@ -49,7 +49,7 @@ class Pendulum(System):
             | ({} if self.a is None else {"a": self.a.batch})
         )
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         return shown(omega=self.omega, damping=self.damping, a=self.a)
 

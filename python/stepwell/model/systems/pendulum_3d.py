@@ -50,11 +50,11 @@ class Pendulum3D(RodSystem):
         shapes = {"length": self.length.shape, "gravity": self.gravity.shape}
         self.batch = checks.batch_shape(shapes | surfaces.batches(self.contacts))
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         return [*shown(length=self.length, gravity=self.gravity), *self.said_of_contacts()]
 
-    def sized(self, *states: Any) -> Pendulum3D:
+    def for_state_shapes(self, *states: Any) -> Pendulum3D:
         """The same pendulum.
 
         Raises:

@@ -51,7 +51,7 @@ class RestrictedThreeBody(System):
             raise ArgumentError(f"mu: expected shares of the mass above 0 and below 1, got {wrong.flat[0]:g}")
         self.batch = self.mu.shape
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         return shown(mu=self.mu)
 

@@ -92,7 +92,7 @@ class RigidBody(System):
             | ({} if self.weight is None else {"weight": self.weight.shape})
         )
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         inertia = self.inertia.tolist() if self.inertia.ndim == 1 else self.inertia
         centre = None if self.centre is None else self.centre.tolist() if self.centre.ndim == 1 else self.centre

@@ -54,7 +54,7 @@ class RodSystem(System):
         y = y[[0, -1]]
         batch = y.shape[1 + len(self.y_shape) :]
         with np.errstate(all="ignore"):
-            error = np.asarray([self.alone(1.0, batch).record("length_error", each, each) for each in y])
+            error = np.asarray([self.reference_at_step(1.0, batch).record("length_error", each, each) for each in y])
             wrong = error[np.isfinite(error) & (error > DOUBTFUL_LENGTH_ERROR)]
         if not wrong.size:
             return None
@@ -171,14 +171,14 @@ class Rods(RodSystem):
             groups[b] = a
         return False
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         n = len(self.masses)
         masses = self.masses.tolist() if self.masses.ndim == 1 and n <= 5 else f"{n} points"
         rods = list(self.rods) if len(self.rods) <= 5 else f"{len(self.rods)} rods"
         return [str(masses), str(rods), *shown(gravity=self.gravity), *self.said_of_contacts()]
 
-    def sized(self, *states: Any) -> Rods:
+    def for_state_shapes(self, *states: Any) -> Rods:
         """The same rods in as many dimensions as the states, v and y, have.
 
         Raises:
@@ -211,7 +211,7 @@ class Rods(RodSystem):
     def _check_start(self, y: Array) -> None:
         """Raise if the equations of the pulls cannot be solved at these coordinates."""
         y = checks.block("y", y, self.y_shape, self.axes, finite=False)
-        s = self.alone(1.0, y.shape[2:])
+        s = self.reference_at_step(1.0, y.shape[2:])
         with np.errstate(all="ignore"):
             d = s.spans(y)
             for rod, span in zip(self.rods, d, strict=True):

@@ -118,14 +118,14 @@ class Springs(System):
             raise ArgumentError(f"pairs: expected particles below {n}, of which there are so many, got {last} in spring {spring}")
         return n
 
-    def said(self) -> list[str]:
+    def repr_arguments(self) -> list[str]:
         """What its repr says of its arguments."""
         optional = {"damping": self.damping, "gravity": self.gravity, "drag": self.drag}
         shorter = {name: each[0] if each is not None and each.shape == (1,) else each for name, each in optional.items()}
         fixed = [f"fixed={len(self.fixed)} particles"] * bool(len(self.fixed))
         return [f"{len(self.pairs)} springs, {self.n} particles", *fixed, *shown(**shorter), *self.said_of_contacts()]
 
-    def sized(self, *states: Any) -> Springs:
+    def for_state_shapes(self, *states: Any) -> Springs:
         """The same net in as many dimensions as the states, v and y, have."""
         if self.dim is not None:
             return self
@@ -175,7 +175,7 @@ class Springs(System):
         """½·Σ m·v² − Σ m·g·y of the particles that are not fixed, and ½·Σ k·(ℓ − ℓ₀)² of the springs."""
         batch = np.broadcast_shapes(v.shape[2:], y.shape[2:])
         with np.errstate(all="ignore"):
-            return np.asarray(self.alone(1.0, batch).energies(v, y)[2])
+            return np.asarray(self.reference_at_step(1.0, batch).energies(v, y)[2])
 
     def safe_step(self, method: str | Method) -> Any:
         """A step below which a method is stable, known before anything is run, for any number of springs.

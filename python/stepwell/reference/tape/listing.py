@@ -103,7 +103,7 @@ class Listing:
         return made
 
     def _sum_of_bits(self, of: Sequence[int], operands: list[Any]) -> Symbol:
-        """The sum of bits, of which one operand is mostly a constant."""
+        """An integer addition; one operand is usually a constant."""
         for k in (0, 1):
             if self.operations[of[k]].name == "constant":
                 made: Symbol = operands[1 - k].add_bits(self.operations[of[k]].given)

@@ -174,7 +174,7 @@ def paces(
 
 
 def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
-    """Where members stand at the start, by the reference; of them it is known where they stand before."""
+    """The step-size controllers at the first step, computed by the reference from their state before it."""
     from ...reference import adaptive
 
     system, pace = of_unit_step(plan, plan.batch), pace_of(plan, paces)
@@ -195,7 +195,11 @@ def of_unit_step(plan: Plan, batch: Shape) -> Any:
     """The NumPy reference of the system, scaled to a step of 1, or of −1 where its time runs backward."""
     from ...reference import adaptive
 
-    return adaptive.Backward(plan.system.alone(-1.0, batch)) if plan.backward else plan.system.alone(1.0, batch)
+    return (
+        adaptive.Backward(plan.system.reference_at_step(-1.0, batch))
+        if plan.backward
+        else plan.system.reference_at_step(1.0, batch)
+    )
 
 
 def pace_of(plan: Plan, numbers: Array) -> Pace:
@@ -260,7 +264,7 @@ def attempt_by_numpy(plan: Plan, budget: int) -> Any:
 
 
 def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
-    """Go on from where members stand, of whom ``paces`` has the numbers of each or those of all."""
+    """Continue every member; ``paces`` has a column for each member, or one for all."""
     if plan.backend == "numpy":
         return _adapt_by_numpy(plan, pacing, paces, v, y)
     times, n_v, members, numbers = len(pacing.at), prod(plan.system.v_shape), plan.members, pace_numbers(plan)

@@ -29,7 +29,7 @@ class Watched(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
+    """What to run. ``choice`` is the number of the method's start; ``force`` is added to v̇; ``threads`` 0 chooses their number.
 
     ``t0`` is the time of step 0, or that of each member, shape (*batch), which the core takes as a parameter: see ``of_core``.
     ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32. Of adaptive steps,

@@ -1,4 +1,4 @@
-"""Events: where in its motion a quantity of a member changes its sign; whether the member goes on from there."""
+"""Events: locate sign changes of a quantity along a trajectory, and stop or change the member there if asked."""
 
 from .event import Event
 from .result import Occurrences

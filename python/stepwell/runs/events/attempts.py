@@ -53,7 +53,7 @@ def attempted(
 ) -> Attempts:
     """Make attempts one by one, of each member until it is at or past a time.
 
-    So the last step of a member is made, where a run would hold it, to save a state within.
+    The last step of a member is therefore taken, although a run would hold it to save states inside it.
 
     Args:
         plan: of these members, along one axis.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base import checks
-from ...base.immutable import Fixed, Value
+from ...base.immutable import Immutable, ValueEquality
 from ...errors import ArgumentError, DTypeError
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 MOST_KEPT = 1000
 
 
-class Event(Fixed, Value):
+class Event(Immutable, ValueEquality):
     """A quantity g(t, v, y) whose changes of sign along the motion are located.
 
     Args:

@@ -77,7 +77,7 @@ class Members:
         self._control = {
             name.removeprefix("control."): row(value, None) for name, value in numbers.items() if isinstance(value, np.ndarray)
         }
-        self._rubbing = None if system.rubbing is None else row(system.rubbing, None)
+        self._rubbing = None if system.stick_friction is None else row(system.stick_friction, None)
         self._force = None if plan.force is None else row(plan.force, len(system.v_shape))
 
     def plan(self, index: Any) -> engine.Plan:
@@ -102,7 +102,7 @@ class Members:
             given=lambda wanted: for_batch(given, wanted),
             given_contacts=lambda wanted: for_batch(contacts, wanted),
             control=control,
-            rubbing=None if self._rubbing is None else some(self._rubbing),
+            stick_friction=None if self._rubbing is None else some(self._rubbing),
         )
         t0: Any = self._plan.t0
         if np.ndim(t0):

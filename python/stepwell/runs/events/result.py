@@ -8,13 +8,13 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Whole
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.reprs import counted
 from ...errors import ArgumentError
 
 
 @dataclass(frozen=True, eq=False)
-class Occurrences(Value):
+class Occurrences(ValueEquality):
     """Where a quantity changed its sign: one entry for each occurrence that was kept, by member and then by time.
 
     Attributes:

@@ -77,7 +77,7 @@ class Quantity:
         self._slope = self._slope_of()
 
     def _operations_of(self) -> Operations:
-        """Its operations, of which the time is the first number of the state."""
+        """The operations of the event; number 0 of their state is the time."""
         tape = _core.Tape()
         numbers, state = map(tape.param, count()), map(tape.state, count())
         t = next(state)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.checks import number
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...errors import ArgumentError
 from ...model import quaternion
 from ...model.systems import RigidBody
@@ -17,7 +17,7 @@ from ..base import Scene
 from ..ranges import within
 
 
-class Wobble(Value):
+class Wobble(ValueEquality):
     """Both blocks of a free body of moments (1, 1, C) as functions of time: the sum of two steady turns.
 
     In the body ω turns about the third axis at (C − 1)·ω₃; in space that axis turns about the angular momentum at |L|.

@@ -84,7 +84,7 @@ def explain(
           v' = v − Φ·y
           y' = y + Φ·v'
     """
-    how, system = find_method(method), a_system(system).sized()
+    how, system = find_method(method), a_system(system).for_state_shapes()
     fits_together(system, how)
     fused, attempt = checks.flag("fused", fused), checks.flag("attempt", attempt)
     single = checks.is_single(dtype)
@@ -94,7 +94,7 @@ def explain(
     if attempt and how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"attempt: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
-    if attempt and system.rubbing is not None:
+    if attempt and system.stick_friction is not None:
         raise UnsupportedError(f"attempt: adaptive steps do not go with friction that sticks, which {system!r} has")
     if attempt:
         not_of_a_step(system.keeper if control is None else control)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ...base import checks, files
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.reprs import counted
 from ...model.methods import Method
 from ...model.systems import System
@@ -37,7 +37,7 @@ PARTS = {
 
 
 @dataclass(frozen=True)
-class MachineCode(Value):
+class MachineCode(ValueEquality):
     """The machine code of a step.
 
     Attributes:
@@ -62,7 +62,7 @@ class MachineCode(Value):
 
 
 @dataclass(frozen=True)
-class Packing(Value):
+class Packing(ValueEquality):
     """Whether equal operations of a single member are made by one vector, and why. Cycles are those of a model of the CPU.
 
     Attributes:
@@ -103,7 +103,7 @@ class Packing(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Explanation(Value):
+class Explanation(ValueEquality):
     """The operations of a step and its machine code on this machine. ``print`` it.
 
     Attributes:

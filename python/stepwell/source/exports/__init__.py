@@ -97,7 +97,11 @@ def export(
     """
     how = find_method(method)
     system = a_system(system)
-    system = system.sized() if v is None and y is None else system.sized(*(0.0 if each is None else each for each in (v, y)))
+    system = (
+        system.for_state_shapes()
+        if v is None and y is None
+        else system.for_state_shapes(*(0.0 if each is None else each for each in (v, y)))
+    )
     fits_together(system, how)
     kind = LANGUAGES[checks.known("language", language, tuple(LANGUAGES))]
     dt = checks.number("dt", dt, positive=True, unit="units of time")

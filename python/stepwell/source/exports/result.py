@@ -9,13 +9,13 @@ from typing import Any
 
 from ...base import checks, files
 from ...base.arrays import Shape
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...model.methods import Method
 from ...model.systems import System
 
 
 @dataclass(frozen=True, eq=False)
-class ExportedStep(Value):
+class ExportedStep(ValueEquality):
     """A step as source code of another language. ``print`` it, or ``save`` it.
 
     Attributes:

@@ -275,7 +275,7 @@ def by_cost_and_error(candidates: Sequence[Kind], costs: Sequence[float], errors
 
 
 def _judged(candidate: Candidate, trial: Trial) -> float:
-    """The error by which what costs the same is ordered; that rounding made an error smaller is luck, and counts for nothing."""
+    """The error that orders equal costs: at least that of the float64 run, for a lucky rounding proves nothing."""
     return max(trial.error, candidate.in_float64(trial)) if isinstance(candidate, Single) else trial.error
 
 
@@ -367,9 +367,9 @@ def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
     if search.allowed(candidate) < trial.error < ASYMPTOTIC_ERROR:
         trial = candidate.measured(missed.k)
     detail = f"dt = {trial.dt:.3g}" if candidate.by == "step" else f"{trial.steps} steps"
-    tried = f"with {candidate.said(missed.k)} ({detail})"
+    tried = f"with {candidate.described(missed.k)} ({detail})"
     too_expensive = f"costs over {MAX_COST_RATIO:g} times the least"
-    needs = f"; by its order it needs about {candidate.said(missed.expected)}" if missed.expected else ""
+    needs = f"; by its order it needs about {candidate.described(missed.expected)}" if missed.expected else ""
     unstable = "still unstable" if candidate.by == "step" else "stops early"
     if trial.error <= search.allowed(candidate):
         reason = f"good enough {tried}, which {too_expensive}"

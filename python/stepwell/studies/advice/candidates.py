@@ -77,7 +77,7 @@ class Candidate(Protocol):
     def possible(self, k: int) -> bool:
         """Whether there is such a run."""
 
-    def said(self, k: int) -> str:
+    def described(self, k: int) -> str:
         """What k stands for, in words."""
 
 
@@ -120,7 +120,7 @@ class Fixed:
         """Whether a step still moves the time."""
         return self.grid.steps(k) < 2**52
 
-    def said(self, k: int) -> str:
+    def described(self, k: int) -> str:
         """How many steps."""
         return f"{k} step{'s' * (k != 1)}{' a frame' * self.grid.framed}"
 
@@ -215,6 +215,6 @@ class Adaptive:
         """Whether the tolerance is above the rounding."""
         return self.tolerance(k) >= LEAST_TOLERANCE
 
-    def said(self, k: int) -> str:
+    def described(self, k: int) -> str:
         """The tolerance."""
         return f"a tolerance of {self.tolerance(k):g}"

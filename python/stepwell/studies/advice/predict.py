@@ -148,7 +148,7 @@ def fastest_oscillation(trials: Trials) -> float | None:
     fastest = 0.0
     try:
         for i in range(len(t)):
-            matrix = maps.rates(system.sized(v[i], y[i]), float(t[i]), v[i], y[i])
+            matrix = maps.rates(system.for_state_shapes(v[i], y[i]), float(t[i]), v[i], y[i])
             if np.isfinite(matrix).all():
                 fastest = max(fastest, float(np.abs(np.linalg.eigvals(matrix).imag).max()))
     except UnsupportedError:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ...base import registry
 from ...base.checks import file, known
 from ...base.files import write_text
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn, drawn
 from ...base.tables import finite, rows_to_csv
 from ...model.methods import Method
@@ -30,7 +30,7 @@ COSTS = ("evaluations", "batch", "single")
 
 
 @dataclass(frozen=True, eq=False)
-class Timing(Value):
+class Timing(ValueEquality):
     """Measured nanoseconds, per step or per unit of time of one member: not repeatable.
 
     Attributes:
@@ -54,7 +54,7 @@ class Timing(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Point(Value):
+class Point(ValueEquality):
     """One method with one step, or one tolerance.
 
     Attributes:
@@ -99,7 +99,7 @@ LATER, LUCKY = 3, 4.0
 
 
 @dataclass(frozen=True, eq=False)
-class Curve(Value):
+class Curve(ValueEquality):
     """One method with all steps, or all tolerances; or a peer.
 
     Attributes:
@@ -181,7 +181,7 @@ class Curve(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class WorkPrecision(Drawn, Value):
+class WorkPrecision(Drawn, ValueEquality):
     """Error against cost of several methods on one scene.
 
     Attributes:
@@ -224,7 +224,7 @@ class WorkPrecision(Drawn, Value):
         return drawn(path, lambda: self.draw(error, time))
 
     def front(self, error: str = "state_error", cost: str = "evaluations") -> list[dict[str, Any]]:
-        """The Pareto front: the points than which none is both as cheap and as right, from the cheapest to the most right.
+        """The Pareto front: the points that no other beats in both cost and error, from the cheapest to the most accurate.
 
         Of points that are usable and not right by luck (``Curve.dependable``), with an error not below ``floor``.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...errors import ArgumentError
 from ...scenes import Scene
 from ...scenes.truth import MAX_DIFFERENCE, with_truth
@@ -58,7 +58,7 @@ def dense(exact: Exact, until: float) -> Exact:
 
 
 @dataclass(frozen=True, eq=False)
-class Interpolant(Value):
+class Interpolant(ValueEquality):
     """Polynomials through equidistant states; a class, since a local function cannot be pickled with its chart.
 
     Attributes:

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.checks import count, known, numbers, short
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...errors import DTypeError, ShapeError, UnsupportedError
 from ...model.methods import method
 from ...model.systems import NBody
@@ -34,7 +34,7 @@ TOLERANCES = tuple(float(f"{10.0 ** (-k / 2):.3g}") for k in range(4, 25))
 
 
 @dataclass(frozen=True, eq=False)
-class Solved(Value):
+class Solved(ValueEquality):
     """The result of a peer.
 
     Attributes:
@@ -51,7 +51,7 @@ class Solved(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Peer(Value):
+class Peer(ValueEquality):
     """Another program.
 
     Attributes:
@@ -134,7 +134,7 @@ def scipy(method: str = "RK45", settings: Sequence[float] = TOLERANCES) -> Peer:
     return Peer(f"SciPy {method}", ByScipy(method), settings)
 
 
-class ByScipy(Value):
+class ByScipy(ValueEquality):
     """Solves a scene by one of SciPy's methods."""
 
     def __init__(self, method: str) -> None:
@@ -146,7 +146,7 @@ class ByScipy(Value):
     def __call__(self, scene: Scene, times: Array, tolerance: float) -> Solved:
         """The states at these times."""
         solver = _need("scipy.integrate", "scipy")
-        if scene.system.rubbing is not None:
+        if scene.system.stick_friction is not None:
             raise UnsupportedError(
                 f"SciPy is given rates, and {scene.system!r} has friction that sticks, which depends on the step"
             )
@@ -186,7 +186,7 @@ def _series(scene: Scene, tolerance: float) -> Any:
     return hy.taylor_adaptive(_expressions(hy, scene), np.zeros(scene.v.size + scene.y.size), tol=tolerance)
 
 
-class ByHeyoka(Value):
+class ByHeyoka(ValueEquality):
     """Solves a scene by heyoka."""
 
     def __repr__(self) -> str:
@@ -233,7 +233,7 @@ def rebound(integrator: str = "ias15", settings: Sequence[float] | None = None) 
     return Peer(f"REBOUND {integrator}", ByRebound(integrator), settings, "tolerance" if REBOUND[integrator] else "step")
 
 
-class ByRebound(Value):
+class ByRebound(ValueEquality):
     """Solves a scene by one of REBOUND's integrators."""
 
     def __init__(self, integrator: str) -> None:

@@ -156,10 +156,10 @@ def refuse_fixed(outcomes: Iterable[Outcome], options: Mapping[str, Any]) -> Non
 
 def lost(run: Run) -> int:
     """How many members have an absolute tolerance so large that the motion is lost in it."""
-    if run.stand is None:
+    if run.controller_state is None:
         return 0
-    groups = len(run.stand.pace) - PACE_NUMBERS
-    return int(np.count_nonzero(lost_in_tolerance(run.stand.pace, groups)))
+    groups = len(run.controller_state.pace) - PACE_NUMBERS
+    return int(np.count_nonzero(lost_in_tolerance(run.controller_state.pace, groups)))
 
 
 def why(status: int) -> str:

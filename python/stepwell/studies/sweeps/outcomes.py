@@ -13,7 +13,7 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...errors import ArgumentError, ShapeError
 from ...model.systems import System
 from ...runs.result import Run
@@ -67,7 +67,7 @@ class Reduction(ABC):
         """The results, by name."""
 
 
-class Outcome(Value):
+class Outcome(ValueEquality):
     """What is to be kept of each member; given in ``outcomes`` of ``stepwell.sweep``.
 
     Attributes:

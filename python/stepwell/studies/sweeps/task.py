@@ -149,7 +149,7 @@ def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
     given = {**task.given, **{name: value for name, value in values.items() if name in OF_THE_RUN}}
     parameters = {name: value for name, value in values.items() if name not in OF_THE_RUN}
     system = task.system if isinstance(task.system, System) else task.system(**parameters)
-    system = a_system(system).sized(given.get("v"), given["y"])
+    system = a_system(system).for_state_shapes(given.get("v"), given["y"])
     if set(values) == {"dt"}:
         # Nothing else has an axis of members; a chunk of one dt has one.
         block = checks.block("y", given["y"], system.y_shape, system.axes)
@@ -337,8 +337,8 @@ def probed(task: Task, values: dict[str, Any]) -> Probed:
             few = min(PROBED_STEPS, given.get("max_steps", PROBED_STEPS))
             begun = integrate(system, task.method, at=task.at, **(given | {"max_steps": few}))
             _as_many(begun, 1)
-            assert begun.stand is not None
-            return Probed(begun.system, (begun.stand.v, begun.stand.y), _names(task, begun))
+            assert begun.controller_state is not None
+            return Probed(begun.system, (begun.controller_state.v, begun.controller_state.y), _names(task, begun))
         first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **given)
         _as_many(first, 1)
         return Probed(first.system, (first.v[-1], first.y[-1]), _names(task, first))

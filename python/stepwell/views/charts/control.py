@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base import checks, registry
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn
 from ...base.tables import write_csv, write_json
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
@@ -42,7 +42,7 @@ WAYS: tuple[str, ...] = controls.WAYS
 
 
 @dataclass(frozen=True, eq=False)
-class ControlSweep(Drawn, Value):
+class ControlSweep(Drawn, ValueEquality):
     """Errors of what a control keeps, and of the state, against its gain.
 
     Attributes:
@@ -247,7 +247,7 @@ def control(
     kinds = _kinds(given, forms, ways)
     progress = checks.callback("progress", progress)
 
-    system = given.sized(v, y)
+    system = given.for_state_shapes(v, y)
     v, y = (checks.block(name, a, system.v_shape, system.axes) for name, a in (("v", v), ("y", y)))
     if system.batch or v.shape != system.v_shape or y.shape != system.y_shape:
         raise ShapeError(f"scene: expected one start of shape {system.v_shape}, got a batch; the gains are the batch here")

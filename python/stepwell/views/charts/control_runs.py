@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning, ShapeError
 from ...model import controls
 from ...model.methods import Method
@@ -34,7 +34,7 @@ Exact = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class Held(Value):
+class Held(ValueEquality):
     """One method under one kind of control, over the gains. Runs that diverged have infinite errors.
 
     Attributes:

@@ -13,7 +13,7 @@ import numpy as np
 from ...analysis.stability import StabilityLimit, analyse, stability_limit
 from ...base import checks, registry
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
 from ...base.tables import write_csv, write_json
 from ...errors import ArgumentError
@@ -42,7 +42,7 @@ DOCUMENTS_START = "first_order"
 
 
 @dataclass(frozen=True, eq=False)
-class Samples(Value):
+class Samples(ValueEquality):
     """The samples of one method from v₀ = 0 and y₀ = 1; arrays are of shape (steps + 1,).
 
     Attributes:
@@ -74,7 +74,7 @@ class Samples(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class HarmonicCase(Value):
+class HarmonicCase(ValueEquality):
     """Samples that turn by the same angle in every step and keep their amplitude (§4), made by Verlet; shape (steps + 1,).
 
     Attributes:
@@ -106,7 +106,7 @@ class HarmonicCase(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Figures(Value):
+class Figures(ValueEquality):
     """The samples of several methods with the same step.
 
     Attributes:

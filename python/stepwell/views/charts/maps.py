@@ -13,7 +13,7 @@ import numpy as np
 from ...analysis.stability import analyse
 from ...base import checks, registry
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
 from ...base.tables import write_csv, write_json
 from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, ShapeError
@@ -46,7 +46,7 @@ Truths = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityMap(Value):
+class StabilityMap(ValueEquality):
     """The radius r₁ of one method over angle per step and damping ratio.
 
     Attributes:
@@ -174,7 +174,7 @@ class StabilityMap(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Observation(Value):
+class Observation(ValueEquality):
     """What the points of a map do when they are stepped, beside what their eigenvalues say.
 
     Attributes:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base import checks, registry
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn
 from ...base.tables import write_csv, write_json
 from ...errors import ArgumentError, DivergenceWarning, ShapeError
@@ -43,7 +43,7 @@ SETTLED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Settled(Value):
+class Settled(ValueEquality):
     """One method: where the norm settles under control, and what the angle of a step is there.
 
     Attributes:
@@ -71,7 +71,7 @@ class Settled(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class NormSweep(Drawn, Value):
+class NormSweep(Drawn, ValueEquality):
     """A steady turn under control of the norm, over the gain, beside the same turn with the norm reset.
 
     Attributes:

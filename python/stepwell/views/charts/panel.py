@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...base import checks, files, registry
 from ...base.checks import known
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn, drawn
 from ...base.tables import finite, rows_to_csv
 from ...errors import ArgumentError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Panel(Drawn, Value):
+class Panel(Drawn, ValueEquality):
     """Work-precision charts of several scenes.
 
     Attributes:

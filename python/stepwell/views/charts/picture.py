@@ -39,7 +39,7 @@ ERRORS = {
     "phase_error": "phase error at the end of the run, periods",
     "energy_error": "largest energy error of the run, relative",
 }
-#: Digits of what, in a title; of the state if nothing is said.
+#: The word before "digits" in a title, by kind of error; empty means the state.
 DIGITS_OF = {
     "state_error": "",
     "end_error": " at the end",
@@ -49,7 +49,7 @@ DIGITS_OF = {
 COUNTED = "function evaluations per unit of simulated time"
 TIMES = {"batch": "batch", "single": "single run"}
 
-#: Under the curves, the points than which none is both as cheap and as right.
+#: Under the curves, the points that no other beats in both cost and error.
 FRONT: dict[str, Any] = {"color": "#e4e4e4", "linewidth": 10.0, "solid_capstyle": "round", "zorder": 0.8}
 
 

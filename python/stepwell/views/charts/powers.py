@@ -17,7 +17,7 @@ from ...analysis.stability import maps
 from ...analysis.stability.expansion import polynomials
 from ...base import checks, registry
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.literals import RunForm
 from ...base.pictures import Drawn
 from ...base.tables import write_csv, write_json
@@ -47,7 +47,7 @@ BITS = 320
 
 
 @dataclass(frozen=True, eq=False)
-class Powers(Drawn, Value):
+class Powers(Drawn, ValueEquality):
     """Cost and error of n steps in each form.
 
     Attributes:

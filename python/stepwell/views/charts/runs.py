@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base import registry
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn
 from ...base.tables import write_csv, write_json
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
@@ -32,7 +32,7 @@ EXACT = 6001
 
 
 @dataclass(frozen=True, eq=False)
-class RunPicture(Drawn, Value):
+class RunPicture(Drawn, ValueEquality):
     """A run of a scene, with its errors at the saved states; arrays are of shape (saved,).
 
     Attributes:

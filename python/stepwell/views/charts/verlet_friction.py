@@ -15,7 +15,7 @@ import numpy as np
 
 from ...base import checks, registry
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn
 from ...base.tables import write_csv, write_json
 from ...errors import ArgumentError
@@ -36,7 +36,7 @@ HALVINGS = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Block(Value):
+class Block(ValueEquality):
     """A block that friction stops; arrays are of shape (steps + 1,).
 
     Attributes:
@@ -55,7 +55,7 @@ class Block(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class VerletFriction(Drawn, Value):
+class VerletFriction(Drawn, ValueEquality):
     """Verlet with the velocity of the secant, beside what is right.
 
     Attributes:

@@ -16,7 +16,7 @@ from ...analysis.stability.eigen import Complex
 from ...analysis.stability.expansion import text
 from ...base import checks, registry
 from ...base.arrays import Array
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
 from ...base.tables import write_csv, write_json
 from ...errors import ArgumentError, ShapeError
@@ -40,7 +40,7 @@ KINDS = ("loci", "curves")
 
 
 @dataclass(frozen=True, eq=False)
-class Locus(Value):
+class Locus(ValueEquality):
     """One method on the undamped oscillator at n angles per step; arrays are of shape (n,) unless said otherwise.
 
     Attributes:
@@ -102,7 +102,7 @@ class Locus(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Stability(Value):
+class Stability(ValueEquality):
     """Methods on the undamped oscillator, over the angle per step.
 
     Attributes:

@@ -84,4 +84,4 @@ def system_and_control(name: str) -> tuple[System, AnyControl | None]:
             f"{', '.join(each for each in classes if issubclass(getattr(systems, each), System))}"
         )
     found = scene(name)
-    return found.system.sized(found.v, found.y), found.control
+    return found.system.for_state_shapes(found.v, found.y), found.control

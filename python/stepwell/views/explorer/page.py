@@ -16,7 +16,7 @@ from typing import Any
 
 from ... import _core
 from ...base import checks, files
-from ...base.immutable import Value
+from ...base.immutable import ValueEquality
 from ...errors import ArgumentError
 from ...model.methods import Method
 from ...model.methods import choice as chosen_methods
@@ -88,7 +88,7 @@ def _scenes(given: Any) -> list[Scene]:
 
 
 @dataclass(frozen=True, eq=False)
-class Explorer(Value):
+class Explorer(ValueEquality):
     """A page with scenes and methods. ``save`` it, ``open`` it, or let a notebook show it.
 
     Attributes:
