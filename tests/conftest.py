@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 
 import pytest
+from support.complete import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401  hooks
 
 #: Files that take longest, the longest first: with one of them last, one core would run it while the others wait.
 LONGEST = (

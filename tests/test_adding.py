@@ -45,9 +45,9 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     page = (tree / "docs" / "developing" / "adding.md").read_text(encoding="utf-8")
     added = FILES.findall(page)
     assert sorted(name for name, _ in added) == [
+        "python/stepwell/model/systems/van_der_pol.py",
         "python/stepwell/reference/steppers/midpoint.py",
         "python/stepwell/reference/systems/van_der_pol.py",
-        "python/stepwell/model/systems/van_der_pol.py",
         "rust/core/src/model/steppers/midpoint.rs",
         "rust/core/src/model/systems/van_der_pol.rs",
     ]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 import tomllib
 import zipfile
 from email import message_from_string
@@ -81,3 +84,19 @@ def test_a_wheel_has_what_it_should() -> None:
 @needs_wheel
 def test_a_wheel_installs_in_a_clean_environment() -> None:
     tried(WHEELS[-1])
+
+
+@pytest.mark.parametrize(("asked", "outcome"), [("", "2 skipped"), ("complete", "1 failed, 1 skipped")])
+def test_what_is_missing_in_ci_fails(asked: str, outcome: str, tmp_path: Path) -> None:
+    """A tool that is missing is a skip on a user's machine and a failure in CI; a combination that does not exist is a skip."""
+    (tmp_path / "test_skips.py").write_text(
+        "import pytest\nfrom support.complete import *\n"
+        "def test_a_tool(): pytest.skip('there is no ffmpeg here')\n"
+        "def test_a_combination(): pytest.skip('the method needs an acceleration')\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "conftest.py").write_text("from support.complete import *\n", encoding="utf-8")
+    environment = os.environ | {"STEPWELL_TESTS": asked, "PYTHONPATH": str(ROOT / "tests")}
+    command = [sys.executable, "-m", "pytest", "-q", "-c", os.devnull, "--rootdir", str(tmp_path), str(tmp_path)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, cwd=tmp_path)
+    assert outcome in done.stdout

@@ -77,7 +77,7 @@ def adaptive_run(
 ) -> tuple[Run, tuple[Array, Array] | None, Callable[[Whole], tuple[Array, Array, Array]]]:
     """The run with a tolerance, where it began, and a function that finds between which y some of its members have been.
 
-    It has none if it continues ``continued_from``: a carry, its method and what it is for.
+    There is no start if it continues ``continued_from``: a carry, its method and what it is for.
     """
     control = _steppable(system, how, a_control(control), options, continued_from)
     t0 = checks.numbers("t0", t0, unit="units of time")
