@@ -57,7 +57,7 @@ def test_mypy_finds_what_is_written_wrongly(tmp_path: Path) -> None:
     text = f"{HEAD}{RIGHT}\n\ndef wrong() -> None:\n{lines}"
     path = tmp_path / "calls.py"
     path.write_text(text, encoding="utf-8")
-    package = Path(literals.__file__).parents[1]
+    package = Path(literals.__file__).parents[2]
     # A package that is not installed is found there; mypy finds an installed one by itself, and refuses to be told.
     env = {"PATH": ""} if package.name == "site-packages" else {"PATH": "", "MYPYPATH": str(package)}
     words = ["-m", "mypy", "--strict", "--no-error-summary", "--cache-dir", str(tmp_path / "cache"), str(path)]
