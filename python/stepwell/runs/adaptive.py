@@ -287,17 +287,20 @@ def _ascending(times: Array, since: Array, sign: float, goes_on: bool) -> None:
 
 def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:
     """The times that no step crosses, ascending along the first axis: those of the user, of inputs and of the equations."""
-    # Those after the last time count, too: the step that contains it goes on from there when the run is continued.
-    ahead = bool(np.max(times[-1] - t0) >= 0.0)
-    of_inputs = system.jumps(*((float(np.min(t0)), np.inf) if ahead else (-np.inf, float(np.max(t0)))))
-    ends = [float(edge(np.append(times, t0))) for edge in (np.min, np.max)]
-    jumps = [of_inputs, system.switching_times(*ends)]
+    parts = []
+    ahead = bool((times[-1] - t0).max() >= 0.0)
+    if system.given_inputs():
+        # Those after the last time count, too: the step that contains it goes on from there when the run is continued.
+        parts.append(system.jumps(*((float(t0.min()), np.inf) if ahead else (-np.inf, float(t0.max())))))
+    if system.reads_time:
+        begin, end = min(float(times.min()), float(t0.min())), max(float(times.max()), float(t0.max()))
+        parts.append(system.switching_times(begin, end))
     if given is not None:
-        jumps.append(np.atleast_1d(checks.numbers("jumps", given, unit="units of time")))
-    together = checks.concatenated(jumps)
-    together[np.isnan(together)] = np.inf if ahead else -np.inf
-    if not len(together):
+        parts.append(np.atleast_1d(checks.numbers("jumps", given, unit="units of time")))
+    if not any(len(part) for part in parts):
         return None
+    together = checks.concatenated(parts)
+    together[np.isnan(together)] = np.inf if ahead else -np.inf
     return np.unique(together) if together.ndim == 1 else np.sort(together, axis=0)
 
 

@@ -136,6 +136,11 @@ class Equations:
             self._series = Rates(self, given)
         return self._series
 
+    @property
+    def constant_switching_times(self) -> Numbers | None:
+        """Those that depend on nothing; None if they depend on parameters or on the run, or were not sought yet."""
+        return None if self._switches is None or self._switches.switches else self._switches.constants
+
     def switching_times(self, given: dict[str, Any], begin: float, end: float) -> Numbers:
         """When the rates change from one piece to another by the time alone, shape (times, *batch)."""
         from .switching import Switches, numbers_of

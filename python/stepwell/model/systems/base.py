@@ -325,6 +325,11 @@ class System(Immutable, ValueEquality, ABC):
         """When its inputs or their derivatives jump, from ``begin`` to ``end``: ascending, each time once."""
         return np.unique(np.concatenate([np.empty(0), *(each.jumps(begin, end) for each in self.given_inputs().values())]))
 
+    @property
+    def reads_time(self) -> bool:
+        """Whether its equations, beside its inputs, depend on the time."""
+        return False
+
     def switching_times(self, begin: float, end: float) -> Array:
         """When its rates take another piece by the time alone, from ``begin`` to ``end`` and some around: (times, *batch)."""
         return np.empty(0)

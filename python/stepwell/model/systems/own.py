@@ -327,12 +327,17 @@ class OwnSystem(System):
         """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
         return bool(self._retraced()._series_rates().chooses)
 
+    @property
+    def reads_time(self) -> bool:
+        """Whether the function does."""
+        return bool(self._retraced()._core.reads_time)
+
     def switching_times(self, begin: float, end: float) -> Array:
         """The comparisons of the function with the time, solved for it, with the parameters of each member."""
         bound = self._retraced()
-        if not bound._core.reads_time:
-            return np.empty(0)
         assert bound.equations is not None
+        if (known := bound.equations.constant_switching_times) is not None:
+            return known
         parameters = {name: value for name, value in bound.given(bound.batch).items() if name in self.parameters_given}
         return bound.equations.switching_times(parameters, begin, end)
 
