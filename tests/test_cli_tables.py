@@ -134,8 +134,6 @@ def test_bench_times_the_methods_of_a_scene(capsys: Any) -> None:
         assert row["error"] >= 0.0
         assert row["median_ns_per_step"] >= row["ns_per_step"] > 0.0
         assert row["steps_per_second"] == pytest.approx(1e9 / row["ns_per_step"])
-    cost = {row["method"]: row["ns_per_step"] for row in rows}
-    assert cost["rk4"] > 1.5 * cost["leapfrog"], "four evaluations against one"
 
 
 def test_bench_says_what_it_cannot_time(capsys: Any) -> None:
