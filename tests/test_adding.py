@@ -26,7 +26,7 @@ opt-level = 0
 opt-level = 0
 """
 
-pytestmark = pytest.mark.skipif(shutil.which("cargo") is None, reason="builds the core")
+pytestmark = pytest.mark.skipif(shutil.which("cargo") is None, reason="there is no cargo here, which builds the core")
 
 
 def changed(text: str, change: str) -> str:

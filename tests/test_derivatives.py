@@ -10,7 +10,7 @@ import pytest
 from stepwell import _core
 from stepwell.analysis.derivatives import Evaluation, directional, gradient, jacobian
 from stepwell.errors import UnsupportedError
-from stepwell.reference import bits, marks, trig
+from stepwell.reference import bits, functions, marks, trig
 from stepwell.reference.log import log
 from stepwell.reference.tape import rules
 from support.differences import central
@@ -147,13 +147,12 @@ PAIRS = [(0.3, 1.2), (-0.7, 0.6), (1.9, -0.8), (-1.5, -2.2)]
 TRIED: dict[str, tuple[Callable[..., Any], Any]] = {
     **{
         name: (getattr(np, name), SPREAD)
-        for name in ["sin", "cos", "tan", "arctan", "sinh", "cosh", "tanh", "arcsinh", "exp", "exp2", "expm1", "cbrt", "square"]
+        for name in ["sin", "cos", "tan", "arctan", "sinh", "cosh", "tanh", "exp", "exp2", "expm1", "cbrt", "square"]
     },
     **{name: (getattr(np, name), SPREAD) for name in ["abs", "sign", "floor", "ceil", "trunc"]},
-    **{name: (getattr(np, name), UNIT) for name in ["arcsin", "arccos", "arctanh"]},
+    **{name: (getattr(np, name), UNIT) for name in ["arcsin", "arccos"]},
     **{name: (getattr(np, name), ABOVE) for name in ["log", "log2", "log10", "log1p", "sqrt"]},
     **{name: (getattr(np, name), PAIRS) for name in ["arctan2", "hypot", "copysign", "minimum", "maximum", "mod", "remainder"]},
-    "arccosh": (np.arccosh, [1.1, 1.7, 5.0]),
     "round": (np.rint, SPREAD),
     "power": (np.power, [(0.4, 1.7), (1.3, -2.2), (2.4, 0.5), (3.0, 3.0)]),
     "clip": (np.clip, [(0.3, -1.0, 1.0), (1.7, -1.0, 1.0), (-2.1, -1.0, 1.0)]),
@@ -222,9 +221,6 @@ def test_a_wrong_rule_is_found(name: str, wrong: Any, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize("name", rules.PARTIALS)
 def test_elementary_functions_have_their_derivatives(name: str) -> None:
     """Those of ``reference.functions`` as they are traced, forwards and backwards, against NumPy's."""
-    functions = pytest.importorskip("stepwell.reference.functions")
-    if not hasattr(functions, name):
-        pytest.skip(f"there is no {name} among the elementary functions")
     f, points = TRIED[name]
     at = np.array(points, dtype=float).reshape(len(points), -1).T
     tape = _core.Tape()

@@ -91,7 +91,7 @@ def test_what_is_missing_in_ci_fails(asked: str, outcome: str, tmp_path: Path) -
     """A tool that is missing is a skip on a user's machine and a failure in CI; a combination that does not exist is a skip."""
     (tmp_path / "test_skips.py").write_text(
         "import pytest\nfrom support.complete import *\n"
-        "def test_a_tool(): pytest.skip('there is no ffmpeg here')\n"
+        "def test_a_tool(): pytest.skip('there is no compiler or interpreter of c here')\n"
         "def test_a_combination(): pytest.skip('the method needs an acceleration')\n",
         encoding="utf-8",
     )

@@ -388,7 +388,6 @@ def test_equilibria_and_limits_of_lorenz() -> None:
     assert limit == 0.0  # the origin's own motion grows
 
 
-@pytest.mark.skipif(not hasattr(sw, "system"), reason="there are no systems of a user's own equations yet")
 def test_the_exponents_of_lorenz_as_a_users_own_equations() -> None:
     @sw.system(order=1)  # type: ignore[attr-defined]
     def lorenz(t: Any, y: Any, *, sigma: Any = 10.0, rho: Any = 28.0, beta: Any = 8.0 / 3.0) -> Any:
