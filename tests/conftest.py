@@ -6,6 +6,9 @@ import gc
 
 import pytest
 from support.complete import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401  hooks
+from support.snapshots import _snapshots, pytest_addoption, pytest_deselected, snapshot  # noqa: F401  hooks, fixtures
+
+pytest_plugins = ["pytester"]
 
 #: Files that take longest, the longest first: with one of them last, one core would run it while the others wait.
 LONGEST = (
