@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell.base.arrays import Array
 from stepwell.reference import events
 from stepwell.runs.events import collected
 from stepwell.runs.events.trials import Trials
@@ -366,3 +368,33 @@ def test_mistake_a_secant_without_a_bound_is_noticed(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(events, "_next", secant)
     with pytest.raises(AssertionError):
         test_no_function_takes_more_trials_than_bisection_and_one(HARD["steep at the end"])
+
+
+def test_a_step_beyond_stability_is_not_looked_into_without_end() -> None:
+    """Slopes that say nothing of g would halve every part: 2²⁶ of them, in one step of a run that diverges."""
+    evaluations = 0
+
+    def look(of: Any, share: Array) -> tuple[Array, Array, Array, Array]:
+        nonlocal evaluations
+        evaluations += len(share)
+        return share + 1.0, np.full(len(share), -1e30), share[None], share[None]
+
+    one, ends = np.ones(1), np.zeros((1, 1))
+    parts = events.Parts(np.zeros(1, dtype=int), 0.0 * one, one, one, 2.0 * one, -1e30 * one, -1e30 * one, ends, ends)
+    brackets, stuck = events.parted(look, parts)
+    assert not len(brackets.of)
+    assert not len(stuck)
+    assert evaluations <= 2 * events.MOST_PARTS
+
+
+def test_events_of_a_run_that_diverges_end_and_leave_its_bits() -> None:
+    @sw.system(order=1)
+    def lorenz(t: Any, y: Any) -> Any:
+        return np.array([10.0 * (y[1] - y[0]), y[0] * (28.0 - y[2]) - y[1], y[0] * y[1] - 8.0 / 3.0 * y[2]])
+
+    run = partial(sw.integrate, lorenz(), "false_euler", y=[2.8, 3.1, 2.2], dt=0.05, steps=60, every=10)
+    with pytest.warns(sw.DivergenceWarning):
+        located = run(events=lambda t, y: y[1] - 1.0)
+    with pytest.warns(sw.DivergenceWarning):
+        assert np.array_equal(run().y, located.y, equal_nan=True)
+    assert located.status == sw.Status.DIVERGED

@@ -29,7 +29,10 @@ REACH = 4.0
 BENDS, BENDS_TWICE = 1.4, 1.25
 #: A part of a step is halved so many times, to find two zeros in it: a smooth g that touches zero is then within its roundings.
 MOST_HALVINGS = 26
-#: The same where g begins at zero and is known to leave it: a bracket begins where it has done so.
+#: Of one step no more parts than this are halved at a time. A step that follows the motion has a few at most; one that is far beyond
+#: the stability limit, whose slopes say nothing of it, would else have twice as many after each halving.
+MOST_PARTS = 32
+#: The same as ``MOST_HALVINGS`` where g begins at zero and is known to leave it: a bracket begins where it has done so.
 MOST_HALVINGS_FROM_ZERO = 60
 
 #: From some members and shares of their steps to g, v and y there; the axis of the members comes last.
@@ -135,12 +138,14 @@ def parted(look: Look, parts: Parts) -> tuple[Parts, Whole]:
         Those parts, at whose end g may be 0; and the steps at whose start g is zero and returns to it within roundings.
     """
     brackets, stuck = [], np.zeros(0, dtype=np.int64)
+    count = int(parts.of.max(initial=-1)) + 1
     for halving in range(MOST_HALVINGS_FROM_ZERO + 1):
         begin, end = sides(parts)
         changes = begin * end < 0.0
         leaves_zero = changes & (parts.g_low * begin <= 0.0)  # a bracket begins where g has left it
         zero_at_end = (parts.g_high == 0.0) & (end != 0.0)
-        split = leaves_zero | ((bends(parts) | (changes & zero_at_end)) & (halving < MOST_HALVINGS))
+        halves = (bends(parts) | (changes & zero_at_end)) & (halving < MOST_HALVINGS)
+        split = leaves_zero | (halves & (np.bincount(parts.of[halves], minlength=count)[parts.of] <= MOST_PARTS))
         brackets.append(parts.some(changes & ~split))
         at_end = zero_at_end & ~changes & ~split
         brackets.append(parts.some(at_end)._replace(low=parts.high[at_end], g_low=end[at_end]))
