@@ -24,11 +24,11 @@ from ...runs import engine, float32
 from .c import C
 from .head import head
 from .javascript import JavaScript
-from .language import Language
 from .names import Names, prefix, snake
 from .plain_python import Python
 from .result import ExportedStep
 from .rust import Rust
+from .skeleton import Skeleton
 from .tapes import Traced
 from .written import MEMBERS, Written
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ExportedStep", "export"]
 
-LANGUAGES: dict[str, type[Language]] = {"c": C, "javascript": JavaScript, "python": Python, "rust": Rust}
+LANGUAGES: dict[str, type[Skeleton]] = {"c": C, "javascript": JavaScript, "python": Python, "rust": Rust}
 
 
 def export(
@@ -150,7 +150,7 @@ def export(
     traced = Traced(plan, index)
     writer = kind(called, Names(MEMBERS), single)
     written = Written(traced, writer)
-    text = writer.file(written, writer.remark(head(written, *_example(system, blocks, batch, index))))
+    text = writer.file(written, writer.remark(head(written, writer, *_example(system, blocks, batch, index))))
     of = "float32" if single else "float64"
     return ExportedStep(text, called, kind.title, kind.endings, system, how, index, fused, traced.count, of)
 

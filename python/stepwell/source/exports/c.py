@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
-from .language import FORCE, Assignment, Language, indented, listed
+from .lines import listed
+from .names import Field
+from .program import FORCE
+from .skeleton import Skeleton
 from .written import Written
 
-TYPES = {"number": "double", "truth": "int", "bits": "uint64_t", "wide": "double"}
-SINGLE_TYPES = {"number": "float", "truth": "int", "bits": "uint32_t", "wide": "double"}
+TYPES = {"number": "double", "truth": "int", "bits": "uint64_t", "wide": "double", "index": "int"}
+SINGLE_TYPES = TYPES | {"number": "float", "bits": "uint32_t"}
 
 #: Values of FLT_EVAL_METHOD (C23, TS 18661-3) under which doubles, and floats, are computed in their own precision: 16, 32 and 64
 #: widen what is narrower than _Float16, float and double, and 1 widens floats to double.
@@ -111,7 +114,7 @@ def _narrow(text: str) -> str:
     return text
 
 
-class C(Language):
+class C(Skeleton):
     """Functions and types that begin with a prefix; bits by ``memcpy``."""
 
     title = "C"
@@ -119,10 +122,49 @@ class C(Language):
     infinity, root, floor, magnitude, fma = "INFINITY", "sqrt", "floor", "fabs", "fma"
     bits_literal = "UINT64_C({})"
     truths = ("0", "1")
-    me = "m->"
+    samples = "{name}, {count}"
+    me, state = "m->", "s->"
     time = "m->t0 + (double)s->step * m->dt"
     types: ClassVar[dict[str, str]] = TYPES
     helpers: ClassVar[dict[str, str]] = HELPERS | {"sample": SAMPLE}
+    declaration, variable = "const $type $name = $text;", ("$type $name = $text;", "$type $name;")
+    loop, work_array = "for (int i = 0; i < $count; i++) $line", "$number w[$size];"
+    table, table_end, array = "static const $of $name[$count] = {", "};", "const $number $name[$count] = {"
+    force = f", const $number {FORCE}[$n]"
+    heads: ClassVar[dict[str, str]] = {
+        "function": "static $number PREFIX_$name($number x)",
+        "prepare": "void ${prefix}_prepare($prefix *m)",
+        "start": "void ${prefix}_start(const $prefix *m, ${prefix}_state *s$parameters$force)",
+        "step": "void ${prefix}_step(const $prefix *m, ${prefix}_state *s$force)",
+        "finish": "void ${prefix}_finish(const $prefix *m, const ${prefix}_state *s$force, $number velocities[$n])",
+        "work": "double ${prefix}_work(const $prefix *m, const ${prefix}_state *s)",
+    }
+    work = "return s->tally / ($evaluations.0 * m->dt);"
+    order = ("prepare", "create", "start", "step", "finish", "work")
+    usage = (
+        "Compile a program that includes it, such as the example, with: cc -O2 -ffp-contract=off example.c -lm",
+        "${prefix}_defaults(&m) sets the parameters; change any of them and call ${prefix}_prepare(&m).",
+        "${prefix}_start(&m, &s, $blocks$start_force) makes the state at step 0, "
+        "${prefix}_step(&m, &s$step_force) makes one step.",
+    )
+    calls: ClassVar[dict[str, str]] = {
+        "finish": "${prefix}_finish(&m, &s$finish_force, velocities)",
+        "work": "${prefix}_work(&m, &s)",
+    }
+    program = r"""#include <stdio.h>
+#include "$prefix.c"
+
+int main(void) {
+    $prefix m;
+    ${prefix}_state s;
+    $arrays
+
+    ${prefix}_defaults(&m);
+    ${prefix}_start(&m, &s, $blocks$start_force);
+    for (int k = 0; k < $steps; k++) ${prefix}_step(&m, &s$step_force);
+    printf("%.17g\n", s.$shown[0]);
+    return 0;
+}"""
     of_single: ClassVar[dict[str, Any]] = {
         "root": "sqrtf",
         "floor": "floorf",
@@ -132,6 +174,7 @@ class C(Language):
         "time": "(float)(m->t0 + (double)s->step * (double)m->dt)",
         "types": SINGLE_TYPES,
         "helpers": {name: _narrow(text) for name, text in HELPERS.items()},
+        "work": "return (double)s->tally / ($evaluations.0 * (double)m->dt);",
     }
 
     def literal(self, x: float) -> str:
@@ -142,199 +185,56 @@ class C(Language):
         """With the prefix, so that several files may be compiled together."""
         return f"{self.prefix}_{name}"
 
-    def declare(self, line: Assignment, note: str) -> str:
-        """A value that gets a name."""
-        return f"const {self.types[line.kind]} {line.name} = {line.text};{note}"
-
-    def array(self, size: int) -> str:
-        """The array in which loops compute."""
-        return f"{self.types['number']} w[{size}];"
-
-    def loop(self, count: int, line: str) -> str:
-        """A line for each i from 0 on."""
-        return f"for (int i = 0; i < {count}; i++) {line}"
-
-    def table(self, name: str, places: Sequence[int]) -> list[str]:
-        """A table of places in arrays."""
-        return listed(f"static const int {self.table_name(name)}[{len(places)}] = {{", list(map(str, places)), "};", "")
-
-    def variable(self, line: Assignment, note: str) -> list[str]:
-        """A value that is set again in a branch; with no text if it is set in both."""
-        return [f"{self.types[line.kind]} {line.name}{' = ' * bool(line.text)}{line.text};{note}"]
-
-    def sample(self, table: int, t: str) -> str:
-        """The sample of a table that holds at a time."""
-        of = self.tables[table]
-        number = (
-            f"{self.helper('sample')}({self.prefix}_{of.name}_samples, {len(of.values)}, m->{of.start}, m->{of.interval}, {t})"
-        )
-        return of.time("m->", number)
-
-    def function(self, name: str, lines: list[str]) -> str:
-        """A function of one number x."""
-        of = self.types["number"]
-        return "\n".join([f"// The {name} of x.", f"static {of} PREFIX_{name}({of} x) {{", *indented(lines), "}"])
-
-    def how(self, w: Written) -> list[str]:
-        """How to compile and call it."""
-        p, blocks, force = self.prefix, "".join(f", {of}" for of, _ in w.given), ", force" * w.forced("step")
-        lines = [
-            "Compile a program that includes it, such as the example, with: cc -O2 -ffp-contract=off example.c -lm",
-            f"{p}_defaults(&m) sets the parameters; change any of them and call {p}_prepare(&m).",
-            f"{p}_start(&m, &s{blocks}) makes the state at step 0, {p}_step(&m, &s{force}) makes one step.",
-        ]
-        if w.carries:
-            force = ", force" * w.forced("finish")
-            lines.append(
-                f"{p}_finish(&m, &s{force}, velocities) finds the velocities; in the state {w.slot} stands in their place."
-            )
-        if w.evaluations:
-            lines.append(f"{p}_work(&m, &s) is the energy that the control has given since the start.")
-        return lines
-
-    def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
-        """A program that makes some steps and prints a number of the state."""
-        p, blocks = self.prefix, [(name, each) for name, each in (("v", v), ("y", y)) if each]
-        arrays = [*blocks, (FORCE, w.traced.force)] if w.traced.force else blocks
-        start = [name for name, _ in blocks] + [FORCE] * w.forced("start")
-        return [
-            "#include <stdio.h>",
-            f'#include "{p}.c"',
-            "",
-            "int main(void) {",
-            f"    {p} m;",
-            f"    {p}_state s;",
-            *(
-                line
-                for n, a in arrays
-                for line in self.listed(f"const {self.types['number']} {n}[{len(a)}] = {{", a, "};", "    ")
-            ),
-            "",
-            f"    {p}_defaults(&m);",
-            f"    {p}_start(&m, &s{''.join(f', {name}' for name in start)});",
-            f"    for (int k = 0; k < {steps}; k++) {p}_step(&m, &s{', force' * w.forced('step')});",
-            f'    printf("%.17g\\n", s.{w.shown}[0]);',
-            "    return 0;",
-            "}",
-        ]
-
     def file(self, w: Written, head: list[str]) -> str:
-        """The whole text after the comment at the head."""
-        tables = ["\n".join(line for name, places in w.places.items() for line in self.table(name, places))] if w.places else []
-        parts = [
-            self._structures(w),
-            *self._tables(w),
-            *tables,
-            self._prepare(w),
-            self._defaults(w),
-            self._start(w),
-            self._step(w),
-        ]
-        if w.carries:
-            parts.append(self._finish(w))
-        if w.evaluations:
-            parts.append(self._work(w))
-        functions = self.functions("\n".join(parts))
-        return "\n".join(head) + "\n" + self._begin() + "\n" + "\n\n".join([*functions, *parts]) + "\n" + END
-
-    # ---- parts of it
-
-    def _begin(self) -> str:
+        """The whole text; ``head`` is the comment at its head."""
         number = self.types["number"]
         others = " && ".join(f"FLT_EVAL_METHOD != {each}" for each in OWN_PRECISION[number])
-        return BEGIN.replace("ALL_OTHERS", others).replace("NUMBER", number).replace("PREFIX", self.prefix)
+        begin = BEGIN.replace("ALL_OTHERS", others).replace("NUMBER", number).replace("PREFIX", self.prefix)
+        parts = ["\n".join(self._structures(w)), *self._tables(w), *map("\n".join, self._functions(w))]
+        return "\n".join(head) + "\n" + begin + "\n" + "\n\n".join([*self._helpers("\n".join(parts)), *parts]) + "\n" + END
 
-    def _structures(self, w: Written) -> str:
-        p = self.prefix
+    def _function(self, about: str, head: str, lines: Iterable[str]) -> list[str]:
+        lines = [*lines]
+        is_unused = "*m" in head and not any(self.me in line for line in lines)
+        return super()._function(about, head, ["(void)m;"] * is_unused + lines)
+
+    def _parameter(self, name: str, n: int) -> str:
+        return f", const {self.types['number']} {name}[{n}]"
+
+    def _structures(self, w: Written) -> list[str]:
+        p, number = self.prefix, self.types["number"]
         lines = ["// What a step is described by.", "typedef struct {"]
-        for each in w.parameters:
-            size = "".join(f"[{n}]" for n in each.shape)
-            lines.append(
-                f"    {self.type_of(each)} {each.name}{size};" + (f" // {each.about}" if each.about != each.name else "")
-            )
-        if w.made:
-            lines += ["", f"    // Made of these by {p}_prepare."]
-            lines += [f"    {self.types[each.kind]} {each.name.removeprefix(self.me)};" for each in w.made]
-        lines += ["", f"    // Made of these by {p}_prepare.", f"    {self.types['number']} {w.array}[{w.made_size}];"] * bool(
-            w.made_size
-        )
+        lines += [f"    {self.type_of(each)} {each.name}{_size(each)};{self._about(each)}" for each in w.parameters]
+        made = [f"    {self.types[each.kind]} {each.name.removeprefix(self.me)};" for each in w.made]
+        made += [f"    {number} {w.array}[{w.made_size}];"] * bool(w.made_size)
+        lines += ["", f"    // Made of these by {p}_prepare.", *made] if made else []
         lines += [f"}} {p};", "", "// A state.", "typedef struct {"]
-        lines += [f"    {self.types['number']} {name}[{n}];" for name, _, n in w.blocks]
-        lines += [f"    {self.types['number']} tally; // what the control has added up"] * bool(w.evaluations)
-        return "\n".join([*lines, "    int64_t step; // k; the time is t0 + k*dt", f"}} {p}_state;"])
+        lines += [f"    {number} {name}[{n}];" for name, _, n in w.blocks]
+        lines += [f"    {number} tally; // what the control has added up"] * bool(w.evaluations)
+        return [*lines, "    int64_t step; // k; the time is t0 + k*dt", f"}} {p}_state;"]
 
-    def _tables(self, w: Written) -> list[str]:
-        return [
-            "\n".join(
-                [
-                    f"// The samples of {each.about}.",
-                    *self.listed(
-                        f"static const {self.types['number']} {self.prefix}_{each.name}_samples[{len(each.values)}] = {{",
-                        each.values,
-                        "};",
-                    ),
-                ]
-            )
-            for each in w.tables
-        ]
-
-    def _prepare(self, w: Written) -> str:
-        lines = [f"{each.name} = {each.text};" for each in w.made]
-        lines += [line for each in w.loops for line in self.statement(each)]
-        lines = lines or ["(void)m;"]
-        about = "// What does not change from step to step. To be called after a change of a parameter."
-        return "\n".join([about, f"void {self.prefix}_prepare({self.prefix} *m) {{", *indented(lines), "}"])
-
-    def _defaults(self, w: Written) -> str:
-        p, tables, lines = self.prefix, [], []
+    def _create(self, w: Written) -> list[str]:
+        tables: list[str] = []
+        lines: list[str] = []
         for each in w.parameters:
-            if each.shape:
-                size = "".join(f"[{n}]" for n in each.shape)
-                table = f"static const {self.type_of(each)} {each.name}[{len(each.values)}] = {{"
-                tables += self.listed(table, each.values, f"}}; // {size}" if len(each.shape) > 1 else "};")
-                lines.append(f"memcpy(m->{each.name}, {each.name}, sizeof m->{each.name});")
-            else:
+            if not each.shape:
                 lines.append(f"m->{each.name} = {self.value(each)};")
-        inside = indented([*tables, *([""] if tables else []), *lines, f"{p}_prepare(m);"])
-        return "\n".join(["// The parameters with which it was exported.", f"void {p}_defaults({p} *m) {{", *inside, "}"])
+                continue
+            begin = f"static const {self.type_of(each)} {each.name}[{len(each.values)}] = {{"
+            end = f"}}; // {_size(each)}" if len(each.shape) > 1 else "};"
+            tables += listed(begin, [self.signed(x) for x in each.values], end)
+            lines.append(f"memcpy(m->{each.name}, {each.name}, sizeof m->{each.name});")
+        inside = [*tables, *[""] * bool(tables), *lines, f"{self.prefix}_prepare(m);"]
+        about, head = "The parameters with which it was exported.", f"void {self.prefix}_defaults({self.prefix} *m)"
+        return self._function(about, head, inside)
 
-    def _start(self, w: Written) -> str:
-        p, start = self.prefix, w.functions.get("start")
-        arguments = "".join(f", const {self.types['number']} {of}[{n}]" for of, n in w.given)
+    def _initial(self, w: Written) -> list[str]:
+        carried = w.slot if "start" in w.functions else ""
+        blocks = [(name, of) for name, of, _ in w.blocks if name != carried]
         lines = ["s->step = 0;"] + [f"s->tally = {self.literal(0.0)};"] * bool(w.evaluations)
-        lines += [f"memcpy(s->{name}, {of}, sizeof s->{name});" for name, of, _ in w.blocks if name != w.slot or not start]
-        if start:
-            lines += [
-                "",
-                *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s->{w.slot}"}, "The carry, in place of v."),
-            ]
-        if not (start and start.needs_fields):
-            lines.insert(0, "(void)m;")
-        about = "// The state at step 0, of velocities and coordinates."
-        return "\n".join([about, f"void {p}_start(const {p} *m, {p}_state *s{arguments}) {{", *indented(lines), "}"])
+        return lines + [f"memcpy(s->{name}, {of}, sizeof s->{name});" for name, of in blocks]
 
-    def _step(self, w: Written) -> str:
-        p, f = self.prefix, w.functions["step"]
-        of = {name: f"s->{name}" for name in (w.slot, "y", "tally")}
-        lines = ["(void)m;"] * (not f.needs_fields) + [*self.body(f, of, of), "s->step += 1;"]
-        force = self._force(w, "step")
-        return "\n".join(["// One step.", f"void {p}_step(const {p} *m, {p}_state *s{force}) {{", *indented(lines), "}"])
 
-    def _force(self, w: Written, function: str) -> str:
-        """The argument of a function for a force from outside."""
-        return f", const {self.types['number']} {FORCE}[{w.n_v}]" * w.forced(function)
-
-    def _finish(self, w: Written) -> str:
-        p, f = self.prefix, w.functions["finish"]
-        lines = ["(void)m;"] * (not f.needs_fields)
-        lines += self.body(f, {name: f"s->{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities.")
-        force = self._force(w, "finish")
-        begin = f"void {p}_finish(const {p} *m, const {p}_state *s{force}, {self.types['number']} velocities[{w.n_v}]) {{"
-        return "\n".join(["// The velocities at a state.", begin, *indented(lines), "}"])
-
-    def _work(self, w: Written) -> str:
-        p = self.prefix
-        begin = f"double {p}_work(const {p} *m, const {p}_state *s) {{"
-        about = "// The energy that the control has given since the start."
-        wide = "(double)" * self.single
-        return "\n".join([about, begin, f"    return {wide}s->tally / ({w.evaluations}.0 * {wide}m->dt);", "}"])
+def _size(field: Field) -> str:
+    """The lengths of an array, in brackets."""
+    return "".join(f"[{n}]" for n in field.shape)

@@ -6,7 +6,8 @@ from ... import _core
 from ...base.arrays import Shape
 from ...base.checks import short
 from ...runs import engine
-from .language import indented
+from .lines import indented
+from .skeleton import Skeleton
 from .written import Written
 
 #: Steps of the example.
@@ -19,9 +20,9 @@ MAX_SYSTEM = 400
 EXAMPLE = "Example:"
 
 
-def head(w: Written, v: list[float], y: list[float]) -> list[str]:
+def head(w: Written, language: Skeleton, v: list[float], y: list[float]) -> list[str]:
     """The lines of the comment, without its marks."""
-    plan, language = w.traced.plan, w.language
+    plan = w.traced.plan
     method, system = plan.method, plan.system
     limit = f"undamped oscillators for omega*dt < {method.limit:.10g}" if method.limit else "no undamped oscillator, whatever dt"
     count = engine.evaluations(method, system)
@@ -29,7 +30,7 @@ def head(w: Written, v: list[float], y: list[float]) -> list[str]:
     blocks = [("v", system.v_shape), ("y", system.y_shape)]
     layout = "; ".join(_layout(name if name == "y" else w.slot, shape) for name, shape in blocks)
     return [
-        f"{w.language.prefix}: one step by {method.title}.",
+        f"{language.prefix}: one step by {method.title}.",
         "",
         f"System:  {short(system, MAX_SYSTEM)}",
         f"Method:  {method.title} ({method.name}), order {method.order}, {evaluations}",
@@ -40,7 +41,7 @@ def head(w: Written, v: list[float], y: list[float]) -> list[str]:
         f"Written by stepwell {_core.__version__}. The numbers are those of stepwell.integrate"
         f"{_options(plan.fused, plan.single)}, to the last bit.",
         "",
-        *language.how(w),
+        *language.usage_of(w),
         "",
         EXAMPLE,
         "",

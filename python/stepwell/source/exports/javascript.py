@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from ..explanation.formula import Formula
-from .language import FORCE, Assignment, Language, indented, listed
+from .lines import indented
 from .names import camel
+from .skeleton import Skeleton
 from .written import Written
 
 VIEWS = """// The bits of a number, by views of the same memory.
@@ -67,7 +68,7 @@ def _on_bits(name: str, arguments: str, made: str) -> str:
 ROUNDED = ("add", "subtract", "multiply", "divide", "square root")
 
 
-class JavaScript(Language):
+class JavaScript(Skeleton):
     """A class in an ES module, for browsers and Node; bits by views of a typed array, whole numbers of 64 bits as BigInt."""
 
     title = "JavaScript"
@@ -93,10 +94,39 @@ class JavaScript(Language):
         "shift_down": _on_bits("shift_down", "a, n", "a >> BigInt(n)"),
         "sample": SAMPLE,
     }
+    declaration, variable = "const $name = $text;", ("let $name = $text;", "let $name;")
+    loop, work_array = "for (let i = 0; i < $count; i++) $line", "const w = new Float64Array($size);"
+    table = array = "const $name = ["
+    heads: ClassVar[dict[str, str]] = {
+        "function": "function $name(x)",
+        "prepare": "prepare()",
+        "start": "start($blocks$force)",
+        "step": "step(s$force)",
+        "finish": "finish(s$force)",
+        "work": "work(s)",
+    }
+    velocities = "const velocities = new Float64Array($n);"
+    returned: ClassVar[dict[str, str]] = {"start": "return s;", "finish": "return velocities;"}
+    work = "return s.tally / ($evaluations * this.dt);"
+    usage = (
+        "A module for browsers and Node.",
+        "const m = new $type({ dt: ... }) sets the parameters that are given; call m.prepare() after a change of one.",
+        "const s = m.start($blocks$start_force) is the state at step 0, m.step(s$step_force) makes one step.",
+    )
+    program = """import { $type } from "./$prefix.mjs";
+
+$arrays
+const m = new $type();
+const s = m.start($blocks$start_force);
+for (let k = 0; k < $steps; k++) m.step(s$step_force);
+console.log(s.$shown[0]);"""
     of_single: ClassVar[dict[str, Any]] = {
         "array_type": "Float32Array",
         "bits_literal": "{}",
         "time": "fround(this.t0 + s.step * this.dt)",
+        "rounding": "fround($text)",
+        "work_array": "const w = new Float32Array($size);",
+        "velocities": "const velocities = new Float32Array($n);",
         "helpers": {
             "fround": FROUND,
             "single": SINGLE,
@@ -121,101 +151,17 @@ class JavaScript(Language):
 
     def formula(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
         """An operation of these, in float32 rounded at once."""
-        made = super().formula(name, of, given, bits)
-        return Formula(f"fround({made.text})") if self.single and name in ROUNDED else made
-
-    def declare(self, line: Assignment, note: str) -> str:
-        """A value that gets a name."""
-        return f"const {line.name} = {line.text};{note}"
-
-    def array(self, size: int) -> str:
-        """The array in which loops compute."""
-        return f"const w = new {self.array_type}({size});"
-
-    def loop(self, count: int, line: str) -> str:
-        """A line for each i from 0 on."""
-        return f"for (let i = 0; i < {count}; i++) {line}"
-
-    def table(self, name: str, places: Sequence[int]) -> list[str]:
-        """A table of places in arrays."""
-        return listed(f"const {self.table_name(name)} = [", list(map(str, places)), "];", "")
-
-    def variable(self, line: Assignment, note: str) -> list[str]:
-        """A value that is set again in a branch; with no text if it is set in both."""
-        return [f"let {line.name}{' = ' * bool(line.text)}{line.text};{note}"]
-
-    def given(self, text: str) -> str:
-        """A number of an argument in the precision of the file."""
-        return f"fround({text})" if self.single else text
-
-    def sample(self, table: int, t: str) -> str:
-        """The sample of a table that holds at a time."""
-        of = self.tables[table]
-        number = f"sample({of.name}_samples, this.{of.start}, this.{of.interval}, {t})"
-        return of.time("this.", number)
-
-    def function(self, name: str, lines: list[str]) -> str:
-        """A function of one number x."""
-        return "\n".join([f"// The {name} of x.", f"function {name}(x) {{", *indented(lines, "  "), "}"])
-
-    def how(self, w: Written) -> list[str]:
-        """How to call it."""
-        p, blocks, force = camel(self.prefix), ", ".join(of for of, _ in w.given), ", force" * w.forced("step")
-        lines = [
-            "A module for browsers and Node.",
-            f"const m = new {p}({{ dt: ... }}) sets the parameters that are given; call m.prepare() after a change of one.",
-            f"const s = m.start({blocks}) is the state at step 0, m.step(s{force}) makes one step.",
-        ]
-        if w.carries:
-            lines.append(
-                f"m.finish(s{', force' * w.forced('finish')}) finds the velocities; in the state {w.slot} stands in their place."
-            )
-        if w.evaluations:
-            lines.append("m.work(s) is the energy that the control has given since the start.")
-        return lines
-
-    def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
-        """A program that makes some steps and prints a number of the state."""
-        p = camel(self.prefix)
-        blocks = [(name, each) for name, each in (("v", v), ("y", y)) if each]
-        arrays = [*blocks, (FORCE, w.traced.force)] if w.traced.force else blocks
-        start = [name for name, _ in blocks] + [FORCE] * w.forced("start")
-        return [
-            f'import {{ {p} }} from "./{self.prefix}.mjs";',
-            "",
-            *(line for name, each in arrays for line in self.listed(f"const {name} = [", each, "];")),
-            f"const m = new {p}();",
-            f"const s = m.start({', '.join(start)});",
-            f"for (let k = 0; k < {steps}; k++) m.step(s{', force' * w.forced('step')});",
-            f"console.log(s.{w.shown}[0]);",
-        ]
+        exact = super().formula(name, of, given, bits)
+        return Formula(f"fround({exact.text})") if self.single and name in ROUNDED else exact
 
     def file(self, w: Written, head: list[str]) -> str:
-        """The whole text after the comment at the head."""
-        parts = [self._prepare(w), self._start(w), self._step(w)]
-        if w.carries:
-            parts.append(self._finish(w))
-        if w.evaluations:
-            parts.append(self._work(w))
-        tables = [
-            "\n".join([f"// The samples of {each.about}.", *self.listed(f"const {each.name}_samples = [", each.values, "];")])
-            for each in w.tables
-        ]
-        tables += ["\n".join(line for name, places in w.places.items() for line in self.table(name, places))] * bool(w.places)
-        inside = "\n\n".join("\n".join(indented(each, "  ")) for each in [self._constructor(w), *parts])
+        """The whole text; ``head`` is the comment at its head."""
+        inside = "\n\n".join("\n".join(indented(each, "  ")) for each in self._functions(w))
         whole = f"export class {camel(self.prefix)} {{\n{inside}\n}}"
-        return "\n".join(head) + "\n\n" + "\n\n".join([*self.functions(whole), *tables, whole]) + "\n"
+        return "\n".join(head) + "\n\n" + "\n\n".join([*self._helpers(whole), *self._tables(w), whole]) + "\n"
 
-    # ---- parts of it
-
-    def _constructor(self, w: Written) -> list[str]:
-        lines: list[str] = []
-        for each in w.parameters:
-            about = f" // {each.about}" if each.about != each.name else ""
-            if each.shape:
-                lines += self.nested(f"this.{each.name} = ", each.values, each.shape, ";")
-            else:
-                lines.append(f"this.{each.name} = {self.value(each)};{about}")
+    def _create(self, w: Written) -> list[str]:
+        lines = self._set(w, "this.$name = ", ";", remarks=True)
         lines += [f"this.{w.array} = new {self.array_type}({w.made_size});"] * bool(w.made_size)
         lines += [
             "for (const name of Object.keys(given)) {",
@@ -226,51 +172,15 @@ class JavaScript(Language):
         ]
         return ["constructor(given = {}) {", *indented(lines, "  "), "}"]
 
-    def _prepare(self, w: Written) -> list[str]:
-        rounded = [each.name for each in w.parameters if self.single and not each.wide]
-        lines = [f"this.{name} = single(this.{name});" for name in rounded]
-        lines += [f"{each.name} = {each.text};" for each in w.made]
-        lines += [line for each in w.loops for line in self.statement(each)]
-        about = "// What does not change from step to step. To be called after a change of a parameter."
-        return [about, "prepare() {", *indented(lines, "  "), "}"]
-
-    def _start(self, w: Written) -> list[str]:
-        start = w.functions.get("start")
+    def _initial(self, w: Written) -> list[str]:
+        carried = w.slot if "start" in w.functions else ""
         lines = []
-        for of, n in w.given:
+        for of, n in w.arguments:
             numbers = f"{n} number{'s' * (n > 1)}"
             lines.append(f"if ({of}.length !== {n}) throw new RangeError(`{of}: expected {numbers}, got ${{{of}.length}}`);")
         lines.append("const s = { step: 0 };")
         lines += ["s.tally = 0; // what the control has added up"] * bool(w.evaluations)
         for name, of, n in w.blocks:
-            carried = start and name == w.slot
-            lines.append(f"s.{name} = new {self.array_type}({n});" if carried else f"s.{name} = {self.array_type}.from({of});")
-        if start:
-            lines += [
-                "",
-                *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "The carry, in place of v."),
-            ]
-        lines += ["return s;"]
-        about = "// The state at step 0, of velocities and coordinates."
-        return [about, f"start({', '.join(of for of, _ in w.given)}) {{", *indented(lines, "  "), "}"]
-
-    def _step(self, w: Written) -> list[str]:
-        of = {name: f"s.{name}" for name in (w.slot, "y", "tally")}
-        lines = [*self.body(w.functions["step"], of, of), "s.step += 1;"]
-        return ["// One step.", f"step(s{', force' * w.forced('step')}) {{", *indented(lines, "  "), "}"]
-
-    def _finish(self, w: Written) -> list[str]:
-        lines = [f"const velocities = new {self.array_type}({w.n_v});"]
-        lines += self.body(
-            w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
-        )
-        return [
-            "// The velocities at a state.",
-            f"finish(s{', force' * w.forced('finish')}) {{",
-            *indented([*lines, "return velocities;"], "  "),
-            "}",
-        ]
-
-    def _work(self, w: Written) -> list[str]:
-        about = "// The energy that the control has given since the start."
-        return [about, "work(s) {", f"  return s.tally / ({w.evaluations} * this.dt);", "}"]
+            array = f"new {self.array_type}({n})" if name == carried else f"{self.array_type}.from({of})"
+            lines.append(f"s.{name} = {array};")
+        return lines

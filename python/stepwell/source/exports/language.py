@@ -8,27 +8,16 @@ from __future__ import annotations
 
 import re
 import struct
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
-from ... import _core
-from ...base.arrays import Shape
 from ...errors import UnsupportedError
 from ..explanation import formula as plain
 from ..explanation.formula import ATOM, BOTH, CHOICE, COMPARISON, EITHER, NOT, SIGN, SUM, Formula, Notation
-from ..explanation.listing import Leaf, Line, Writer
-from .functions import FUNCTIONS, operations_of
+from ..explanation.listing import Line
+from .functions import FUNCTIONS
 from .names import Field, Names
-
-if TYPE_CHECKING:
-    from .written import Table, Written
-
-#: The block of a force from outside, and the argument.
-FORCE = "force"
-
-#: Characters of a line of numbers.
-WIDTH = 100
+from .program import Assignment, Table
 
 #: Operations whose result is a number.
 ARITHMETIC = ("add", "subtract", "multiply", "divide", "negate")
@@ -44,94 +33,22 @@ EVALUATION = re.compile(r"−?d?[vy](\d+)")
 LAST_BIT = re.compile(r"\w*shift_up\(\w*bits_of\(((?:\w|\.|->)+)\), (\d+)\)")
 
 
-class Assignment(NamedTuple):
-    """A value and how it is made.
-
-    Attributes:
-        name: as it is used.
-        kind: "number", "truth" or "bits".
-        text: its formula.
-        note: its meaning in the method, if the name does not say it.
-        evaluation: the rate evaluation to which it belongs, counted from 1; 0 if that is not known.
-        role: "new"; "variable" if it is set again in a branch, without a text if in both; "set" there.
-    """
-
-    name: str
-    kind: str
-    text: str
-    note: str = ""
-    evaluation: int = 0
-    role: str = "new"
-
-
-class Conditional(NamedTuple):
-    """What is computed if something holds, and if not."""
-
-    condition: str
-    then: list[Statement]
-    other: list[Statement]
-
-
-class Loop(NamedTuple):
-    """So many equal operations: what element i of an array is.
-
-    Of the state, ``@y[i]`` is an element before the step, ``#y[i]`` one after it.
-    """
-
-    times: int
-    target: str
-    text: str
-
-
-Statement = Assignment | Conditional | Loop
-
-
-class Place(NamedTuple):
-    """A number of a state, and what it is called in a function; ``at`` is −1 if its block is one number."""
-
-    block: str
-    at: int
-    name: str
-
-
-class Function(NamedTuple):
-    """The contents of a function.
-
-    Attributes:
-        reads: the numbers of the state that it needs.
-        needs_time: whether it needs the time.
-        needs_fields: whether it reads parameters or values computed from them.
-        of_time: the values that depend on the time alone.
-        lines: the values that depend on the state.
-        writes: the numbers that it writes.
-        work: the length of the array in which loops compute; 0 without loops.
-    """
-
-    reads: list[Place]
-    needs_time: bool
-    needs_fields: bool
-    of_time: list[Assignment]
-    lines: list[Statement]
-    writes: list[Place]
-    work: int = 0
-
-
-class Language(Notation, ABC):
+class Language(Notation):
     """How a language writes values; one object for each file.
 
     Attributes:
         title: the language's name.
-        endings: endings of its files.
-        comment: the beginning of a comment.
         helpers: the text of each function that a file may need.
-        types: of the values, by "number", "truth" and "bits", where a language has types; and "wide", of t0.
-        of_single: those attributes that are others in float32.
-        kinds: of each value with a name of its own, as it is used: "number", "truth" or "bits".
+        types: the types of values, by "number", "truth" and "bits", where a language has types; and "wide", of t0.
+        of_single: the attributes that differ in float32.
+        truths: how false and true are written.
+        words: how "not", "and" and "or" are written.
+        me: the prefix of a field and a parameter.
+        samples: how a table of samples is passed to a function; {name} is the table, {count} its length.
+        kinds: the kind of each value with a name of its own, by that name: "number", "truth" or "bits".
     """
 
     title: ClassVar[str]
-    endings: ClassVar[tuple[str, ...]]
-    comment: ClassVar[str] = "//"
     helpers: ClassVar[dict[str, str]]
     truths: ClassVar[tuple[str, str]] = ("false", "true")
     words: ClassVar[tuple[str, str, str]] = ("!", "&&", "||")
@@ -143,15 +60,9 @@ class Language(Notation, ABC):
     types: ClassVar[dict[str, str]] = {}
     of_single: ClassVar[dict[str, Any]]
     bits_literal: ClassVar[str]
-    #: The prefix of a field and a parameter.
     me: ClassVar[str]
-    #: The end of a statement.
-    end: ClassVar[str] = ";"
-    #: The expression for the time of the present step.
-    time: ClassVar[str]
+    samples: ClassVar[str] = "{name}"
     tables: list[Table]
-    #: By how much what is within something is indented.
-    step_in: ClassVar[str] = "    "
     longest = 88
     called = FUNCTIONS
 
@@ -240,10 +151,9 @@ class Language(Notation, ABC):
             case "divide":
                 return self.quotient(numbers[0], numbers[1], bits[1])
             case "sample":
-                return Formula(self.sample(given, numbers[0].text), SUM if self.tables[given].times else ATOM)
+                return self._sample(self.tables[given], numbers[0].text)
             case "multiply add" | "multiply subtract" | "subtract multiply":
-                made = plain.formula(name, numbers, given, bits)
-                return Formula(f"{self.fma}{made.text.removeprefix('fma')}")
+                return Formula(f"{self.fma}{plain.formula(name, numbers, given, bits).text.removeprefix('fma')}")
             case _ if name in FUNCTIONS:
                 return Formula(self.call(name, numbers[0].text))
             case _ if name in ARITHMETIC:
@@ -268,6 +178,17 @@ class Language(Notation, ABC):
         if a.is_bits or b.is_bits or a.is_truth != b.is_truth:
             a, b = (self.as_bits(each, known) for each, known in zip((a, b), bits[1:], strict=True))
         return Formula(self.choice(truth, a, b), CHOICE, a.is_truth, a.is_bits)
+
+    def _sample(self, table: Table, t: str) -> Formula:
+        """The sample of a table that holds at a time; of a table of times, when that sample is."""
+        samples = self.samples.format(name=self.table_name(f"{table.name}_samples"), count=len(table.values))
+        start, interval = self.me + table.start, self.me + table.interval
+        number = self.call("sample", samples, start, interval, t)
+        return Formula(f"{start} + {interval} * {number}", SUM) if table.times else Formula(number)
+
+    def table_name(self, name: str) -> str:
+        """The name of a table in the file."""
+        return self.helper(name)
 
     def choice(self, truth: Formula, a: Formula, b: Formula) -> str:
         """One of two values."""
@@ -336,186 +257,3 @@ class Language(Notation, ABC):
     def type_of(self, field: Field) -> str:
         """The type of its numbers."""
         return self.types["wide" if field.wide else "number"]
-
-    def functions(self, text: str) -> list[str]:
-        """The functions that this text of a file needs, in their order; each may need those before it."""
-        needed: list[str] = []
-        for name in reversed([*self.helpers, *FUNCTIONS]):
-            if re.search(rf"\b{self.helper(name)}\b", text):
-                function = self.helpers[name] if name in self.helpers else self._of_one_number(name)
-                needed.insert(0, function.replace("PREFIX", self.prefix))
-                text += needed[0]
-        return needed
-
-    def _of_one_number(self, name: str) -> str:
-        """A function of one number, from its operations."""
-        operations, (root,) = operations_of(name, self.single)
-        self.names = Names(("x",))
-        body = [*operations, ("copy", [root], 0)], [len(operations)]
-        section, _ = Writer(_core.Tape(single=self.single), {}, self).section(
-            "member step", body, lambda *_: Leaf(Formula("x"), None, 4), 4, "a", ["result"]
-        )
-        *lines, result = [(self.names(line.name), self.text(line.formula)) for line in section.lines]
-        inside = [self.declare(Assignment(word, self.kinds.get(word, "number"), text), "") for word, text in lines]
-        return self.function(name, [*inside, f"return {result[1]}{self.end}"])
-
-    @abstractmethod
-    def function(self, name: str, lines: list[str]) -> str:
-        """A function of one number x."""
-
-    def remark(self, lines: Iterable[str]) -> list[str]:
-        """Lines as a comment."""
-        return [f"{self.comment} {printable(line)}".rstrip() for line in lines]
-
-    def listed(self, begin: str, values: Sequence[float], end: str, indent: str = "") -> list[str]:
-        """Numbers between two texts, in one line or in several."""
-        return listed(indent + begin, [self.signed(each) for each in values], end, indent)
-
-    def nested(self, begin: str, values: Sequence[float], shape: Shape, end: str, indent: str = "") -> list[str]:
-        """An array of arrays of numbers, between two texts."""
-        if len(shape) == 1:
-            return self.listed(f"{begin}[", values, f"]{end}", indent)
-        size = len(values) // shape[0]
-        lines = [f"{indent}{begin}["]
-        for i in range(shape[0]):
-            lines += self.nested("", values[i * size : (i + 1) * size], shape[1:], ",", indent + "    ")
-        return [*lines, f"{indent}]{end}"]
-
-    def body(
-        self, f: Function, read: Mapping[str, str], write: Mapping[str, str], after: str = "The state after the step."
-    ) -> list[str]:
-        """The body of a function, not indented: where each block is read and written, and a comment."""
-
-        def place(block: str, index: int, of: Mapping[str, str]) -> str:
-            return of[block] if index < 0 else f"{of[block]}[{index}]"
-
-        groups: list[tuple[str, Sequence[Statement]]] = [
-            ("The state.", [Assignment(p.name, "number", place(p.block, p.at, read)) for p in f.reads if p.block != FORCE]),
-            ("The force.", [Assignment(p.name, "number", self.given(f"{FORCE}[{p.at}]")) for p in f.reads if p.block == FORCE]),
-            ("What depends on the time alone.", f.of_time),
-            ("What depends on the state.", f.lines),
-        ]
-        out = [self.declare(Assignment("t", "number", self.time), "")] if f.needs_time else []
-        out += [self.array(f.work)] * bool(f.work)
-        for title, lines in groups:
-            if lines:
-                out += ["", f"{self.comment} {title}"]
-            evaluation = 1
-            for each in lines:
-                if isinstance(each, Assignment) and each.evaluation > evaluation:
-                    evaluation = each.evaluation
-                    out += ["", f"{self.comment} Evaluation {evaluation} of the rates."]
-                out += [self._placed(line, read, write) for line in self.statement(each)]
-        if f.work:
-            return out
-        out += ["", f"{self.comment} {after}"]
-        out += [f"{place(p.block, p.at, write)} = {p.name}{self.end}" for p in f.writes]
-        return out if out[0] else out[1:]
-
-    def given(self, text: str) -> str:
-        """A number of an argument in the precision of the file."""
-        return text
-
-    def _placed(self, line: str, read: Mapping[str, str], write: Mapping[str, str]) -> str:
-        """A line with the names of the blocks that are read and written."""
-        line = re.sub(rf"@{FORCE}(\[.*?\]+)", lambda found: self.given(FORCE + found[1]), line)
-        line = re.sub(r"@(\w+)", lambda found: read[found[1]], line)
-        return re.sub(r"#(\w+)(?=[\[ ])", lambda found: write.get(found[1], found[0]), line)
-
-    @abstractmethod
-    def array(self, size: int) -> str:
-        """The array in which loops compute."""
-
-    @abstractmethod
-    def loop(self, count: int, line: str) -> str:
-        """A line for each i from 0 on."""
-
-    @abstractmethod
-    def table(self, name: str, places: Sequence[int]) -> list[str]:
-        """A table of places in arrays."""
-
-    def table_name(self, name: str) -> str:
-        """The name of such a table."""
-        return self.helper(name)
-
-    def statement(self, each: Statement) -> list[str]:
-        """Lines of what is computed."""
-        if isinstance(each, Loop):
-            line = f"{each.target} = {each.text}{self.end}"
-            return [line if each.times == 1 else self.loop(each.times, line)]
-        if isinstance(each, Conditional):
-            then = [line for inner in each.then for line in self.statement(inner)]
-            other = [line for inner in each.other for line in self.statement(inner)]
-            if then:
-                return self.conditional(each.condition, then, other)
-            return self.conditional(f"{self.words[0]}{each.condition}", other, [])
-        note = f" {self.comment} {each.note}" if each.note else ""
-        if each.role == "new":
-            return [self.declare(each, note)]
-        return self.variable(each, note) if each.role == "variable" else [f"{each.name} = {each.text}{self.end}"]
-
-    def conditional(self, condition: str, then: list[str], other: list[str]) -> list[str]:
-        """What is computed if something holds, and if not."""
-        behind = ["} else {", *indented(other, self.step_in)] if other else []
-        return [f"if ({condition}) {{", *indented(then, self.step_in), *behind, "}"]
-
-    @abstractmethod
-    def variable(self, line: Assignment, note: str) -> list[str]:
-        """A value that is set again in a branch; with no text if it is set in both."""
-
-    @abstractmethod
-    def declare(self, line: Assignment, note: str) -> str:
-        """A value that gets a name."""
-
-    @abstractmethod
-    def sample(self, table: int, t: str) -> str:
-        """The sample of a table that holds at a time."""
-
-    @abstractmethod
-    def how(self, w: Written) -> list[str]:
-        """How to compile and call it."""
-
-    @abstractmethod
-    def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
-        """A program that makes some steps and prints a number of the state."""
-
-    @abstractmethod
-    def file(self, w: Written, head: list[str]) -> str:
-        """The whole text after the comment at the head."""
-
-
-def texts(statements: Iterable[Statement]) -> list[str]:
-    """All formulas of these."""
-    found: list[str] = []
-    for each in statements:
-        if isinstance(each, Conditional):
-            found += [each.condition, *texts(each.then), *texts(each.other)]
-        elif isinstance(each, Loop):
-            found += [each.target, each.text]
-        else:
-            found.append(each.text)
-    return found
-
-
-def indented(lines: Iterable[str], by: str = "    ") -> list[str]:
-    """Lines indented by at least this much."""
-    return [by + line if line else "" for line in lines]
-
-
-def listed(begin: str, items: Sequence[str], end: str, indent: str) -> list[str]:
-    """Words between two texts, in one line or in several."""
-    if len(one := begin + ", ".join(items) + end) <= WIDTH:
-        return [one]
-    lines, line = [begin], indent + "   "
-    for item in items:
-        if len(line) + len(item) > WIDTH - 2 and line.strip():
-            lines.append(line)
-            line = indent + "   "
-        line += f" {item},"
-    return [*lines, line, indent + end]
-
-
-def printable(line: str) -> str:
-    """A text that does not end a comment or join lines."""
-    line = "".join(letter if letter.isprintable() else " " for letter in line)
-    return line.replace("*/", "* /").replace("??", "? ?").rstrip("\\ ")

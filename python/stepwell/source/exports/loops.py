@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 from ..explanation.formula import COMPARISON, Formula
 from .branches import kind_of
-from .language import Language, Loop
+from .language import Language
+from .program import Loop
 from .tapes import Operations
 
 #: Where a number is: an array, or what is one for all, and its place there.

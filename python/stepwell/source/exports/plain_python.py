@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
 from ..explanation import formula as plain
 from ..explanation.formula import CHOICE, EITHER, Formula
-from .language import FORCE, Assignment, Language, indented, listed
+from .lines import indented
 from .names import camel
+from .skeleton import Skeleton
 from .written import Written
 
 QUOTIENT = '''def quotient(a, b):
@@ -77,18 +78,30 @@ HELPERS = {
 }
 
 
-class Python(Language):
+HEADS = {
+    "function": "def $name(x)",
+    "prepare": "def prepare(self)",
+    "start": "def start(self, $blocks$force)",
+    "step": "def step(self, s$force)",
+    "finish": "def finish(self, s$force)",
+    "work": "def work(self, s)",
+}
+
+#: NumPy warns of infinities, which are no errors here.
+COMPUTES = {name: f'@numpy.errstate(all="ignore")\n{HEADS[name]}' for name in ("prepare", "start", "step", "finish")}
+
+
+class Python(Skeleton):
     """A class of plain floats; bits by ``struct``."""
 
     title = "Python"
     endings = (".py",)
-    comment = "#"
+    comment, gap, end = "#", "  ", ""
     infinity, root, floor, magnitude, fma = "math.inf", "square_root", "floor", "abs", "fused"
     bits_literal = "{}"
     truths = ("False", "True")
     words = ("not ", "and", "or")
     me = "self."
-    end = ""
     time = "self.t0 + s.step * self.dt"
     helpers: ClassVar[dict[str, str]] = {
         "quotient": QUOTIENT,
@@ -100,12 +113,38 @@ class Python(Language):
         **HELPERS,
         "sample": SAMPLE,
     }
+    declaration, variable = "$name = $text", ("$name = $text", "")
+    branch = ("if $condition:", "else:", "")
+    loop, work_array = "for i in range($count): $line", "w = [$zero] * $size"
+    table, table_end, array = "$name = [", "]", "$name = ["
+    doc = "#"
+    heads: ClassVar[dict[str, str]] = HEADS
+    velocities = "velocities = [0.0] * $n"
+    returned: ClassVar[dict[str, str]] = {"start": "return s", "finish": "return velocities"}
+    work = "return s.tally / ($evaluations * self.dt)"
+    usage = (
+        "$needs",
+        "m = $type(dt=...) sets the parameters that are given; call m.prepare() after a change of one.",
+        "s = m.start($blocks$start_force) is the state at step 0, m.step(s$step_force) makes one step.",
+    )
+    program = """from $prefix import $type
+
+$arrays
+m = $type()
+s = m.start($blocks$start_force)
+for _ in range($steps):
+    m.step(s$step_force)
+print(s.$shown[0])"""
     of_single: ClassVar[dict[str, Any]] = {
         "infinity": "float32(numpy.inf)",
         "root": "numpy.sqrt",
         "floor": "numpy.floor",
         "fma": None,
         "time": "float32(self.t0 + s.step * float(self.dt))",
+        "rounding": "float32($text)",
+        "heads": HEADS | COMPUTES,
+        "velocities": "velocities = [float32(0.0)] * $n",
+        "work": "return float(s.tally) / ($evaluations * float(self.dt))",
         "helpers": {
             "float32": "float32 = numpy.float32",
             "single": SINGLE,
@@ -119,10 +158,6 @@ class Python(Language):
         """A finite number."""
         return f"float32({float(x)!r})" if self.single else super().literal(x)
 
-    def decorated(self, function: list[str]) -> list[str]:
-        """A function that computes: NumPy tells of infinities, which are no errors here."""
-        return ['@numpy.errstate(all="ignore")'] * self.single + function
-
     def quotient(self, a: Formula, b: Formula, divisor: int | None) -> Formula:
         """A quotient; by a constant that is not zero Python's own."""
         if self.single or (divisor is not None and divisor & (2**63 - 1)):
@@ -133,106 +168,32 @@ class Python(Language):
         """One of two values."""
         return f"{a.within(EITHER)} if {truth.within(EITHER)} else {b.within(CHOICE)}"
 
-    def declare(self, line: Assignment, note: str) -> str:
-        """A value that gets a name."""
-        return f"{line.name} = {line.text}{' ' if note else ''}{note}"
-
-    def array(self, size: int) -> str:
-        """The array in which loops compute."""
-        return f"w = [{self.literal(0.0)}] * {size}"
-
-    def loop(self, count: int, line: str) -> str:
-        """A line for each i from 0 on."""
-        return f"for i in range({count}): {line}"
-
-    def table(self, name: str, places: Sequence[int]) -> list[str]:
-        """A table of places in arrays."""
-        return listed(f"{self.table_name(name)} = [", list(map(str, places)), "]", "")
-
-    def variable(self, line: Assignment, note: str) -> list[str]:
-        """A value that is set again in a branch; with no text if it is set in both."""
-        return [self.declare(line, note)] * bool(line.text)
-
-    def conditional(self, condition: str, then: list[str], other: list[str]) -> list[str]:
-        """What is computed if something holds, and if not."""
-        behind = ["else:", *indented(other)] if other else []
-        return [f"if {condition}:", *indented(then), *behind]
-
-    def given(self, text: str) -> str:
-        """A number of an argument in the precision of the file."""
-        return f"float32({text})" if self.single else text
-
-    def sample(self, table: int, t: str) -> str:
-        """The sample of a table that holds at a time."""
-        of = self.tables[table]
-        number = f"sample({of.name}_samples, self.{of.start}, self.{of.interval}, {t})"
-        return of.time("self.", number)
-
-    def function(self, name: str, lines: list[str]) -> str:
-        """A function of one number x."""
-        return "\n".join([f"def {name}(x):", f'    """The {name} of x."""', *indented(lines)])
-
-    def how(self, w: Written) -> list[str]:
-        """How to call it."""
-        p, blocks, force = camel(self.prefix), ", ".join(of for of, _ in w.given), ", force" * w.forced("step")
-        needs = (
-            "Needs Python 3.13, which has a fused multiply-add." if w.traced.plan.fused else "Needs only the standard library."
-        )
-        needs = "Needs NumPy, which has numbers of float32." if self.single else needs
-        lines = [
-            needs,
-            f"m = {p}(dt=...) sets the parameters that are given; call m.prepare() after a change of one.",
-            f"s = m.start({blocks}) is the state at step 0, m.step(s{force}) makes one step.",
-        ]
-        if w.carries:
-            lines.append(
-                f"m.finish(s{', force' * w.forced('finish')}) finds the velocities; in the state {w.slot} stands in their place."
-            )
-        if w.evaluations:
-            lines.append("m.work(s) is the energy that the control has given since the start.")
-        return lines
-
-    def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
-        """A program that makes some steps and prints a number of the state."""
-        p = camel(self.prefix)
-        blocks = [(name, each) for name, each in (("v", v), ("y", y)) if each]
-        arrays = [*blocks, (FORCE, w.traced.force)] if w.traced.force else blocks
-        start = [name for name, _ in blocks] + [FORCE] * w.forced("start")
-        return [
-            f"from {self.prefix} import {p}",
-            "",
-            *(line for name, each in arrays for line in listed(f"{name} = [", list(map(repr, each)), "]", "")),
-            f"m = {p}()",
-            f"s = m.start({', '.join(start)})",
-            f"for _ in range({steps}):",
-            f"    m.step(s{', force' * w.forced('step')})",
-            f"print(s.{w.shown}[0])",
-        ]
-
     def file(self, w: Written, head: list[str]) -> str:
-        """The whole text after the comment at the head."""
+        """The whole text; ``head`` is the comment at its head."""
         p = camel(self.prefix)
-        parts = [self._init(w), self._prepare(w), self._start(w), self._step(w)]
-        if w.carries:
-            parts.append(self._finish(w))
-        if w.evaluations:
-            parts.append(self._work(w))
-        tables = [
-            "\n".join([f"# The samples of {each.about}.", *self.listed(f"{each.name}_samples = [", each.values, "]")])
-            for each in w.tables
-        ]
-        tables += ["\n".join(line for name, places in w.places.items() for line in self.table(name, places))] * bool(w.places)
         step = f'class {p}:\n    """What a step is described by, and the step."""\n\n'
-        step += "\n\n".join("\n".join(indented(each)) for each in parts)
+        step += "\n\n".join("\n".join(indented(each)) for each in self._functions(w))
         state = [f"class {p}State:", '    """A state."""', "", *indented(self._state(w))]
-        whole = "\n\n\n".join([*tables, "\n".join(state), step])
-        functions = self.functions(whole)
+        whole = "\n\n\n".join([*self._tables(w), "\n".join(state), step])
+        functions = self._helpers(whole)
         used = "\n".join([*functions, whole])
         imports = [f"import {name}" for name in ("math", "struct", "numpy") if f"{name}." in used]
         begin = "\n".join(head) + "\n\n" + ("\n".join(imports) + "\n\n\n" if imports else "\n")
         return begin + "\n\n\n".join([*functions, whole]) + "\n"
 
-    # ---- parts of it
+    def _words(self, w: Written) -> dict[str, object]:
+        needs = "Needs only the standard library."
+        if self.single:
+            needs = "Needs NumPy, which has numbers of float32."
+        elif w.traced.plan.fused:
+            needs = "Needs Python 3.13, which has a fused multiply-add."
+        return super()._words(w) | {"needs": needs}
+
+    def _shown(self, x: float) -> str:
+        return repr(x)
+
+    def _function(self, about: str, head: str, lines: Iterable[str]) -> list[str]:
+        return [*f"{head}:".splitlines(), *indented([f'"""{about}"""', *lines])]
 
     def _state(self, w: Written) -> list[str]:
         arguments = ", ".join(name for name, _, _ in w.blocks)
@@ -240,14 +201,8 @@ class Python(Language):
         lines += [f"self.tally = {self.literal(0.0)}  # what the control has added up"] * bool(w.evaluations)
         return [f"def __init__(self, {arguments}):", *indented(lines)]
 
-    def _init(self, w: Written) -> list[str]:
-        lines: list[str] = []
-        for each in w.parameters:
-            about = f"  # {each.about}" if each.about != each.name else ""
-            if each.shape:
-                lines += self.nested(f"self.{each.name} = ", each.values, each.shape, "")
-            else:
-                lines.append(f"self.{each.name} = {self.value(each)}{about}")
+    def _create(self, w: Written) -> list[str]:
+        lines = self._set(w, "self.$name = ", "", remarks=True)
         lines += [f"self.{w.array} = [{self.literal(0.0)}] * {w.made_size}"] * bool(w.made_size)
         lines += [
             "for name, value in given.items():",
@@ -258,45 +213,12 @@ class Python(Language):
         ]
         return ["def __init__(self, **given):", *indented(lines)]
 
-    def _prepare(self, w: Written) -> list[str]:
-        lines = ['"""What does not change from step to step. To be called after a change of a parameter."""']
-        rounded = [each.name for each in w.parameters if self.single and not each.wide]
-        loops = [line for each in w.loops for line in self.statement(each)]
-        lines += [f"self.{name} = single(self.{name})" for name in rounded]
-        return self.decorated(
-            ["def prepare(self):", *indented([*lines, *(f"{each.name} = {each.text}" for each in w.made), *loops])]
-        )
-
-    def _start(self, w: Written) -> list[str]:
-        start = w.functions.get("start")
-        lines = ['"""The state at step 0, of velocities and coordinates."""']
-        for of, n in w.given:
+    def _initial(self, w: Written) -> list[str]:
+        carried, number = w.slot if "start" in w.functions else "", "float32" if self.single else "float"
+        lines = []
+        for of, n in w.arguments:
             numbers = f"{n} number{'s' * (n > 1)}"
             lines += [f"if len({of}) != {n}:", f'    raise ValueError(f"{of}: expected {numbers}, got {{len({of})}}")']
-            lines.append(f"{of} = [{'float32' if self.single else 'float'}(each) for each in {of}]")
-        given = [f"[{self.literal(0.0)}] * {n}" if start and name == w.slot else of for name, of, n in w.blocks]
-        lines.append(f"s = {camel(self.prefix)}State({', '.join(given)})")
-        if start:
-            lines += [
-                "",
-                *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "The carry, in place of v."),
-            ]
-        return self.decorated([f"def start(self, {', '.join(of for of, _ in w.given)}):", *indented([*lines, "return s"])])
-
-    def _step(self, w: Written) -> list[str]:
-        of = {name: f"s.{name}" for name in (w.slot, "y", "tally")}
-        lines = ['"""One step."""', *self.body(w.functions["step"], of, of), "s.step += 1"]
-        return self.decorated([f"def step(self, s{', force' * w.forced('step')}):", *indented(lines)])
-
-    def _finish(self, w: Written) -> list[str]:
-        lines = ['"""The velocities at a state."""', f"velocities = [{self.literal(0.0)}] * {w.n_v}"]
-        lines += self.body(
-            w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
-        )
-        return self.decorated([f"def finish(self, s{', force' * w.forced('finish')}):", *indented([*lines, "return velocities"])])
-
-    def _work(self, w: Written) -> list[str]:
-        about = '    """The energy that the control has given since the start."""'
-        if self.single:
-            return ["def work(self, s):", about, f"    return float(s.tally) / ({w.evaluations} * float(self.dt))"]
-        return ["def work(self, s):", about, f"    return s.tally / ({w.evaluations} * self.dt)"]
+            lines.append(f"{of} = [{number}(each) for each in {of}]")
+        blocks = [f"[{self.literal(0.0)}] * {n}" if name == carried else of for name, of, n in w.blocks]
+        return [*lines, f"s = {camel(self.prefix)}State({', '.join(blocks)})"]

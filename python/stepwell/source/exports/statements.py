@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 from ..explanation.formula import Formula
 from ..explanation.listing import Leaf, Writer
 from .branches import Branch, Branched, Item, branches
-from .language import Assignment, Conditional, Language, Statement
+from .language import Language
+from .program import Assignment, Conditional, Statement
 
 
 class Copy(NamedTuple):

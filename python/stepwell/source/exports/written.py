@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from math import prod
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,11 +13,12 @@ from ...runs.engine import pushes
 from ..explanation.formula import Formula
 from ..explanation.listing import Leaf, Line, Writer
 from .branches import Branched
-from .language import FORCE, Assignment, Function, Language, Loop, Place, Statement, texts
+from .language import Language
 from .loops import MADE, WORK, NoLoopError
 from .loops import Place as LoopPlace
 from .loops import Writer as LoopWriter
 from .names import Field, Names, fields
+from .program import FORCE, Assignment, Function, Loop, Place, Statement, Table, texts
 from .statements import Statements
 from .tapes import MAX_OPERATIONS, STATE, STEP, TALLY, Operations, Part, Traced, elements, too_long
 
@@ -27,24 +27,6 @@ LOCALS = ("m", "s", "t", "self", "coordinates", "velocities", FORCE)
 
 #: Names that fields may not have, because something else of the object has them.
 MEMBERS = ("defaults", "finish", "new", "prepare", "start", "step", "work", "constructor", "prototype")
-
-
-class Table(NamedTuple):
-    """A table of a sampled input: the name of its samples, the time of the first, and the interval to the next.
-
-    If it is one of ``times``, it has the numbers of the samples, from which their times follow.
-    """
-
-    name: str
-    about: str
-    values: list[float]
-    start: str
-    interval: str
-    times: bool = False
-
-    def time(self, me: str, number: str) -> str:
-        """When the sample of a number is."""
-        return f"{me}{self.start} + {me}{self.interval} * {number}" if self.times else number
 
 
 class Written:
@@ -122,15 +104,20 @@ class Written:
 
     def forced(self, function: str) -> bool:
         """Whether a function has a force from outside for an argument: a step has if there is one, others if they read it."""
-        if function not in self.functions:
-            return False
-        of = self.functions[function]
-        reads = any(each.block == FORCE for each in of.reads) or any(f"@{FORCE}" in text for text in texts(of.lines))
-        return reads or (function == "step" and bool(self.traced.force))
+        return function in self._forced or (function == "step" and bool(self.traced.force))
+
+    @cached_property
+    def _forced(self) -> set[str]:
+        """The functions that read a force."""
+        return {
+            name
+            for name, of in self.functions.items()
+            if any(each.block == FORCE for each in of.reads) or any(f"@{FORCE}" in text for text in texts(of.lines))
+        }
 
     @property
-    def given(self) -> list[tuple[str, int]]:
-        """What the state at the start is made of: the arguments and their lengths."""
+    def arguments(self) -> list[tuple[str, int]]:
+        """The arguments from which the state at the start is computed, and their lengths."""
         return [(of, n) for _, of, n in self.blocks] + [(FORCE, self.n_v)] * self.forced("start")
 
     @property
@@ -243,7 +230,7 @@ class Written:
             to.append((f"#{block}", -1 if block == TALLY else i if i < self.n_v else i - self.n_v))
         lines = [*found.loops, *loops.moved([found.places[i] for i in own], aside), *loops.moved(values, to)]
         needs_time = any(re.search(r"\bt\b", text) for text in texts(lines))
-        return Function([], needs_time, True, [], list(lines), [], found.size + len(own))
+        return Function([], needs_time, [], list(lines), [], found.size + len(own))
 
     def _function(self, part: Part, operations: Operations, kept: list[int], known: list[Leaf]) -> Function:
         language, tape = self.language, part.tape
@@ -302,11 +289,9 @@ class Written:
         else:
             lines = Statements(branched, writer, leaf, leaves, part.roots, part.results).lines
         writes = [place(part.results, i) for i in range(len(part.results))]
-        text = " ".join(texts([*of_time_lines, *lines]))
         return Function(
             [reads[i] for i in sorted(reads)],
             "time" in asked,
-            "time" in asked or language.me in text,
             of_time_lines,
             lines,
             writes,
