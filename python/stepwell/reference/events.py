@@ -29,8 +29,8 @@ REACH = 4.0
 BENDS, BENDS_TWICE = 1.4, 1.25
 #: A part of a step is halved so many times, to find two zeros in it: a smooth g that touches zero is then within its roundings.
 MOST_HALVINGS = 26
-#: Of one step no more parts than this are halved at a time. A step that follows the motion has a few at most; one that is far beyond
-#: the stability limit, whose slopes say nothing of it, would else have twice as many after each halving.
+#: Of one step no more parts than this are halved at a time. A step that follows the motion has a few at most; one that is far
+#: beyond the stability limit, whose slopes say nothing of it, would else have twice as many after each halving.
 MOST_PARTS = 32
 #: The same as ``MOST_HALVINGS`` where g begins at zero and is known to leave it: a bracket begins where it has done so.
 MOST_HALVINGS_FROM_ZERO = 60
