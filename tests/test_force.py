@@ -16,7 +16,7 @@ from stepwell.errors import ArgumentError, DTypeError, FixedError, ShapeError, U
 from stepwell.reference import around
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from support.cases import SYSTEMS
+from support.cases import ADAPTIVE, SYSTEMS, fits
 from support.graphs import assert_one_graph, methods
 from support.tracing import made
 
@@ -378,9 +378,166 @@ def test_it_goes_with_the_direct_form(form: str) -> None:
         sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, force=1.0, form=form)
 
 
-def test_it_goes_with_fixed_steps() -> None:
-    with pytest.raises(ArgumentError, match="force: goes with fixed steps only"):
-        sw.integrate(sw.Oscillator(), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0], force=1.0)
+# ---- adaptive steps
+
+ABLE = [method.name for method in sw.methods() if method.error_order is not None]
+PACED = [name for name in ADAPTIVE if name in PUSHED]
+
+
+def equal(one: sw.Run, other: sw.Run) -> None:
+    np.testing.assert_array_equal(one.v, other.v)
+    np.testing.assert_array_equal(one.y, other.y)
+    np.testing.assert_array_equal(one.status, other.status)
+    for ours, theirs in zip(one.paces, other.paces, strict=True):  # type: ignore[arg-type]
+        np.testing.assert_array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize("name", PACED)
+def test_one_graph_of_an_attempt(name: str) -> None:
+    """Forward and backward in time, and where a member stands at the start."""
+    system = SYSTEMS[name](np.random.default_rng(3), 1).uncontrolled
+    force = np.ones((*system.v_shape, *system.batch))
+    for method in map(sw.method, ABLE):
+        if not fits(system, method):
+            continue
+        for backward in (False, True):
+            plan = engine.Plan(system, method, system.batch, 1.0, force=force, backward=backward)
+            for what in ("attempt", "begin"):
+                tape = _core.Tape()
+                traced = getattr(Tracer(system, tape, force), what)(method, backward=backward)
+                assert_one_graph(tape, tape.trace(engine.model(plan), what), traced)
+
+
+@pytest.mark.parametrize("fused", [False, True])
+@pytest.mark.parametrize("method", ABLE)
+def test_adaptive_steps_equal_the_reference(method: str, fused: bool) -> None:
+    """Under a force of each member, forward and backward, in pieces and in one."""
+    for name in ("free", "pendulum, damped", "three bodies", "own: Duffing", "linear, masses"):
+        system, v, y, force = forced(name, 9)
+        if not fits(system, sw.method(method)):
+            continue
+        for at in (np.array([0.1, 0.25, 0.4]), np.array([-0.1, -0.25, -0.4])):
+            ask: dict[str, Any] = {"tolerance": 1e-5, "fused": fused, "max_steps": 200}
+            one, other = (
+                sw.integrate(system, method, v=v, y=y, at=at, force=force, backend=backend, **ask)
+                for backend in ("rust", "numpy")
+            )
+            equal(one, other)
+            first = sw.integrate(system, method, v=v, y=y, at=at[:1], force=force, **ask)
+            rest = sw.integrate(system, method, at=at[1:], max_steps=200, **first.resume)
+            np.testing.assert_array_equal(rest.y, one.y[1:])
+            alone = (
+                sw.integrate(system, method, v=v[..., 4], y=y[..., 4], at=at, force=force[..., 4], **ask)
+                if not system.batch
+                else None
+            )
+            if alone is not None:
+                np.testing.assert_array_equal(alone.y, one.y[..., 4])
+
+
+@pytest.mark.parametrize("control", [None, sw.EnergyControl(0.3), sw.Projection(), sw.Projection("nacozy")], ids=repr)
+@pytest.mark.parametrize("bodies", [3, 30, 60])
+def test_adaptive_steps_under_control(bodies: int, control: Any) -> None:
+    """The push, the projection and the force: on one tape, and over rows by a kernel written by hand."""
+    rng = np.random.default_rng(5)
+    system = sw.NBody(np.full(bodies, 1.0), softening=0.2)
+    v, y, force = (rng.normal(size=(bodies, 2, 2)) for _ in range(3))
+    ask: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-4, "at": [0.02, 0.05], "force": force, "control": control}
+    one, other = (sw.integrate(system, "merson", backend=backend, **ask) for backend in ("rust", "numpy"))
+    equal(one, other)
+    if control is not None:
+        np.testing.assert_array_equal(one.work, other.work)
+
+
+@pytest.mark.parametrize("method", ["dop853", "merson"])
+@pytest.mark.parametrize(
+    "system",
+    [
+        sw.Chain(3000),
+        sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80),
+        SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().for_state_shapes(None, np.zeros((300, 3))),  # type: ignore[attr-defined]
+    ],
+    ids=repr,
+)
+def test_adaptive_steps_of_large_systems(system: sw.System, method: str) -> None:
+    """By kernels written by hand and by tapes of the rates, forward and backward."""
+    rng = np.random.default_rng(2)
+    system = system.for_state_shapes(np.zeros(system.v_shape or 1), np.zeros(system.y_shape)) if system.v_shape else system
+    v, y, force = (rng.normal(size=shape) for shape in (system.v_shape, system.y_shape, system.v_shape))
+    for end in (0.02, -0.02):
+        ask: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-3, "at": [end], "force": force}
+        equal(*(sw.integrate(system, method, backend=backend, **ask) for backend in ("rust", "numpy")))
+
+
+@pytest.mark.parametrize("side", [3, 30])
+def test_adaptive_steps_of_fixed_particles(side: int) -> None:
+    """Fixed particles feel no force, in either direction of time, on a tape and over rows."""
+    place = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), axis=-1).reshape(-1, 2) / side
+    number = np.arange(side * side).reshape(side, side)
+    pairs = np.concatenate(
+        [np.stack([number[1:], number[:-1]], -1).reshape(-1, 2), np.stack([number[:, 1:], number[:, :-1]], -1).reshape(-1, 2)]
+    )
+    net = sw.Springs(pairs, stiffness=50.0, rest=1.0 / side, fixed=[0, side - 1])
+    for end in (0.05, -0.05):
+        ask: dict[str, Any] = {"v": 0.0, "y": place, "tolerance": 1e-4, "at": [end], "force": np.ones_like(place)}
+        one, other = (sw.integrate(net, "merson", backend=backend, **ask) for backend in ("rust", "numpy"))
+        equal(one, other)
+        np.testing.assert_array_equal(one.y[-1][[0, side - 1]], place[[0, side - 1]])
+
+
+@pytest.mark.parametrize("method", ABLE)
+def test_adaptive_steps_are_as_right_as_without(method: str) -> None:
+    """ÿ = −y + f is the free oscillator about y = f, of which the tolerance counts the size; forward and backward."""
+    force, y = np.linspace(-1.0, 1.0, 7), np.linspace(1.5, 2.0, 7)
+    for end in (7.0, -7.0):
+        run = sw.integrate(sw.Oscillator(), method, v=0.0, y=y, tolerance=1e-9, at=[end], force=force)
+        assert np.abs(run.y[-1] - force - (y - force) * np.cos(end)).max() < 1e-7
+        assert np.abs(run.v[-1] + (y - force) * np.sin(end)).max() < 1e-7
+
+
+def test_another_force_begins_anew() -> None:
+    """The step that is held was made under the force of before, so a run with another one begins at the saved state."""
+    ask: dict[str, Any] = {"tolerance": 1e-6, "max_steps": 100}
+    first = sw.integrate(sw.Pendulum(), "dop853", v=0.0, y=1.0, at=[1.0], force=0.5, **ask)
+    assert first.resume["force"] == 0.5
+    on = sw.integrate(sw.Pendulum(), "dop853", at=[2.0], **first.resume | {"force": -0.5})
+    anew = sw.integrate(sw.Pendulum(), "dop853", v=first.v[-1], y=first.y[-1], t0=1.0, at=[2.0], force=-0.5, **ask)
+    assert abs(on.y[-1] - anew.y[-1]) < 1e-6
+    assert abs(on.y[-1] - sw.integrate(sw.Pendulum(), "dop853", at=[2.0], **first.resume).y[-1]) > 0.1
+
+
+@pytest.mark.parametrize("method", ABLE)
+def test_events_of_adaptive_steps_under_a_force(method: str) -> None:
+    """A throw, ÿ = f: it is back at 0 at t = −2v/f; the change is located in the run's own steps, alike by both backends."""
+    event = sw.Event(lambda t, v, y: y, name="back", direction=-1, terminal=True)
+    force = np.array([-1.0, -2.0, -4.0])
+    ask: dict[str, Any] = {"v": 3.0, "y": 0.0, "tolerance": 1e-9, "at": [10.0], "force": force, "events": event}
+    one, other = (
+        sw.integrate(sw.Oscillator(0.0, form="physical"), method, backend=backend, **ask) for backend in ("rust", "numpy")
+    )
+    equal(one, other)
+    np.testing.assert_allclose(one.stopped_at, -6.0 / force, rtol=1e-9)
+
+
+def test_a_force_changes_the_energy_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
+    sw.integrate(
+        sw.NBody([1.0, 1e-3], force="newton"),
+        "merson",
+        v=[[0.0, 0.0], [0.0, 1.0]],
+        y=[[0.0, 0.0], [1.0, 0.0]],
+        tolerance=1e-6,
+        at=[20.0],
+        force=[[0.0, 0.0], [3.0, 0.0]],
+    )
+    assert not recwarn.list
+
+
+def test_a_sweep_over_forces_with_a_tolerance() -> None:
+    pytest.importorskip("xarray")
+    force = np.linspace(-1.0, 1.0, 5)
+    found = sw.sweep(sw.Pendulum(), {"force": force}, "merson", v=0.0, y=1.0, tolerance=1e-6, at=[0.5, 1.0])
+    run = sw.integrate(sw.Pendulum(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[0.5, 1.0], force=force)
+    np.testing.assert_array_equal(found.y, run.y[-1])
 
 
 @pytest.mark.parametrize("side", [4, 40])

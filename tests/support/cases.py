@@ -373,4 +373,4 @@ def has_branches(system: Any) -> bool:
     tracer = Tracer(system, tape)
     v, y, _ = tracer.state()
     one = tape.number(1.0)
-    return bool(expanded(tracer.of_unit_step(), 2, tape.time(), (one, one), v, y)[1])
+    return bool(expanded(tracer.attempted().unit, 2, tape.time(), (one, one), v, y)[1])

@@ -14,6 +14,7 @@ import numpy as np
 from ..base.arrays import Array, Scaled, Whole
 from . import tableau
 from .acceptance import Acceptance
+from .around import Forced
 from .bits import and_bits, at_most, less, where
 from .tableau import Increments, Weights
 
@@ -247,6 +248,7 @@ class Stretched:
 
     def __init__(self, s: Scaled, h: Array) -> None:
         self.s, self.h = s, h
+        self.fixed = getattr(s, "fixed", ())
 
     def dv(self, t: Array, v: Array, y: Array) -> Array:
         """h·v̇."""
@@ -263,19 +265,29 @@ class Stretched:
 
 
 class Attempted:
-    """How an attempt uses a system: its rates for a step, pushed by a control, and the projection of the state after it.
+    """How an attempt uses a system: its rates for a step under control and force, and the projection of the state after it.
 
     ``s`` is the system scaled to a step of 1. A control, which has ``pushes``, needs the step; a projection does not.
+
+    Attributes:
+        unit: the rates for a step of 1, under the force and without control.
     """
 
-    def __init__(self, s: Any, control: Any = None) -> None:
+    def __init__(self, s: Any, control: Any = None, force: Any = None) -> None:
         self.s, self.push = s, control if control is not None and control.pushes else None
         self.projected = s if control is None or control.pushes else control.around(s, 1.0)
+        self.force = force
+        self.unit = self._forced(s, 1.0)
 
     def rates(self, step: Any) -> Any:
         """The rates for a step, which may be another for each member."""
         stretched = self.s.stretched(step) if hasattr(self.s, "stretched") else Stretched(self.s, step)
-        return stretched if self.push is None else self.push.around(stretched, step)
+        return self._forced(stretched if self.push is None else self.push.around(stretched, step), step)
+
+    def _forced(self, rates: Any, step: Any) -> Any:
+        if self.force is None:
+            return rates
+        return Forced(rates, -step if isinstance(self.s, Backward) else step, self.force)
 
     def project(self, v: Array, y: Array) -> tuple[Array, Array, Any]:
         """The state after the step, and the energy that this added; None without a projection."""
@@ -297,6 +309,7 @@ class Backward:
             self.stretched = lambda h: Backward(s.stretched(-h))
         if hasattr(s, "project"):
             self.project = s.project
+        self.fixed = getattr(s, "fixed", ())
 
     def dv(self, t: Any, v: Array, y: Array) -> Any:
         """−h·v̇."""

@@ -77,7 +77,7 @@ def attempt(
     """One step, or one extra step, which leaves the pace as it is."""
     outlook, groups = pace.outlook(budget), acceptance.groups
     unit = unit_of(pace.before)
-    terms, branches = expanded(system.s, order, pace.t, (unit, unit), v, y)
+    terms, branches = expanded(system.unit, order, pace.t, (unit, unit), v, y)
     far, moved, allowed = reach(order, pace, unit, block_axes, acceptance, v, y, terms)
     bound = pace.wall - pace.t
     ends = less(bound, far)
@@ -88,7 +88,7 @@ def attempt(
     new = sizes(v1, y1, block_axes, groups)
     slope_v, slope_y = (value(terms[0][i], [(k + 1.0) * term[i] for k, term in enumerate(terms[1:], 1)], share) for i in range(2))
     end = pace.t + length
-    rate_v, rate_y = system.s.dv(end, v1, y1), system.s.dy(end, v1, y1)
+    rate_v, rate_y = system.unit.dv(end, v1, y1), system.unit.dy(end, v1, y1)
     defect = sizes(slope_v - unit * rate_v, slope_y - unit * rate_y, block_axes, groups)
     # Rates that change in a step by their own size change by this in some roundings of the time.
     rounded = sizes(slope_v, slope_y, block_axes, groups) * (TIME_ROUNDING * longer(end, -end) * (1.0 / unit))

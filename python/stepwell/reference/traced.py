@@ -86,12 +86,14 @@ class Tracer:
         surfaces = {name: self.symbols(value, batch) for name, value in self.system.given_contacts(batch).items()}
         s, control = contact.around(self.system.reference(h, **given), h, surfaces), self._control()
         s = s if control is None else control.around(s, h)
-        stick_friction, force = self.system.stick_friction, self.force
+        stick_friction = self.system.stick_friction
         if stick_friction is not None:
             stick_friction = self.symbols(stick_friction, stick_friction.shape)
-        if force is not None:
-            force = self.symbols(force, force.shape[len(self.system.v_shape) :])
-        return surrounded(s, h, force, stick_friction)
+        return surrounded(s, h, self._force(), stick_friction)
+
+    def _force(self) -> Any:
+        """The force from outside with symbols for its numbers, which come last; None without one."""
+        return None if self.force is None else self.symbols(self.force, self.force.shape[len(self.system.v_shape) :])
 
     def _control(self) -> Any:
         """The control with symbols for its numbers, which come behind those of the system; None without one."""
@@ -118,16 +120,11 @@ class Tracer:
         with over(of_slot(t, h)):
             return self.flat(getattr(method.steps, which)(s, choice, t, v, y), y)
 
-    def of_unit_step(self, *, backward: bool = False) -> Any:
-        """The system scaled to a step of 1, or of −1 where its time runs backward; without control."""
-        given = {name: self.symbols(value, self.system.batch) for name, value in self.system.given(self.system.batch).items()}
-        if backward:
-            return adaptive.Backward(self.system.reference(-1.0, **given))
-        return self.system.reference(1.0, **given)
-
     def attempted(self, *, backward: bool = False) -> adaptive.Attempted:
         """How an attempt at an adaptive step uses the system."""
-        return adaptive.Attempted(self.of_unit_step(backward=backward), self._control())
+        given = {name: self.symbols(value, self.system.batch) for name, value in self.system.given(self.system.batch).items()}
+        s = adaptive.Backward(self.system.reference(-1.0, **given)) if backward else self.system.reference(1.0, **given)
+        return adaptive.Attempted(s, self._control(), self._force())
 
     def pace(self, acceptance: Acceptance, more: Iterator[Any]) -> adaptive.Pace:
         """The pace as a part of the state."""
@@ -152,11 +149,11 @@ class Tracer:
 
     def begin(self, method: Any, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state, and the pace at the start of a run with a tolerance."""
-        system = self.of_unit_step(backward=backward)
+        system = self.attempted(backward=backward)
         v, y, more = self.state()
         pace = self.pace(acceptance, more)
         axes = len(self.system.v_shape), len(self.system.y_shape)
-        begun = adaptive.begin(system, pace, v, y, axes, acceptance.groups, series=method.has_series)
+        begun = adaptive.begin(system.unit, pace, v, y, axes, acceptance.groups, series=method.has_series)
         return self.flat(v, y, *begun.numbers)
 
     def record(self, names: Sequence[str]) -> list[Any]:

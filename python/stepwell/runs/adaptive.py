@@ -14,7 +14,7 @@ from ..base import checks
 from ..base.arrays import Array, Shape, Whole
 from ..base.reprs import of_member, share
 from ..errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning, UnsupportedError
-from ..model.compatibility import goes_with_series, not_of_a_step
+from ..model.compatibility import forced, goes_with_series, not_of_a_step
 from ..model.controls import a_control
 from ..model.methods import Method
 from ..model.methods import methods as every_method
@@ -69,6 +69,7 @@ def adaptive_run(
     t0: Any,
     continued_from: tuple[Any, Any, Any] | None,
     control: Any,
+    force: Any,
     fused: bool,
     threads: int | None,
     backend: str,
@@ -126,6 +127,10 @@ def adaptive_run(
         batches["jumps"] = jumps.shape[1:]
     if control is not None:
         batches |= {"control": control.batch}
+    if force is not None:
+        forced(system)
+        force = checks.block("force", force, system.v_shape, system.axes)
+        batches["force"] = force.shape[len(system.v_shape) :]
     tolerances = None
     if carry is None:
         tolerances = _tolerances(options.tolerance, system, acceptance, checks.batch_shape(batches))
@@ -166,7 +171,7 @@ def adaptive_run(
         begin: Any = sign * t0 if t0.ndim else float(sign * t0)
         plan = engine.Plan(
             system, how, batch, 1.0, begin, threads=workers, backend=backend, progress=told, fused=fused, order=order,
-            acceptance=acceptance, backward=backward,
+            acceptance=acceptance, backward=backward, force=None if force is None else spread(force, system.v_shape, batch),
         )  # fmt: skip
         at = np.ascontiguousarray(sign * times)
         pacing = engine.Pacing(at, budget, carry is None, None if jumps is None else np.sort(sign * jumps, axis=0))
@@ -209,6 +214,7 @@ def adaptive_run(
             {name: each for name, each in given_again.items() if each is not None},
         ),
         fused=fused,
+        force=plan.force,
         work=None if system.control is None else out.paces[engine.WORK] / engine.pushes(system.control, how.attempt_evaluations),
     )
     for name in record:

@@ -26,8 +26,11 @@ if TYPE_CHECKING:
 LENGTH = 64
 
 
-def identity(system: System, batch: Shape, v: Array, y: Array) -> str:
-    """By what a system, with its control, and a state of a batch are known: equal only if all of their bits are."""
+def identity(system: System, batch: Shape, v: Array, y: Array, force: Array | None = None) -> str:
+    """By what a system, with its control, and a state of a batch are known: equal only if all of their bits are.
+
+    With adaptive steps the ``force`` counts, too: the step that is held was made under it.
+    """
     import hashlib  # only runs that go on need it
 
     found = hashlib.sha256(f"{system.kernel} {batch}".encode())
@@ -38,6 +41,8 @@ def identity(system: System, batch: Shape, v: Array, y: Array) -> str:
     for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))):
         whole = np.broadcast_to(block, (*np.shape(block)[:axes], *batch))
         found.update(np.ascontiguousarray(whole, dtype=np.float64).data)
+    if force is not None:
+        found.update(np.ascontiguousarray(force, dtype=np.float64).data)
     return found.hexdigest()
 
 
@@ -82,7 +87,10 @@ def with_tolerance(run: Run) -> dict[str, Any]:
     state: dict[str, Any] = {"v": v, "y": y, "t0": run.t0}
     if run.system.keeper is not None:
         state["control"] = run.system.keeper
-    return state | at.options | {"carry": carry, "carried_by": at.method, "carried_for": identity(run.system, batch, v, y)}
+    if run.force is not None:
+        state["force"] = run.force
+    carried_for = identity(run.system, batch, v, y, run.force)
+    return state | at.options | {"carry": carry, "carried_by": at.method, "carried_for": carried_for}
 
 
 def taken_up(
@@ -94,7 +102,7 @@ def taken_up(
     pace[engine.WORK] = 0.0  # no control has done anything yet in this run
     # A run that saved its start alone did not know of a time of the run, of which the first step from rest may be a part.
     begins = not pace[engine.COUNTS].any() and not pace[engine.HELD].any() and bool((pace[engine.STEP] == engine.BLIND).any())
-    if begins or carried_for != identity(plan.system, plan.batch, v, y):
+    if begins or carried_for != identity(plan.system, plan.batch, v, y, plan.force):
         return _begun_anew(plan, pacing, pace), v, y, True
     return pace, state[:n_v].reshape(v.shape), state[n_v:].reshape(y.shape), False
 

@@ -114,7 +114,8 @@ def integrate(
         control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant, or another control or projection; with a
             tolerance, too, where a projection acts on accepted steps. Verlet and leapfrog go without.
         force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force
-            per mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all. In a ``World`` it may change.
+            per mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all. With fixed and adaptive steps;
+            in a ``World`` it may change.
         record: quantities to record of every saved state, ``run.recorded``: "energy", and those that the system names in its
             ``quantities``; nothing if None. Bodies compute their energy together with the force of the next step, at little cost.
         events: quantities of a state whose changes of sign are located to the accuracy of the method, ``run.events``: a function
@@ -197,7 +198,6 @@ def integrate(
             "start": start,
             "first_bad_step": first_bad_step,
             "dt_before": dt_before,
-            "force": force,
         }
         if not isinstance(form, str) or form != "direct":
             fixed["form"] = form
@@ -209,7 +209,7 @@ def integrate(
         asked = None if events is None else _asked(events, "direct")
         options = AdaptiveOptions(tolerance, at, max_steps, max_step, jumps, positive)
         run, begun, visited = adaptive_run(
-            system, how, v, y, dt, options, record, t0, went, control, fused, threads, backend, progress, asked
+            system, how, v, y, dt, options, record, t0, went, control, force, fused, threads, backend, progress, asked
         )
         warn_of_nonsense(run, begun if _is_one_motion(asked) else None, visited)
         return run

@@ -12,6 +12,7 @@ from ..base.arrays import Array, Shape
 from ..base.reprs import counted, first_of, share
 from ..errors import ToleranceWarning
 from ..model.systems import System
+from ..reference.around import surrounded
 from . import engine
 from .positive import name_of, places_of
 from .result import Run, Status
@@ -99,7 +100,7 @@ def _of_rates_beyond(run: Run, index: Shape) -> str:
     assert run.controller_state is not None
     t, (v, y) = run.paces.t, (run.controller_state.v, run.controller_state.y)
     ahead = BEYOND * np.where(run.paces.h < 0.0, -1.0, 1.0) * np.spacing(np.abs(t))
-    dv, dy = rates_of(run.system, run.status.shape, t, (v, y))
+    dv, dy = rates_of(run.system, run.status.shape, t, (v, y), run.force)
     return _not_finite(rates_of(run.system, run.status.shape, t + ahead, (v + ahead * dv, y + ahead * dy)), index)
 
 
@@ -107,7 +108,8 @@ def _rates_there(run: Run) -> State:
     """v̇ and ẏ where members stopped."""
     assert run.paces is not None
     assert run.controller_state is not None
-    return rates_of(run.system, run.status.shape, run.paces.t, (run.controller_state.v, run.controller_state.y))
+    state = run.controller_state.v, run.controller_state.y
+    return rates_of(run.system, run.status.shape, run.paces.t, state, run.force)
 
 
 def _of_rates_there(run: Run, index: Shape) -> str:
@@ -170,10 +172,10 @@ def _component(block: str, index: Shape) -> str:
     return f"{block}[{', '.join(map(str, index))}]" if index else block
 
 
-def rates_of(system: System, batch: Shape, t: Any, state: State) -> State:
+def rates_of(system: System, batch: Shape, t: Any, state: State, force: Array | None = None) -> State:
     """v̇ and ẏ of states of all members, each at its own time."""
     v, y = state
     with np.errstate(all="ignore"):
-        alone = system.reference_at_step(1.0, batch)
+        alone = surrounded(system.reference_at_step(1.0, batch), 1.0, force, None)
         dv, dy = alone.dv(t, v, y), alone.dy(t, v, y)
     return np.broadcast_to(dv, v.shape), np.broadcast_to(dy, y.shape)

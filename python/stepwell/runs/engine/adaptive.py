@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ... import _core
-from ...base.arrays import Array, Shape, Whole
+from ...base.arrays import Array, Whole
 from ...model.methods import Method
 from ...model.systems import System
 from ...model.systems.base import rows
@@ -17,7 +17,7 @@ from .by_tape import blocks_of, evaluated, rows_of
 from .plan import Plan, model
 
 if TYPE_CHECKING:
-    from ...reference.adaptive import Jumps, Pace
+    from ...reference.adaptive import Attempted, Jumps, Pace
 
 #: How many numbers a ``Pace`` has that are not of each group of components; behind them are those of the groups.
 PACE_NUMBERS = 20
@@ -177,8 +177,8 @@ def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
     """The step-size controllers at the first step, computed by the reference from their state before it."""
     from ...reference import adaptive
 
-    system, pace = of_unit_step(plan, plan.batch), pace_of(plan, paces)
-    return adaptive.begin(system, pace, v, y, plan.block_axes, plan.acceptance.groups, series=plan.method.has_series)
+    system, pace = attempted_system(plan), pace_of(plan, paces)
+    return adaptive.begin(system.unit, pace, v, y, plan.block_axes, plan.acceptance.groups, series=plan.method.has_series)
 
 
 def begun_again(plan: Plan, numbers: Array, t: Array, v: Array, y: Array) -> Array:
@@ -191,15 +191,12 @@ def begun_again(plan: Plan, numbers: Array, t: Array, v: Array, y: Array) -> Arr
     return numbers_of(begun(plan, numbers_of(anew), v, y))
 
 
-def of_unit_step(plan: Plan, batch: Shape) -> Any:
-    """The NumPy reference of the system, scaled to a step of 1, or of −1 where its time runs backward."""
+def attempted_system(plan: Plan) -> Attempted:
+    """How an attempt uses the NumPy reference of the system, scaled to a step of 1, or of −1 where its time runs backward."""
     from ...reference import adaptive
 
-    return (
-        adaptive.Backward(plan.system.reference_at_step(-1.0, batch))
-        if plan.backward
-        else plan.system.reference_at_step(1.0, batch)
-    )
+    s = plan.system.reference_at_step(-1.0 if plan.backward else 1.0, plan.batch)
+    return adaptive.Attempted(adaptive.Backward(s) if plan.backward else s, plan.system.control, plan.force)
 
 
 def pace_of(plan: Plan, numbers: Array) -> Pace:
@@ -256,11 +253,9 @@ def evaluated_attempt(plan: Plan, budget: int) -> Any:
 
 def attempt_by_numpy(plan: Plan, budget: int) -> Any:
     """The same, by the tape if it has to be."""
-    from ...reference import adaptive
-
     if plan.by_tape:
         return evaluated_attempt(plan, budget)
-    return attempts(plan, adaptive.Attempted(of_unit_step(plan, plan.batch), plan.system.control))
+    return attempts(plan, attempted_system(plan))
 
 
 def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:

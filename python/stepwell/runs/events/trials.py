@@ -161,15 +161,14 @@ class AdaptiveTrials(Trials):
         self._is_traced = self._is_traced and not self._always_traced
 
     def _scaled(self, plan: engine.Plan, h: Any) -> Any:
-        return Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control).rates(h)
+        return engine.attempted_system(plan).rates(h)
 
     def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
         return tracer.attempted(backward=self._plan.backward).rates(h)
 
     def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-        system = Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control)
         with np.errstate(all="ignore"):
-            v, y = within(plan, system, t, h, v, y)
+            v, y = within(plan, engine.attempted_system(plan), t, h, v, y)
         return np.asarray(v), np.asarray(y)
 
     def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
@@ -201,7 +200,7 @@ def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any)
     steps: Any = plan.method.steps
     if plan.method.has_series:
         unit = longer(series_pace.unit_of(h), LEAST_UNIT)
-        terms, share = expanded(system.s, plan.order or steps.ORDER, t, (unit, unit), v, y)[0], h * (1.0 / unit)
+        terms, share = expanded(system.unit, plan.order or steps.ORDER, t, (unit, unit), v, y)[0], h * (1.0 / unit)
         v, y = (series_pace.value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
     else:
         v, y = tableau.plus(v, y, steps.WEIGHTS, steps.stages(system.rates(h), t, h, v, y))

@@ -90,8 +90,6 @@ def arguments(
         raise ArgumentError(
             "axes: dt: with a tolerance, dt is the step to try first and nothing else; leave it out, or give one for all by dt="
         )
-    if "force" in varied:
-        raise ArgumentError("axes: force: goes with fixed steps only, and tolerance= or at= was given")
     if "tolerance" in varied:
         axis = varied["tolerance"]
         if axis.own:

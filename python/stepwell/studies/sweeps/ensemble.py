@@ -190,7 +190,7 @@ def sweep(
         given["events"], kept_of_each = list(located), (*kept_of_each, happenings.Happenings(located))
     times = None
     if paced:
-        others = {"steps": steps, "transient": transient, "every": every, "observe": observe, "start": start, "force": force}
+        others = {"steps": steps, "transient": transient, "every": every, "observe": observe, "start": start}
         options = {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive}
         more, times = adaptive.arguments(grid, how, tolerance, at, options, others, kept_of_each)
         given |= more

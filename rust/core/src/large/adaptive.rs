@@ -105,10 +105,10 @@ impl AdaptiveBatch for LargeAdaptive {
             if !outlook.runs && !outlook.is_extra {
                 break;
             }
-            rates.set_step(outlook.step);
-            rates.tally_mut().fill(0.0);
             // Rates that run backward are those of a step of −1.
             let (t, step) = if self.backward { (-self.pace.t, -outlook.step) } else { (self.pace.t, outlook.step) };
+            rates.set_step(step);
+            rates.tally_mut().fill(0.0);
             self.executor.run(&schedules.step, rates.as_mut(), *sizes, t, step, arena);
             // Results come in pairs: of velocities, of coordinates.
             let block = |i: usize, row: usize| &arena[row * *stride..][..sizes[i % 2]];

@@ -15,7 +15,8 @@ pub(crate) fn wrap(rates: Box<dyn Rates>, asked: &RatesRequest) -> Box<dyn Rates
         return rates;
     }
     let fixed = fixed(asked.signature, asked.shape.v);
-    Box::new(ForcedRates { rates, h: asked.h, push: vec![-0.0; asked.shape.v], fixed })
+    let attempts = asked.attempts.then(|| Attempts { force: vec![0.0; asked.shape.v], stretch: !rates.traits().stretched });
+    Box::new(ForcedRates { rates, h: asked.h, push: vec![-0.0; asked.shape.v], fixed, attempts })
 }
 
 struct ForcedRates {
@@ -24,6 +25,14 @@ struct ForcedRates {
     /// h times the force; −0 on what is fixed, which changes no sum.
     push: Vec<f64>,
     fixed: Vec<bool>,
+    attempts: Option<Attempts>,
+}
+
+/// Of attempts at adaptive steps, each of which has another h.
+struct Attempts {
+    force: Vec<f64>,
+    /// Whether the rates of v are still to be multiplied by h.
+    stretch: bool,
 }
 
 impl ForcedRates {
@@ -37,6 +46,9 @@ impl ForcedRates {
     }
 
     fn add(&self, dv: &mut [f64]) {
+        if self.attempts.as_ref().is_some_and(|attempts| attempts.stretch) {
+            dv.iter_mut().for_each(|dv| *dv *= self.h);
+        }
         dv.iter_mut().zip(&self.push).for_each(|(dv, push)| *dv += push);
     }
 }
@@ -51,12 +63,28 @@ impl Rates for ForcedRates {
     }
 
     fn traits(&self) -> RateTraits {
-        self.rates.traits()
+        let traits = self.rates.traits();
+        RateTraits { stretched: traits.stretched || self.attempts.is_some(), ..traits }
+    }
+
+    fn set_step(&mut self, step: f64) {
+        self.rates.set_step(step);
+        self.h = step;
+        if let Some(attempts) = &self.attempts {
+            for ((push, force), fixed) in self.push.iter_mut().zip(&attempts.force).zip(&self.fixed) {
+                if !fixed {
+                    *push = step * force;
+                }
+            }
+        }
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
         let place = spec.signature.place(NAME).unwrap_or(0);
-        self.set(|i| spec.rows[place + i].at(first));
+        match &mut self.attempts {
+            Some(attempts) => attempts.force.iter_mut().enumerate().for_each(|(i, to)| *to = spec.rows[place + i].at(first)),
+            None => self.set(|i| spec.rows[place + i].at(first)),
+        }
         self.rates.prepare(spec, first, count);
     }
 

@@ -17,7 +17,7 @@ mod chain;
 mod contact;
 mod control;
 pub(crate) mod executor;
-mod force;
+pub(crate) mod force;
 pub mod group;
 pub mod hand_written;
 mod inputs;

@@ -44,7 +44,11 @@ pub trait Rates: Send + Sync {
     fn traits(&self) -> RateTraits;
 
     /// The step of the attempt that comes, for rates that depend on it.
-    fn set_step(&mut self, _step: f64) {}
+    fn set_step(&mut self, step: f64) {
+        if let Some(inner) = self.inner_mut() {
+            inner.set_step(step);
+        }
+    }
 
     /// The window over which samples of inputs are averaged in what comes; at any other time they are looked up at that time.
     fn set_window(&mut self, window: Option<Window<f64>>) {

@@ -15,7 +15,13 @@ use crate::{
         window::{self, Window},
     },
     stage::{Clock, Force, PreparedStage, Stage},
-    step::{block, cache::Cache, ids, key::TapeKey, parameters},
+    step::{
+        block,
+        cache::Cache,
+        ids,
+        key::{StepKind, TapeKey},
+        parameters,
+    },
     tape::{
         Id, Op, Tape,
         number::{Symbol, record},
@@ -25,11 +31,16 @@ use crate::{
 
 static CACHE: LazyLock<Cache<CacheKey, RateTapes>> = LazyLock::new(Cache::default);
 
-/// The system, and its recorded quantities.
-type CacheKey = (Arc<Signature>, Vec<String>);
+/// The system, its recorded quantities, and whether the force from outside is left out.
+type CacheKey = (Arc<Signature>, Vec<String>, bool);
 
 fn cache_key(key: &TapeKey) -> CacheKey {
-    (key.signature.clone(), key.record.clone())
+    (key.signature.clone(), key.record.clone(), is_unforced(key))
+}
+
+/// Whether rates leave out the force from outside: attempts at adaptive steps add h times it to rates that are stretched to h.
+fn is_unforced(key: &TapeKey) -> bool {
+    matches!(key.how, StepKind::Attempts { .. })
 }
 
 /// The rates of a system, traced. Their state is v, y, a block for the result, and a number for the tally.
@@ -56,18 +67,18 @@ fn behind(shape: Shape) -> usize {
     before(shape) + shape.v.max(shape.y)
 }
 
+/// A function of the system, v and y: a block or none, v and y.
+type Made<'a> =
+    &'a dyn Fn(&dyn System<Symbol>, Block<Symbol>, Block<Symbol>) -> (Option<Block<Symbol>>, Block<Symbol>, Block<Symbol>);
+
 /// Traces a function of the system, v and y. Its results are a block or none, v and y.
-fn rate(
-    kind: &Kind,
-    signature: &Signature,
-    shape: Shape,
-    make: impl FnOnce(&dyn System<Symbol>, Block<Symbol>, Block<Symbol>) -> (Option<Block<Symbol>>, Block<Symbol>, Block<Symbol>),
-) -> (Tape, Vec<Id>) {
+fn rate(kind: &Kind, signature: &Signature, shape: Shape, unforced: bool, make: Made) -> (Tape, Vec<Id>) {
     record(Tape::default(), || {
         let state = |i: usize| Symbol::new(Op::State(i as u32));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(signature, Symbol::new(Op::Step));
-        let s = around::wrap(&p, (kind.make)(&p), state(behind(shape)));
+        let wrap = if unforced { around::wrap_below_force } else { around::wrap };
+        let s = wrap(&p, (kind.make)(&p), state(behind(shape)));
         let seen = || WINDOW_ENDS.map(|end| Symbol::new(Op::Param(end)));
         let (made, v, y) = window::over(signature, seen, || make(s.as_ref(), v, y));
         let mut next = ids([&v, &y]);
@@ -92,20 +103,21 @@ fn is_v_times_step(tape: &Tape, made: &[Id]) -> bool {
 
 impl RateTapes {
     /// Traces the rates of a system, and the quantities to record.
-    pub(crate) fn new(signature: &Signature, names: &[String]) -> Result<RateTapes, Error> {
+    fn new(key: &TapeKey) -> Result<RateTapes, Error> {
+        let (signature, names) = (key.signature.as_ref(), &key.record);
         let kind = kind(signature)?;
         let shape = (kind.shape)(signature)?;
+        let rate = |make: Made| rate(kind, signature, shape, is_unforced(key), make);
         let time = || Symbol::new(Op::Time);
         let stage = |traced: &(Tape, Vec<Id>)| Some(Stage::cut(signature, traced));
-        let dv = rate(kind, signature, shape, |s, v, y| (Some(s.dv(time(), &v, &y)), v, y));
-        let dy = rate(kind, signature, shape, |s, v, y| (Some(s.dy(time(), &v, &y)), v, y));
+        let dv = rate(&|s, v, y| (Some(s.dv(time(), &v, &y)), v, y));
+        let dy = rate(&|s, v, y| (Some(s.dy(time(), &v, &y)), v, y));
         let second_order = shape.v == shape.y && is_v_times_step(&dy.0, &dy.1[before(shape)..][..shape.y]);
         let needed = dv.0.needed(dv.1[before(shape)..].iter().copied());
         let reads = |what: &dyn Fn(Op) -> bool| needed.iter().zip(dv.0.ops()).any(|(needed, op)| *needed && what(*op));
         let reads_v = reads(&|op| matches!(op, Op::State(i) if (i as usize) < shape.v));
         let is_of_y = !reads_v && !reads(&|op| matches!(op, Op::Time | Op::Sample(..)));
-        let velocity =
-            (!second_order && shape.v == shape.y).then(|| rate(kind, signature, shape, |s, v, y| (Some(s.velocity(&y)), v, y)));
+        let velocity = (!second_order && shape.v == shape.y).then(|| rate(&|s, v, y| (Some(s.velocity(&y)), v, y)));
         // Where a tape that also computes h·v̇ costs hardly more than without, it does so, and the next step uses it.
         let work = |(tape, next): &(Tape, Vec<Id>)| tape.needed(next.iter().copied()).iter().filter(|needed| **needed).count();
         let with_rate = |trace: &dyn Fn(bool) -> (Tape, Vec<Id>)| {
@@ -114,7 +126,7 @@ impl RateTapes {
             (Stage::cut(signature, if is_cheap { &both } else { &alone }), is_cheap)
         };
         let project = |with_dv: bool| {
-            rate(kind, signature, shape, |s, v, y| {
+            rate(&|s, v, y| {
                 let (v, y) = s.project(v, y);
                 (with_dv.then(|| s.dv(time(), &v, &y)), v, y)
             })
@@ -148,7 +160,7 @@ impl RateTapes {
     /// Those of a key, found before or made now; all methods share them.
     pub fn of(key: &TapeKey) -> Result<Arc<RateTapes>, Error> {
         CACHE.find(&cache_key(key), || {
-            let tapes = RateTapes::new(&key.signature, &key.record)?;
+            let tapes = RateTapes::new(key)?;
             let size = tapes.size();
             Ok((tapes, size))
         })

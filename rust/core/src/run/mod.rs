@@ -15,6 +15,7 @@ use crate::{
     large::{
         adaptive::LargeAdaptive,
         blocks::Schedules,
+        force,
         group::LargeGroup,
         hand_written::{HandWrittenRates, kernel_of, single},
         matrix::Matrix,
@@ -162,7 +163,10 @@ impl Model<'_> {
                 (StepStrategy::HandWrittenRates(long), _) | (_, StepStrategy::HandWrittenRates(long)) => {
                     single(long, &self.asked(traced, machine, Clock::NONE.h))
                 }
-                _ => Box::new(TapeRates::new(RateTapes::of(&self.key)?, spec, level, 1, &Clock::NONE)),
+                _ => {
+                    let rates = Box::new(TapeRates::new(RateTapes::of(&self.key)?, spec, level, 1, &Clock::NONE));
+                    force::wrap(rates, &self.asked(traced, machine, Clock::NONE.h))
+                }
             },
         };
         let schedules = Schedules::of(&self.key.how, rates.traits(), traced.shape)?;

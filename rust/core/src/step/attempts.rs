@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     model::{
-        around::{self, controls},
+        around::{self, controls, force},
         program::Program,
         spec::Signature,
         system::{Block, Kind, Shape, System},
@@ -37,9 +37,20 @@ impl AttemptsOf<'_> {
         (self.kind.make)(&parameters(self.signature, h))
     }
 
+    /// Rates for a step, under the force from outside: h·v̇ + h·f.
+    fn forced(&self, h: Symbol, rates: Box<dyn System<Symbol>>) -> Box<dyn System<Symbol>> {
+        force::wrap(&parameters(self.signature, if self.backward { -h } else { h }), rates)
+    }
+
+    /// The rates for a step of 1.
+    fn of_unit_step(&self) -> Box<dyn System<Symbol>> {
+        self.forced(Symbol::of(1.0), self.scaled(Symbol::of(1.0)))
+    }
+
     /// The system scaled to a step of 1, under its projection if there is one.
     fn projected(&self) -> Box<dyn System<Symbol>> {
-        around::wrap(&parameters(self.signature, Symbol::of(1.0)), self.scaled(Symbol::of(1.0)), Symbol::of(0.0))
+        let p = parameters(self.signature, Symbol::of(1.0));
+        around::wrap_below_force(&p, self.scaled(Symbol::of(1.0)), Symbol::of(0.0))
     }
 
     fn state(&self) -> (Block<Symbol>, Block<Symbol>) {
@@ -66,14 +77,14 @@ impl AttemptsOf<'_> {
         let (signature, (v, y), (pace, scales)) = (self.signature, self.state(), self.pace());
         let rates = |step: Symbol| -> Box<dyn System<Symbol>> {
             if signature.equations.is_some() {
-                return self.scaled(step); // the push of their control depends on the step
+                return self.forced(step, self.scaled(step)); // the push of their control depends on the step
             }
             let stretched = Box::new(Stretched { s: self.scaled(Symbol::of(1.0)), h: step });
-            if controls::pushes(signature) {
-                around::wrap(&parameters(signature, step), stretched, Symbol::of(0.0))
-            } else {
-                stretched
-            }
+            let pushed = match controls::pushes(signature) {
+                true => around::wrap_below_force(&parameters(signature, step), stretched, Symbol::of(0.0)),
+                false => stretched,
+            };
+            self.forced(step, pushed)
         };
         let projected = if controls::pushes(signature) { self.scaled(Symbol::of(1.0)) } else { self.projected() };
         let system = Attempted { rates: &rates, projected: projected.as_ref() };
@@ -85,9 +96,10 @@ impl AttemptsOf<'_> {
     /// Steps by a series of that order, and its coefficients.
     pub(crate) fn series(&self, order: u32) -> (Vec<Id>, Vec<Id>) {
         let (v, y) = self.state();
-        let (terms, branches) = series_pace::terms(order, self.scaled(Symbol::of(1.0)).as_ref(), &self.pace().0, &v, &y);
+        let rates = self.of_unit_step();
+        let (terms, branches) = series_pace::terms(order, rates.as_ref(), &self.pace().0, &v, &y);
         let numbers = ids(terms.iter().flat_map(|(v, y)| [v, y]));
-        (self.attempt_by((&terms, &branches), Some(self.scaled(Symbol::of(1.0)).as_ref())), numbers)
+        (self.attempt_by((&terms, &branches), Some(rates.as_ref())), numbers)
     }
 
     /// One attempt by coefficients of a series.
@@ -103,7 +115,7 @@ impl AttemptsOf<'_> {
     /// Where a member stands at the start, without control.
     pub(crate) fn begin(&self, series: bool) -> Vec<Id> {
         let (v, y) = self.state();
-        let (pace, longest) = self.pace().0.begun(self.scaled(Symbol::of(1.0)).as_ref(), self.acceptance, series, &v, &y);
+        let (pace, longest) = self.pace().0.begun(self.of_unit_step().as_ref(), self.acceptance, series, &v, &y);
         self.next(&pace, &longest, &v, &y)
     }
 }

@@ -41,17 +41,23 @@ pub fn fit(kind: &Kind, signature: &Signature, method: &Record) -> Result<Shape,
 
 /// An error if something is given that goes with steps of fixed length only.
 pub(crate) fn only_fixed(signature: &Signature) -> Result<(), Error> {
-    let name = [force::NAME, friction::NAME].into_iter().find(|name| signature.count(name) > 0);
-    match name {
-        None => Ok(()),
-        Some(name) => Err(Error::Options { system: signature.system.clone(), options: format!("{name}, with adaptive steps") }),
+    match signature.count(friction::NAME) {
+        0 => Ok(()),
+        _ => {
+            Err(Error::Options { system: signature.system.clone(), options: format!("{}, with adaptive steps", friction::NAME) })
+        }
     }
 }
 
 /// A system with all that is given around it. The tally starts from this number: h times the energy that control or projection
 /// added.
 pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
-    friction::wrap(p, force::wrap(p, controls::wrap(p, contact::wrap(p, system), tally)))
+    friction::wrap(p, force::wrap(p, wrap_below_force(p, system, tally)))
+}
+
+/// A system with what is around it below the force from outside, which attempts add to rates that are stretched already.
+pub(crate) fn wrap_below_force<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
+    controls::wrap(p, contact::wrap(p, system), tally)
 }
 
 /// A system with surfaces and the force from outside: what a method's start and finish see.
