@@ -274,10 +274,15 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     if not _core.adapt(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
         before = numbers_of(begun(plan, paces, v, y)).reshape(numbers, members)
         _core.adapt(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
-    series = plan.method.has_series
-    each = _core.series_evaluations(spec, attempts=True) if series else plan.method.attempt_evaluations
+    each = _evaluations_of_attempt(plan)
     last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
     return Adapted(saved_v, saved_y, last_v, last_y, last_paces.reshape(numbers, *plan.batch), status, each)
+
+
+def _evaluations_of_attempt(plan: Plan) -> int:
+    if plan.method.has_series:
+        return _core.series_evaluations(model(plan._replace(t0=0.0)), attempts=True)
+    return plan.method.attempt_evaluations
 
 
 def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
@@ -288,5 +293,5 @@ def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array
     attempt, jumps = attempt_by_numpy(plan, pacing.budget), jumps_of(plan, pacing)
     series = plan.method.has_series
     out = adaptive.run(attempt, v, y, pace, at=pacing.at, budget=pacing.budget, jumps=jumps, series=series)
-    each = evaluations(plan.method, plan.system, order=plan.order, paced=True)
+    each = _evaluations_of_attempt(plan)
     return Adapted(out.v, out.y, out.last_v, out.last_y, numbers_of(out.pace), out.status, each)
