@@ -107,8 +107,8 @@ python-beside: .venv/test rust-build lint-python
 	$(PYTEST) --ignore=tests/test_adding.py --ignore=tests/test_interrupt.py; others=$$?; \
 	wait $$adding; added=$$?; cat .venv/adding.log; test $$others -eq 0 -a $$added -eq 0
 
-test-long: .venv/test ## run what `test` leaves out for its time: every family of tests in full
-	$(PYTEST) -m long --durations=20
+test-long: .venv/test ## run what `test` leaves out: every family of tests in full, and mistakes that the tests must notice
+	$(PYTEST) --long --durations=20
 	STEPWELL_EMULATED=12000 cargo test --release -p stepwell-core --test aarch64 --quiet
 
 # Each part is tried for a while, and says how often it was and what was found: docs/developing/reliability.md.

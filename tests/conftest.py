@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import gc
-
 import pytest
-from support.complete import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401  hooks
-from support.snapshots import _snapshots, pytest_addoption, pytest_deselected, snapshot  # noqa: F401  hooks, fixtures
 
-pytest_plugins = ["pytester"]
+pytest_plugins = ["pytester", "support.complete", "support.families", "support.snapshots"]
 
 #: Files that take longest, the longest first: with one of them last, one core would run it while the others wait.
 LONGEST = (
@@ -41,20 +37,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The longest files first, the others as they come; the order within a file stays."""
     place = {name: i for i, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path.name, len(place)))
-
-
-def pytest_sessionstart() -> None:
-    """The million objects of the tests themselves stay until the end, so that nothing is gained by looking through them.
-
-    A collection of garbage does so, which takes 0.4 s, and over a second beside a busy neighbour: longer than a call may take.
-    """
-    gc.disable()
-
-
-def pytest_collection_finish() -> None:
-    gc.collect()
-    gc.freeze()
-    gc.enable()
 
 
 @pytest.fixture(autouse=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from typing import Any
 
@@ -13,6 +14,7 @@ from stepwell.reference import series_pace
 from stepwell.runs import engine
 from stepwell.runs.result import Status
 from support.cases import ADAPTIVE, SYSTEMS, fits
+from support.families import family
 
 ABLE = [m.name for m in sw.methods() if m.error_order is not None]
 MEMBERS = 21
@@ -40,11 +42,7 @@ def same(a: sw.Run, b: sw.Run) -> None:
 
 @pytest.mark.parametrize(
     ("name", "method"),
-    [
-        pytest.param(name, method, marks=() if j == i % len(ABLE) else pytest.mark.long)
-        for i, name in enumerate(ADAPTIVE)
-        for j, method in enumerate(ABLE)
-    ],
+    family(itertools.product(ADAPTIVE, ABLE), lambda name, method: ABLE.index(method) == ADAPTIVE.index(name) % len(ABLE)),
 )
 def test_equals_the_reference(name: str, method: str) -> None:
     rng = np.random.default_rng(5)
@@ -70,7 +68,7 @@ def test_every_level_and_number_of_threads(monkeypatch: pytest.MonkeyPatch, leve
     system, state = kepler(np.linspace(0.0, 0.9, 300))
     ask: dict[str, Any] = {"tolerance": 1e-5, "at": [1.0, 2.0]} | state
     whole = sw.integrate(system, "merson", threads=1, **ask)
-    monkeypatch.setenv("STEPWELL_ISA", level)
+    monkeypatch.setenv("STEPWELL_KERNELS", level)
     same(whole, sw.integrate(system, "merson", threads=threads, **ask))
 
 

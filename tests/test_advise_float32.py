@@ -60,6 +60,7 @@ def test_the_advice_in_float32_is_true(name: str, tolerance: float, frame: float
         assert row.error != row.float64_error
 
 
+@pytest.mark.mutant
 @pytest.mark.usefixtures("unmeasured")
 def test_float64_in_the_place_of_float32_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A deliberately wrong search, whose runs in float32 are made in float64: its errors are not those of its rows."""

@@ -159,6 +159,7 @@ def mutant(old: str, new: str) -> Any:
     return made
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(("old", "new"), MUTANTS)
 def test_a_mistake_in_the_rates_is_noticed(old: str, new: str) -> None:
     wrong = mutant(old, new)
@@ -391,6 +392,7 @@ def test_a_control_keeps_the_length_near_one_and_a_projection_at_one() -> None:
     np.testing.assert_allclose(np.linalg.norm(run.y[-1], axis=0), 1.0, rtol=0, atol=1e-5)
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(
     ("old", "new"),
     [

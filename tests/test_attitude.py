@@ -49,6 +49,7 @@ def test_angles_matrices_and_quaternions_are_the_same_rotations() -> None:
     assert agrees(attitude)
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(
     ("old", "new"),
     [

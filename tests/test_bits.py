@@ -33,7 +33,7 @@ def test_equals_the_reference(case: Case) -> None:
 def test_does_not_depend_on_the_cpu_level(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     best = case.run(161)
     for level in sw.isa_levels():
-        monkeypatch.setenv("STEPWELL_ISA", level)
+        monkeypatch.setenv("STEPWELL_KERNELS", level)
         assert sw.isa() == level
         assert_same(case.run(161), best)
         assert_same(case.run(3), case.run(3, backend="numpy"))
@@ -106,7 +106,7 @@ def test_diverging_members_too(case: Case) -> None:
 def test_extremes_of_size(monkeypatch: pytest.MonkeyPatch) -> None:
     # Denormal numbers and huge ones: no level flushes to zero.
     for level in sw.isa_levels():
-        monkeypatch.setenv("STEPWELL_ISA", level)
+        monkeypatch.setenv("STEPWELL_KERNELS", level)
         for scale in (5e-324, 1e-308, 1e-160, 1e160, 1e300):
             arguments = {"v": scale * np.linspace(-1, 1, 50), "y": scale, "dt": 0.1, "steps": 50, "every": 1}
             rust = sw.integrate(sw.Oscillator(1.3, 0.1), "rk4", **arguments)

@@ -75,6 +75,7 @@ def test_what_was_found_stays_mended(case: dict[str, Any]) -> None:
     assert outcome.kind in case["kinds"], f"{fuzz.told(case['call'])}: {outcome}"
 
 
+@pytest.mark.mutant
 @timer
 @pytest.mark.usefixtures("_quiet")
 def test_the_oracle_notices_what_it_is_to_notice() -> None:
@@ -139,6 +140,7 @@ def test_memory_is_steady(kind: str) -> None:
     assert not memory.wrong(kind, before, after), f"after {count} runs"
 
 
+@pytest.mark.mutant
 @LINUX
 def test_a_leak_is_noticed() -> None:
     """Eight kilobytes a run, and a file that stays open."""

@@ -15,6 +15,8 @@ from stepwell.runs.engine import direct
 from support import contacts
 from support.contact_mutants import changed
 
+pytestmark = pytest.mark.mutant
+
 #: What stands there, and what a mistake would make of it.
 MISTAKES = [
     # where a point is

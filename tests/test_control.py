@@ -12,6 +12,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, UnknownNameError, UnsupportedError
 from support.cases import assert_same
+from support.families import family
 
 FORMS = ("limited", "printed")
 FORCES = ("logarithmic", "newton", "printed")
@@ -196,19 +197,21 @@ def test_a_gain_for_each_member_equals_single_runs(form: str, method: str) -> No
 
 
 SIZES = [(3, 2, 1), (3, 2, 13), (2, 3, 5), (9, 3, 9), (40, 2, 1), (40, 3, 3)]
+TURNS = {turn: i for i, turn in enumerate(itertools.product(SIZES, FORMS, FORCES))}
+
+
+def takes_its_turn(size: tuple[int, int, int], form: str, force: str, method: str) -> bool:
+    """By default two methods for each of the others, which take turns."""
+    return (TURNS[size, form, force] - STEPPED.index(method)) % len(STEPPED) < 2
 
 
 @pytest.mark.parametrize(
-    ("bodies", "dim", "members", "form", "force", "method"),
-    [
-        # By default two methods for each of the others, which take turns.
-        pytest.param(*size, form, force, method, marks=() if (i - j) % len(STEPPED) < 2 else pytest.mark.long)
-        for i, (size, form, force) in enumerate(itertools.product(SIZES, FORMS, FORCES))
-        for j, method in enumerate(STEPPED)
-    ],
+    ("size", "form", "force", "method"),
+    family(itertools.product(SIZES, FORMS, FORCES, STEPPED), takes_its_turn),
 )
-def test_both_backends_agree_to_the_bit(bodies: int, dim: int, members: int, form: str, force: str, method: str) -> None:
+def test_both_backends_agree_to_the_bit(size: tuple[int, int, int], form: str, force: str, method: str) -> None:
     """In batches of one and more, and alone."""
+    bodies, dim, members = size
     if sw.method(method).has_series and bodies > MOST_IN_SERIES:
         pytest.skip("a series of so many bodies is refused; test_taylor.py tests that")
     rng = np.random.default_rng([bodies, dim, members])

@@ -71,6 +71,7 @@ def test_examples_print_what_they_say(name: str, tmp_path: Any, monkeypatch: pyt
     assert runner.failures == 0, "".join(told)
 
 
+@pytest.mark.mutant
 def test_a_wrong_example_is_noticed() -> None:
     wrong = types.SimpleNamespace(__doc__=">>> 1 + 1\n3\n")
     runner = doctest.DocTestRunner(optionflags=OPTIONS, verbose=False)

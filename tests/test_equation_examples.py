@@ -68,6 +68,7 @@ def test_last_line_and_picture(name, capsys, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == [f"{name}.png"]
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize("name", MISTAKES)
 def test_a_mistake_is_noticed(name, tmp_path):
     right, wrong = MISTAKES[name]

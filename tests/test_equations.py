@@ -381,6 +381,7 @@ def test_a_local_function_is_not_pickled() -> None:
         pickle.dumps(local())
 
 
+@pytest.mark.mutant
 def test_a_wrong_rate_is_noticed() -> None:
     """The mutant: were the sign of one term wrong in the tape, the reference would tell."""
 

@@ -492,12 +492,6 @@ def test_aliased_arrays() -> None:
     world(v=both[:3], y=both[3:])  # neighbours are fine
 
 
-def test_a_cpu_level_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("STEPWELL_ISA", "avx1024")
-    with pytest.raises(errors.ArgumentError, match='STEPWELL_ISA="avx1024" is not a CPU level of this machine; it has interpret'):
-        run()
-
-
 @pytest.mark.parametrize("name", ["avx1024", "baseline", "AVX2", "NEON", "interpret,avx2", " "])
 def test_kernels_that_are_not_there(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """Names are written small, and one is asked for."""

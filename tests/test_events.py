@@ -136,6 +136,7 @@ def test_what_the_core_notices_is_all_that_there_is(method: str, every: int | No
         assert_same_events(every_state, noticed)
 
 
+@pytest.mark.mutant
 def test_mistake_the_core_notices_another_quantity_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """So the core's part is not idle: of a quantity that never changes its sign it notices nothing within some steps. At their
     end the quantity itself is looked at, which finds more; here it does not.

@@ -6,6 +6,7 @@ Where it is, and mistakes that these tests must notice, are in test_events_adapt
 from __future__ import annotations
 
 import copy
+import itertools
 import pickle
 import warnings
 from pathlib import Path
@@ -29,6 +30,7 @@ from support.events_adaptive import (
     growing,
     sweep,
 )
+from support.families import family
 
 
 def same(a: sw.Run, b: sw.Run) -> None:
@@ -46,11 +48,7 @@ def goes(system: sw.System, method: sw.Method) -> bool:
 
 @pytest.mark.parametrize(
     ("name", "method"),
-    [
-        pytest.param(name, method, marks=() if j == i % len(ABLE) else pytest.mark.long)
-        for i, name in enumerate(ADAPTIVE)
-        for j, method in enumerate(ABLE)
-    ],
+    family(itertools.product(ADAPTIVE, ABLE), lambda name, method: ABLE.index(method) == ADAPTIVE.index(name) % len(ABLE)),
 )
 @pytest.mark.filterwarnings("ignore::stepwell.ToleranceWarning")
 def test_steps_are_those_of_a_run_without_and_both_backends_agree(name: str, method: str) -> None:

@@ -86,18 +86,21 @@ def test_bounces(method: str) -> None:
 # ---- mistakes
 
 
+@pytest.mark.mutant
 def test_mistake_a_straight_line_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(collected, "located", straight)
     with pytest.raises(AssertionError):
         test_the_error_of_the_time_follows_the_tolerance_and_is_that_of_the_motion("dop853")
 
 
+@pytest.mark.mutant
 def test_mistake_the_end_before_the_event_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(collected, "located", low_end)
     with pytest.raises(AssertionError):
         test_bounces("merson")
 
 
+@pytest.mark.mutant
 def test_mistake_trials_at_another_time_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     step = AdaptiveTrials.step
     monkeypatch.setattr(AdaptiveTrials, "step", lambda self, index, t, h, v, y: step(self, index, 0.0 * t, h, v, y))
@@ -105,6 +108,7 @@ def test_mistake_trials_at_another_time_are_noticed(monkeypatch: pytest.MonkeyPa
         test_a_driven_motion_passes_in_time("merson")
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize("method", ["merson", "taylor"])
 def test_mistake_the_length_of_another_step_is_noticed(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The step to try next is not the one that was made; of a series the one before is not."""
@@ -114,6 +118,7 @@ def test_mistake_the_length_of_another_step_is_noticed(method: str, monkeypatch:
         bits.check_a_trial_is_the_state_that_is_saved_within_a_step(method, "pendulum")
 
 
+@pytest.mark.mutant
 def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     class Wrong(adaptive._Driver):
         def __init__(self, *given: Any) -> None:
@@ -132,6 +137,7 @@ def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyP
         bits.check_the_ends_of_a_run()
 
 
+@pytest.mark.mutant
 def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     look = adaptive._Driver._look
     monkeypatch.setattr(adaptive._Driver, "_look", lambda self, *given: look(self, *given[:-1], False))
@@ -139,6 +145,7 @@ def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.Monke
         bits.check_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter("merson", False)
 
 
+@pytest.mark.mutant
 def test_mistake_attempts_after_the_end_of_a_member_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right = adaptive._Driver.stepped
 
@@ -151,6 +158,7 @@ def test_mistake_attempts_after_the_end_of_a_member_are_noticed(monkeypatch: pyt
         bits.check_what_comes_after_a_terminal_event_is_not_computed("merson", monkeypatch)
 
 
+@pytest.mark.mutant
 def test_mistake_one_attempt_too_few_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right = adaptive._Driver.stepped
 

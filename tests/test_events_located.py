@@ -276,6 +276,7 @@ def parabola(t: Any, y: Any) -> Any:
     return 2.0 * (t - 1.0)
 
 
+@pytest.mark.mutant
 def test_mistake_a_step_whose_ends_have_one_sign_is_not_looked_into(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(events, "bends", lambda parts: np.zeros(len(parts.of), dtype=bool))
     with pytest.raises(AssertionError):
@@ -314,23 +315,27 @@ def test_a_way_from_rest_takes_its_time_in_any_unit(unit: float, steps: dict[str
 # ---- mistakes
 
 
+@pytest.mark.mutant
 def test_mistake_a_straight_line_has_order_two(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(collected, "located", straight)
     assert order_of(driven, "rk4", STEP[4]) < 3.5
 
 
+@pytest.mark.mutant
 def test_mistake_the_end_before_the_event_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(collected, "located", low_end)
     with pytest.raises(AssertionError):
         test_bounces()
 
 
+@pytest.mark.mutant
 def test_mistake_trials_at_another_time_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     step = Trials.step
     monkeypatch.setattr(Trials, "step", lambda self, index, t, h, v, y: step(self, index, 0.0 * t, h, v, y))
     assert order_of(driven, "rk4", STEP[4]) < 3.5
 
 
+@pytest.mark.mutant
 def test_mistake_trials_from_the_carry_of_the_full_step_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Verlet's previous y is one of h ago; with it, a step of another length is wrong by a share of the whole way."""
     from stepwell.runs.events import trials
@@ -346,6 +351,7 @@ def test_mistake_trials_from_the_carry_of_the_full_step_are_noticed(monkeypatch:
     assert order_of(pendulum, "verlet", STEP[2]) < 1.7
 
 
+@pytest.mark.mutant
 def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     from support.events import check_a_state_at_zero_counts_once_and_not_at_the_start as check
 
@@ -359,6 +365,7 @@ def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.
         check()
 
 
+@pytest.mark.mutant
 def test_mistake_a_secant_without_a_bound_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Regula falsi alone: one end of the bracket stays where it is."""
 

@@ -130,6 +130,7 @@ def test_what_does_not_go_is_refused_in_words() -> None:
         sw.integrate(ball(), "rk4", v=0.0, y=1.0, dt=0.1, steps=3, events=event)
 
 
+@pytest.mark.mutant
 def test_mistake_an_event_that_leaves_the_state_as_it_is_is_noticed() -> None:
     """So the closed forms above see the change of the state."""
     run = sw.integrate(ball(), "rk4", v=0.0, y=1.0, dt=0.01, steps=100, events=sw.Event(lambda t, v, y: y, name="ground"))

@@ -154,6 +154,7 @@ def test_what_other_members_do_does_not_matter_where_a_budget_ends() -> None:
     assert run.paces.accepted[0] + run.paces.rejected[0] == 40
 
 
+@pytest.mark.mutant
 def test_mistake_a_member_that_forgets_from_which_side_it_came_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Then a ball at the ground, whose height is a rounding below it, falls through, or bounces again at once."""
     right = adaptive._Resetting.parts

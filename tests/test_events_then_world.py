@@ -88,6 +88,7 @@ def test_a_world_with_a_terminal_event_is_refused() -> None:
         sw.World(ball(), "rk4", v=np.zeros(1), y=np.ones(1), dt=0.1, events=stop)
 
 
+@pytest.mark.mutant
 def test_mistake_neighbours_that_begin_anew_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without their carry members of a leapfrog world would have other bits where another bounces."""
     from stepwell.runs.events import frames

@@ -152,6 +152,7 @@ def test_what_does_not_go() -> None:
     assert sw.World(sw.Pendulum(), "rk4", **start(), dt=0.1).events == {}
 
 
+@pytest.mark.mutant
 def test_mistake_the_quantity_of_the_last_call_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right, kept = Frames._quantities, {}
 
@@ -163,6 +164,7 @@ def test_mistake_the_quantity_of_the_last_call_is_noticed(monkeypatch: pytest.Mo
         test_what_is_written_between_calls_is_no_event_and_counts("rk4")
 
 
+@pytest.mark.mutant
 def test_mistake_the_force_of_the_first_call_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     from stepwell.runs.events import frames as module
 

@@ -42,6 +42,7 @@ def test_every_step_has_the_bits_of_integrate(tmp_path: Path) -> None:
     assert not wrong
 
 
+@pytest.mark.mutant
 @needs_node
 def test_a_slider_that_is_not_heard_is_noticed(tmp_path: Path) -> None:
     mistake = ("trajectory", "value * factor", "slider.value * factor")

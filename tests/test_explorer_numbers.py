@@ -82,6 +82,7 @@ def test_roots_at_a_state_are_those_of_analyse(tmp_path: Path) -> None:
         assert nearest(got, wanted) < (1e-9 if name == "pendulum" else 1e-4), (name, key)
 
 
+@pytest.mark.mutant
 @needs_node
 @pytest.mark.parametrize(
     ("module", "right", "mistake"),
@@ -210,6 +211,7 @@ told = given.map(([scene, values, v, y]) => ENERGIES[scene.energy.kind](settings
     assert right == (canonical if forgotten else [True] * len(SLID))
 
 
+@pytest.mark.mutant
 @needs_node
 @pytest.mark.parametrize(
     ("right", "mistake", "scenes"),
@@ -269,6 +271,7 @@ def test_formulas_of_the_motion_are_those_of_the_scenes(tmp_path: Path) -> None:
     assert max(most.values()) < 50 * 60 * 5 * 2.0**-53
 
 
+@pytest.mark.mutant
 @needs_node
 @pytest.mark.parametrize(
     ("right", "mistake", "scene"),

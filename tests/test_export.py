@@ -492,6 +492,7 @@ def test_each_operation_counts(tmp_path: Path) -> None:
         assert not unnoticed
 
 
+@pytest.mark.mutant
 @languages
 def test_a_wrong_operation_is_noticed_in_every_language(language: str, tmp_path: Path) -> None:
     each = Journey(sw.Pendulum(1.3), "merson", 4.0, 5.5, steps=90)

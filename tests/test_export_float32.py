@@ -81,6 +81,7 @@ def test_every_bit_is_that_of_integrate(language: str, tmp_path: Path) -> None:
     assert_same(every, run(language, every, tmp_path))
 
 
+@pytest.mark.mutant
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
 def test_a_step_that_rounds_less_is_noticed(tmp_path: Path) -> None:
     """The same text with numbers of float64 in their place is another step."""

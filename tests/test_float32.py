@@ -67,7 +67,7 @@ def test_machine_code_equals_the_interpreter(case: Case, monkeypatch: pytest.Mon
         options = {"steps": 410, "every": every, "dtype": "float32", "dt": 0.02}
         runs = []
         for level in sw.isa_levels():
-            monkeypatch.setenv("STEPWELL_ISA", level)
+            monkeypatch.setenv("STEPWELL_KERNELS", level)
             runs.append(case.run(b, **options))
         for run in runs[1:]:
             assert_same(run, runs[0])
@@ -101,6 +101,7 @@ def test_it_does_not_depend_on_threads_company_or_pieces() -> None:
     np.testing.assert_array_equal(run.v[-1], together.v[-1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 0}, "float32 diverges alike"))
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
 def test_diverging_members_too(case: Case) -> None:
@@ -127,7 +128,7 @@ def test_members_diverge_where_the_range_of_float32_ends(method: str) -> None:
 
 def test_small_and_large_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     for level in sw.isa_levels():
-        monkeypatch.setenv("STEPWELL_ISA", level)
+        monkeypatch.setenv("STEPWELL_KERNELS", level)
         for scale in (1e-45, 1e-38, 1e-30, 1e30, 3e37):
             arguments = {"v": scale * np.linspace(-1, 1, 50), "y": scale, "dt": 0.1, "steps": 50, "every": 1, "dtype": "float32"}
             run = sw.integrate(sw.Oscillator(1.3, 0.1), "rk4", **arguments)
@@ -352,6 +353,7 @@ def test_none_of_all_results_is_further_than_an_ulp_from_the_truth(name: str) ->
     assert most - 0.03 < found <= most
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(
     ("name", "constant", "value"),
     [

@@ -197,6 +197,7 @@ def test_fused(name: str) -> None:
     np.testing.assert_array_equal((world.v, world.y), (run.v[-1], run.y[-1]))
 
 
+@pytest.mark.mutant
 def test_wrong_forces_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Those tests would fail if the reference added the force once, without h, or with another sign."""
     system, v, y, force = forced("pendulum, damped")

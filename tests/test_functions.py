@@ -117,6 +117,7 @@ CONSTANTS = [
 ]
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(("module", "constant", "name"), CONSTANTS, ids=[c for _, c, _ in CONSTANTS])
 def test_a_wrong_constant_is_noticed(module: ModuleType, constant: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its second part is wrong by a hundredth; π/4's by ten times itself, since it is below an ulp. That is more than an ulp."""
@@ -125,6 +126,7 @@ def test_a_wrong_constant_is_noticed(module: ModuleType, constant: str, name: st
     assert worst(name, 1000, 1) > 1.0
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize("name", ["exp", "expm1", "exp2"])
 @pytest.mark.parametrize(
     ("piece", "wrong"),

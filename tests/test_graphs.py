@@ -100,6 +100,7 @@ def test_the_start_under_a_control_of_an_invariant(control: Any) -> None:
     assert_one_graph(tape, tape.trace(model(system, ABLE[0]), "begin"), Tracer(system, tape).begin(ABLE[0]))
 
 
+@pytest.mark.mutant
 def test_another_start_is_noticed() -> None:
     """A first step that goes by another share of the time is another graph."""
     system, _, _ = made("pendulum")

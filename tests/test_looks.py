@@ -53,6 +53,7 @@ def test_families_are_told_apart(eye):
     assert least(eye, style.FAMILIES.values()) > 1.0
 
 
+@pytest.mark.mutant
 def test_colours_that_merge_are_noticed():
     """Red and green of one lightness are alike in grey, and nearly so without green cones."""
     assert lab(np.ones(3)) == pytest.approx([100.0, 0.0, 0.0], abs=0.02)

@@ -17,6 +17,8 @@ import stepwell as sw
 from support.cases import assert_same, cases, number
 from support.truths import CLOSED_FORMS, forced_error, matrix_of, quadrature_error, slope
 
+pytestmark = pytest.mark.mutant
+
 #: method: what to replace, by what, and what kind of mistake it is.
 MUTANTS = [
     ("false_euler", "return v, y + s.dy(t, v, y)", "return v, y + s.dy(t, v - s.dv(t, v, y), y)", "old v for new v"),

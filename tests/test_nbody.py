@@ -187,7 +187,7 @@ def test_one_system_equals_the_reference(n: int, monkeypatch: pytest.MonkeyPatch
             arguments: dict[str, Any] = {"v": v[:, :dim], "y": y[:, :dim], "dt": 0.01, "steps": 2, "control": control}
             reference = sw.integrate(system, "false_euler", **arguments, backend="numpy")
             for level in sw.isa_levels():
-                monkeypatch.setenv("STEPWELL_ISA", level)
+                monkeypatch.setenv("STEPWELL_KERNELS", level)
                 assert_same(sw.integrate(system, "false_euler", **arguments), reference)
 
 

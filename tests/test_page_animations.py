@@ -81,6 +81,7 @@ def test_places_in_a_page_are_the_states(name, tmp_path):
         np.testing.assert_array_equal(np.array(panel["links"]), springs)
 
 
+@pytest.mark.mutant
 @needs_node
 def test_a_page_that_decodes_wrongly_is_noticed(tmp_path):
     chart = own_picture(sw.scenes.figure_eight().run("rk4", steps=60, every=1))

@@ -59,6 +59,7 @@ def test_what_is_known(truth: Callable[[str], None], backend: str) -> None:
     truth(backend)
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(("old", "new", "truth"), MUTANTS, ids=[f"{new} #{i}" for i, (_, new, _) in enumerate(MUTANTS)])
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
 def test_a_mistake_is_noticed(monkeypatch: pytest.MonkeyPatch, old: str, new: str, truth: Callable[[str], None]) -> None:

@@ -218,6 +218,7 @@ def true_by_the_reference() -> bool:
     return True
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(("module", "old", "new", "mistake"), MUTANTS, ids=IDS)
 def test_mistakes_are_noticed(mutate: Any, module: Any, old: str, new: str, mistake: str) -> None:
     """By the comparison with the core, and by truths even if both languages had the same mistake."""

@@ -265,6 +265,7 @@ def equal_to_the_core() -> bool:
     return np.array_equal(runs[0].y, runs[1].y)
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(("old", "new"), MISTAKES, ids=[str(i) for i in range(len(MISTAKES))])
 @pytest.mark.filterwarnings("ignore")
 def test_a_mistake_is_noticed(old: str, new: str, monkeypatch: Any) -> None:

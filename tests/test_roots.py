@@ -93,6 +93,7 @@ MUTANTS = [
 ]
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(("old", "new", "mistake"), MUTANTS, ids=[mistake for _, _, mistake in MUTANTS])
 def test_mistakes_are_noticed(old: str, new: str, mistake: str) -> None:
     right = BY_NAME["degree 5"]

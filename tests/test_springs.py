@@ -92,6 +92,7 @@ MUTANTS = [
 ]
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(("old", "new"), MUTANTS)
 def test_mistakes_are_noticed(monkeypatch: pytest.MonkeyPatch, old: str, new: str) -> None:
     source = inspect.getsource(reference)

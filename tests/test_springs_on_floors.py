@@ -89,6 +89,7 @@ def test_no_step_adds_more_energy_than_springs_can_take(floor: str) -> None:
     no_energy_beyond_the_bound(FLOORS[floor])
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -163,6 +164,7 @@ def test_fixed_particles_pass_through_surfaces(way: dict[str, Any], n: int, back
         assert (run.y[-1, 1] != free.y[-1, 1]).any()
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(
     ("old", "new"),

@@ -212,12 +212,14 @@ def test_first_crossings_are_those_of_the_exact_motion(steps: int) -> None:
     assert (errors < bound).all()
 
 
+@pytest.mark.mutant
 def test_linear_crossings_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(crossings, "rates", lambda *_: None)
     errors, bound = crossing_errors(40)
     assert (errors > 10 * bound).all()
 
 
+@pytest.mark.mutant
 def test_slopes_of_the_wrong_sign_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(crossings, "rates", lambda *given: -np.asarray(observed.rates(*given)))
     errors, bound = crossing_errors(40)
@@ -434,6 +436,7 @@ def test_samples_in_every_division() -> None:
         assert len({small(axes=axes, chunk=n).attrs["bits"] for n in (5, 64)}) == 1
 
 
+@pytest.mark.mutant
 def test_a_sum_in_another_order_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A mean that adds the states of a piece first would depend on the piece."""
 

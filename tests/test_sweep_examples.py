@@ -45,6 +45,7 @@ def test_last_line_and_picture(name: str, capsys: pytest.CaptureFixture[str], tm
     assert [file.name for file in tmp_path.iterdir()] == [f"{name}.png"]
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize("name", MISTAKES)
 def test_a_mistake_is_noticed(name: str, tmp_path: Path) -> None:
     right, wrong = MISTAKES[name]

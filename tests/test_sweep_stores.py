@@ -145,6 +145,7 @@ def test_a_torn_chunk_is_done_again(how: str, name: str, tmp_path: Path, compute
     assert unlike(whole, again) == []
 
 
+@pytest.mark.mutant
 def test_a_chunk_that_is_taken_as_finished_by_its_hash_alone_would_be_noticed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

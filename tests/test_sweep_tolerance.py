@@ -199,6 +199,7 @@ def test_little_memory_is_more_pieces() -> None:
     assert 2 <= some.states_at_once(system, members) < AT.size < some.states_at_once(system, 5)
 
 
+@pytest.mark.mutant
 def test_pieces_that_begin_anew_would_be_noticed(whole: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A piece that goes on from the last saved state, and not from where the members are, has other steps."""
 

@@ -143,6 +143,7 @@ MISTAKES: dict[str, tuple[str, Any, str]] = {
 }
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_wrong_recurrence_is_noticed(mistake: str, monkeypatch: pytest.MonkeyPatch) -> None:
     name, wrong, of = MISTAKES[mistake]
@@ -151,6 +152,7 @@ def test_a_wrong_recurrence_is_noticed(mistake: str, monkeypatch: pytest.MonkeyP
         assert_known(of)
 
 
+@pytest.mark.mutant
 def test_a_wrong_derivative_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     from stepwell.reference.tape import rules
 
@@ -210,6 +212,7 @@ def test_the_order_is_eight(error: Callable[[int, Any], tuple[Any, Any]], backen
     assert _cleaned_slopes(lambda steps: error(steps, backend)) == pytest.approx([8.0, 8.0], abs=0.1)
 
 
+@pytest.mark.mutant
 def test_a_wrong_order_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A term less; and an input that stays as it is at the start of the step."""
     monkeypatch.setattr(TAYLOR.steps, "ORDER", 7)
@@ -379,6 +382,7 @@ def test_energy_errors_grow_as_the_square_root_of_the_time() -> None:
     assert abs(_growth_of_energy_errors(2.0**-53) - 0.5) < 0.12
 
 
+@pytest.mark.mutant
 def test_a_bias_of_the_energy_is_noticed() -> None:
     """At a tolerance at which the terms that are cut off count: these always err to the same side."""
     assert _growth_of_energy_errors(1e-7) > 0.5 + 2 * 0.12

@@ -18,6 +18,7 @@ import pytest
 import stepwell as sw
 from stepwell.analysis import stability
 from stepwell.views import charts
+from support import families
 from support import own_systems as own
 from support.wrong_calls import A_RUN, CALLS, JUNK, SAVED, SAVED_OWN
 
@@ -78,12 +79,13 @@ def wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, make: 
 #: What is known and left: steps so long that the elements of P overflow are not refused, and NumPy warns of them.
 KNOWN = {("analyse at", "dt", "10**12"), ("analyse v y", "dt", "10**12")}
 
-#: Which of them an ordinary run of the tests takes: every so manieth, others for each argument.
+#: An ordinary run of the tests takes every SHARE-th of them, others for each argument; the long one takes all.
 SHARE = 7
 
 
-def calls(share: int) -> list[Any]:
-    """Calls with one strange argument, and what it is given."""
+def calls() -> list[Any]:
+    """Calls with one strange argument, and the values that it gets."""
+    share = 1 if families.LONG else SHARE
     arguments = [(name, call, given, argument) for name, (call, given) in CALLS.items() for argument in given]
     return [
         pytest.param(
@@ -92,27 +94,17 @@ def calls(share: int) -> list[Any]:
             argument,
             [each for each in list(JUNK)[i % share :: share] if (name, argument, each) not in KNOWN],
             id=f"{name}: {argument}",
+            marks=[pytest.mark.long] * families.LONG,
         )
         for i, (name, call, given, argument) in enumerate(arguments)
     ]
 
 
-def check(call: Callable[..., Any], given: dict[str, Any], argument: str, junk: list[str]) -> None:
+@timer
+@pytest.mark.parametrize(("call", "given", "argument", "junk"), calls())
+def test_calls_work_or_say_what_is_wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, junk: list[str]) -> None:
     bad = {name: text for name in junk if (text := wrong(call, given, argument, JUNK[name])) is not None}
     assert not bad, "\n" + "\n".join(f"{argument} = {name}: {text}" for name, text in bad.items())
-
-
-@timer
-@pytest.mark.parametrize(("call", "given", "argument", "junk"), calls(SHARE))
-def test_some_work_or_say_what_is_wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, junk: list[str]) -> None:
-    check(call, given, argument, junk)
-
-
-@timer
-@pytest.mark.long
-@pytest.mark.parametrize(("call", "given", "argument", "junk"), calls(1))
-def test_all_work_or_say_what_is_wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, junk: list[str]) -> None:
-    check(call, given, argument, junk)
 
 
 @timer

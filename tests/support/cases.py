@@ -17,6 +17,7 @@ from stepwell.reference.series import expanded
 from stepwell.reference.traced import Tracer
 
 from support import own_systems as own
+from support.families import family
 
 Make = Callable[[np.random.Generator, int], sw.System]
 
@@ -308,9 +309,10 @@ DIVERGE_IN_SERIES = ("aircraft, quaternion", "springs: hung, damped")
 def cases(methods: Iterator[str] | None = None) -> Iterator[Case]:
     """Every case that is not refused."""
     rng = np.random.default_rng()
+    one_member = {name: make(rng, 1) for name, make in SYSTEMS.items()}
     names = [m.name for m in sw.methods()] if methods is None else list(methods)
     for method, system in itertools.product(names, SYSTEMS):
-        made, record = SYSTEMS[system](rng, 1), sw.method(method)
+        made, record = one_member[system], sw.method(method)
         if not fits(made, record) or (record.has_series and system in DIVERGE_IN_SERIES):
             continue
         waves = any(isinstance(x, sw.Sinusoid) for x in made.given_inputs().values())
@@ -345,11 +347,11 @@ def thinned(every: Iterable[Case], several: Mapping[str, int], salt: str) -> lis
     """Parameters of a test: representative cases, and the others for the long run."""
     every = list(every)
     chosen = set(representative(every, several, salt))
-    return [pytest.param(case, id=str(case), marks=() if case in chosen else pytest.mark.long) for case in every]
+    return family(every, lambda case: case in chosen, str)
 
 
 #: How many methods a test tries with each system, which draws them; in the long run all.
-SOME = pytest.mark.parametrize("some", [pytest.param(4, id="some"), pytest.param(None, id="all", marks=pytest.mark.long)])
+SOME = pytest.mark.parametrize("some", family([4, None], lambda some: some is not None, lambda some: "some" if some else "all"))
 
 
 def drawn(methods: Sequence[sw.Method], some: int | None, *salt: Any) -> list[sw.Method]:
