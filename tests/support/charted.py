@@ -1,7 +1,7 @@
 """Work-precision charts that several tests look at."""
 
 import functools
-import sys
+import importlib
 
 import pytest
 import stepwell as sw
@@ -13,7 +13,7 @@ SCENES = [scene for scene in sw.scenes.scenes() if scene.exact is not None and s
 METHODS = sw.methods()
 
 #: The function hides the module of its name.
-LADDER = sys.modules["stepwell.studies.measuring.work_precision"]
+LADDER = importlib.import_module("stepwell.studies.measuring.work_precision")
 
 
 @functools.cache

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from ..errors import ArgumentError, UnsupportedError
+from . import registry
 from .checks import file
 
 if TYPE_CHECKING:
@@ -65,12 +65,16 @@ def drawn(path: str | Path | None, draw: Callable[[], Figure]) -> Figure:
     return figure
 
 
-class Drawn(ABC):
-    """A chart of which there is one picture."""
+class Drawn:
+    """A chart with one picture."""
 
-    @abstractmethod
+    #: The task that draws it.
+    _painter: ClassVar[str]
+
     def draw(self) -> Figure:
         """The picture, on a new figure."""
+        figure: Figure = registry.task(self._painter)(self)
+        return figure
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw it, and write it to ``path`` if given; the ending says in which format.

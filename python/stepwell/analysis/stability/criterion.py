@@ -5,7 +5,6 @@ Is a programmed oscillator stable? How wrong is its frequency? How many calculat
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,9 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...base import checks, files
+from ...base import checks
 from ...base.immutable import by_value
 from ...base.reprs import MAX_LINE, shortened, table
+from ...base.tables import write_json
 from ...errors import ArgumentError
 from ...model.methods import Method, choice
 from ...model.systems import Oscillator
@@ -117,8 +117,8 @@ class Criteria(tuple[Criterion, ...]):
         return rows
 
     def to_json(self, path: str | Path) -> None:
-        """Write ``rows()``."""
-        files.write_text(checks.file("path", path), json.dumps(self.rows(), ensure_ascii=False, indent=1) + "\n")
+        """Write ``rows()``; what is not finite is null."""
+        write_json(self.rows(), path)
 
     def table(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of texts, for a page or a screen. Heads that end in ``>`` are of numbers."""

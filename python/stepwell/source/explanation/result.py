@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -10,9 +9,9 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from ...base import checks, files
 from ...base.immutable import ValueEquality
 from ...base.reprs import counted
+from ...base.tables import write_json
 from ...model.methods import Method
 from ...model.systems import System
 from .listing import Section
@@ -287,8 +286,7 @@ class Explanation(ValueEquality):
 
     def to_json(self, path: str | Path) -> None:
         """Write ``as_dict()``."""
-        text = json.dumps(self.as_dict(), ensure_ascii=False, indent=1) + "\n"
-        files.write_text(checks.file("path", path), text)
+        write_json(self.as_dict(), path)
 
     def _repr_html_(self) -> str:
         """The same as tables."""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...base import checks, files, registry
+from ...base import registry
 from ...base.arrays import Array
 from ...base.pictures import drawn
 from ...base.reprs import one_line, table
-from ...base.tables import finite
+from ...base.tables import finite, json_text, write_json
 from ...errors import ArgumentError
 from ...model.methods import Method
 from ...runs.integration import integrate
@@ -244,15 +243,13 @@ class Advice:
             "cost_noise": self.cost_noise,
             "dtype": self.dtype,
         }
-        found: dict[str, Any] = finite(whole)
-        return found
+        return dict(finite(whole))
 
     def to_json(self, path: str | Path | None = None) -> str:
         """The text of ``data()`` in JSON; also written to a file if one is given."""
-        text = json.dumps(self.data(), ensure_ascii=False, indent=1)
         if path is not None:
-            files.write_text(checks.file("path", path), text + "\n")
-        return text
+            write_json(self.data(), path)
+        return json_text(self.data())
 
     @property
     def asked(self) -> Array:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...base import registry
-from ...base.checks import file, known
-from ...base.files import write_text
+from ...base.checks import known
 from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn, drawn
-from ...base.tables import finite, rows_to_csv
+from ...base.tables import Columns, Table, columns_of
 from ...model.methods import Method
 from ...scenes import Scene
 from .peers import Peer
@@ -181,7 +179,7 @@ class Curve(ValueEquality):
 
 
 @dataclass(frozen=True, eq=False)
-class WorkPrecision(Drawn, ValueEquality):
+class WorkPrecision(Drawn, Table, ValueEquality):
     """Error against cost of several methods on one scene.
 
     Attributes:
@@ -312,10 +310,5 @@ class WorkPrecision(Drawn, ValueEquality):
             "refused": self.refused,
         }
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each; every number reads back as itself, and what is None is empty."""
-        rows_to_csv(self.rows(), path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write ``as_dict()``; what is not finite is null."""
-        write_text(file("path", path), json.dumps(finite(self.as_dict()), ensure_ascii=False, indent=1) + "\n")
+    def _columns(self) -> Columns:
+        return columns_of(self.rows())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from ...base import checks, registry
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn
-from ...base.tables import write_csv, write_json
+from ...base.tables import Table, stacked
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...model import controls
 from ...model.methods import Method, choice
@@ -42,8 +41,8 @@ WAYS: tuple[str, ...] = controls.WAYS
 
 
 @dataclass(frozen=True, eq=False)
-class ControlSweep(Drawn, ValueEquality):
-    """Errors of what a control keeps, and of the state, against its gain.
+class ControlSweep(Drawn, Table, ValueEquality):
+    """Errors of what a control keeps, and of the state, against its gain: a row for each method, kind and gain.
 
     Attributes:
         title: title of the picture.
@@ -116,11 +115,6 @@ class ControlSweep(Drawn, ValueEquality):
         figure: Figure = registry.task("draw_lengths" if self.keeps_lengths else "draw_control")(self)
         return figure
 
-    def rows(self) -> list[dict[str, Any]]:
-        """A row for each method, kind and gain."""
-        columns = self._columns()
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
     def summary(self) -> list[dict[str, Any]]:
         """A row for each method, kind and step: the gains with the least errors, and from which gain on some diverged."""
         rows = []
@@ -142,31 +136,18 @@ class ControlSweep(Drawn, ValueEquality):
             )
         return rows
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each; every number reads back as itself."""
-        write_csv(self._columns(), path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write system, horizon, summary, rows and refusals; what is not finite is null."""
+    def _head(self) -> dict[str, Any]:
         head: dict[str, Any] = {"title": self.title, "system": repr(self.system), "horizon": self.horizon}
         head["evaluations"] = list(self.evaluations)
         if self.keeps_lengths:
             head |= {"answer": self.answer, "better": {name: list(each) for name, each in self.better.items()}}
         refused = [{"method": method, "kind": kind, "reason": why} for (method, kind), why in self.refused.items()]
-        write_json(head | {"summary": self.summary(), "rows": self.rows(), "refused": refused}, path)
+        return head | {"refused": refused}
 
     def _columns(self) -> dict[str, list[Any]]:
-        names = ["relative", "energy_error", "state_error", "largest", "first_bad_step"]
-        if self.keeps_lengths:
-            names.insert(3, "length_error")
-        columns: dict[str, list[Any]] = {name: [] for name in ("method", "kind", "dt", "steps", *names)}
-        for line in self.lines:
-            for name in ("kind", "dt", "steps"):
-                columns[name] += [getattr(line, name)] * len(line.relative)
-            columns["method"] += [line.method.name] * len(line.relative)
-            for name in names:
-                columns[name] += getattr(line, name).tolist()
-        return columns
+        lengths = ("length_error",) if self.keeps_lengths else ()
+        names = ("kind", "dt", "steps", "relative", "energy_error", "state_error", *lengths, "largest", "first_bad_step")
+        return stacked({"method": line.method.name} | {name: getattr(line, name) for name in names} for line in self.lines)
 
 
 def control(

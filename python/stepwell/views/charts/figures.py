@@ -15,7 +15,7 @@ from ...base import checks, registry
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
-from ...base.tables import write_csv, write_json
+from ...base.tables import Table, stacked
 from ...errors import ArgumentError
 from ...model.methods import Method, _section, choice
 from ...model.methods import method as find_method
@@ -68,6 +68,16 @@ class Samples(ValueEquality):
     limit: StabilityLimit
 
     @property
+    def name(self) -> str:
+        """The method's name."""
+        return self.method.name
+
+    @property
+    def exact(self) -> Array:
+        """The exact coordinates at the times of the samples."""
+        return np.asarray(np.cos(self.t))
+
+    @property
     def file(self) -> str:
         """The name of its picture: the section's number, or 99 for none, and the method's name."""
         return f"{_section(self.method):02d}-{self.method.name}.png"
@@ -106,8 +116,10 @@ class HarmonicCase(ValueEquality):
 
 
 @dataclass(frozen=True, eq=False)
-class Figures(ValueEquality):
+class Figures(Table, ValueEquality):
     """The samples of several methods with the same step.
+
+    A row for each sample of each method, and of each harmonic case, with the exact solution beside it.
 
     Attributes:
         phi: Φ = ω₀·dt, the true angle per step, in radians.
@@ -179,11 +191,6 @@ class Figures(ValueEquality):
             write(place / name)
         return paths + [place / name for name in others]
 
-    def rows(self) -> list[dict[str, Any]]:
-        """A row for each sample of each method, and of each harmonic case, with the exact solution beside it."""
-        columns = self._columns()
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
     def summary(self) -> list[dict[str, Any]]:
         """A row for each method: what its samples do."""
         return [
@@ -201,25 +208,12 @@ class Figures(ValueEquality):
             for samples in self.samples
         ]
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each; every number reads back as itself."""
-        write_csv(self._columns(), path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write Φ, periods, summary and rows; what is not finite is null."""
-        write_json({"phi": self.phi, "periods": self.periods, "summary": self.summary(), "rows": self.rows()}, path)
+    def _head(self) -> dict[str, Any]:
+        return {"phi": self.phi, "periods": self.periods}
 
     def _columns(self) -> dict[str, list[Any]]:
-        columns: dict[str, list[Any]] = {name: [] for name in ("method", "t", "v", "y", "exact")}
-        for samples in self.samples:
-            columns["method"] += [samples.method.name] * len(samples.t)
-            for name, values in (("t", samples.t), ("v", samples.v), ("y", samples.y), ("exact", np.cos(samples.t))):
-                columns[name] += values.tolist()
-        for case in self.harmonic:
-            columns["method"] += [case.name] * len(case.t)
-            for name, values in (("t", case.t), ("v", case.v), ("y", case.y), ("exact", case.exact)):
-                columns[name] += values.tolist()
-        return columns
+        curves: tuple[Samples | HarmonicCase, ...] = (*self.samples, *self.harmonic)
+        return stacked({"method": each.name, "t": each.t, "v": each.v, "y": each.y, "exact": each.exact} for each in curves)
 
 
 def figures(methods: Iterable[Method | str] | None = None, *, phi: float = 0.5, periods: float = 4) -> Figures:

@@ -15,7 +15,7 @@ from ...base import checks, registry
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
-from ...base.tables import write_csv, write_json
+from ...base.tables import Table
 from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, ShapeError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
@@ -46,8 +46,8 @@ Truths = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityMap(ValueEquality):
-    """The radius r₁ of one method over angle per step and damping ratio.
+class StabilityMap(Table, ValueEquality):
+    """The radius r₁ of one method over angle per step and damping ratio: a row for each point.
 
     Attributes:
         method: the method.
@@ -158,19 +158,18 @@ class StabilityMap(ValueEquality):
             )
         return rows
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write a line for each point: Φ, D, r₁ and whether it is stable; every number reads back as itself."""
-        phi, damping = np.meshgrid(self.phi, self.damping)
-        columns = {"phi": phi, "damping": damping, "radius": self.radius, "stable": self.stable}
-        write_csv({name: values.ravel().tolist() for name, values in columns.items()}, path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write the method, the axes and the summary; the points are in the CSV."""
+    def as_dict(self) -> dict[str, Any]:
+        """The method, the axes and the summary. The points are in the CSV."""
         axes = {
             name: {"first": float(values[0]), "last": float(values[-1]), "points": len(values)}
             for name, values in (("phi", self.phi), ("damping", self.damping))
         }
-        write_json({"method": self.method.name, "damped": self.damped} | axes | {"summary": self.summary()}, path)
+        return {"method": self.method.name, "damped": self.damped} | axes | {"summary": self.summary()}
+
+    def _columns(self) -> dict[str, list[Any]]:
+        phi, damping = np.meshgrid(self.phi, self.damping)
+        columns = {"phi": phi, "damping": damping, "radius": self.radius, "stable": self.stable}
+        return {name: values.ravel().tolist() for name, values in columns.items()}
 
 
 @dataclass(frozen=True, eq=False)

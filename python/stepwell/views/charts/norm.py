@@ -5,16 +5,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...base import checks, registry
+from ...base import checks
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn
-from ...base.tables import write_csv, write_json
+from ...base.tables import Table, stacked
 from ...errors import ArgumentError, DivergenceWarning, ShapeError
 from ...model.compatibility import fits_together
 from ...model.controls import NormControl, Projection
@@ -22,9 +21,6 @@ from ...model.methods import Method, choice
 from ...model.systems import RigidBody
 from ...runs.integration import integrate
 from ...runs.result import Run
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Default methods: of first, second and fourth order. False Euler steps a steady turn as Standard Euler does.
 METHODS = ("standard_euler", "standard_heun", "rk4")
@@ -71,8 +67,10 @@ class Settled(ValueEquality):
 
 
 @dataclass(frozen=True, eq=False)
-class NormSweep(Drawn, ValueEquality):
+class NormSweep(Drawn, Table, ValueEquality):
     """A steady turn under control of the norm, over the gain, beside the same turn with the norm reset.
+
+    A row for each method and gain.
 
     Attributes:
         phi: Φ = ½h|ω|, the angle of a true step of the quaternion, in rad.
@@ -81,16 +79,7 @@ class NormSweep(Drawn, ValueEquality):
 
     phi: float
     lines: tuple[Settled, ...]
-
-    def draw(self) -> Figure:
-        """The picture, on a new figure."""
-        figure: Figure = registry.task("draw_norm")(self)
-        return figure
-
-    def rows(self) -> list[dict[str, Any]]:
-        """A row for each method and gain."""
-        columns = self._columns()
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    _painter = "draw_norm"
 
     def summary(self) -> list[dict[str, Any]]:
         """A row for each method: what resetting does, the least error of the angle under control, and the largest gain."""
@@ -110,23 +99,15 @@ class NormSweep(Drawn, ValueEquality):
             )
         return rows
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each; every number reads back as itself."""
-        write_csv(self._columns(), path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write angle, summary and rows; what is not finite is null."""
-        write_json({"phi": self.phi, "summary": self.summary(), "rows": self.rows()}, path)
+    def _head(self) -> dict[str, Any]:
+        return {"phi": self.phi}
 
     def _columns(self) -> dict[str, list[Any]]:
-        names = ("gains", "norm_error", "angle_error")
-        columns: dict[str, list[Any]] = {name: [] for name in ("method", *names, "angle_error_reset")}
-        for line in self.lines:
-            columns["method"] += [line.method.name] * len(line.gains)
-            columns["angle_error_reset"] += [line.angle_error_reset] * len(line.gains)
-            for name in names:
-                columns[name] += getattr(line, name).tolist()
-        return columns
+        return stacked(
+            {"method": line.method.name}
+            | {name: getattr(line, name) for name in ("gains", "norm_error", "angle_error", "angle_error_reset")}
+            for line in self.lines
+        )
 
 
 def norm(

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...base import checks, files, registry
+from ...base import checks, registry
 from ...base.checks import known
 from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn, drawn
-from ...base.tables import finite, rows_to_csv
+from ...base.tables import Columns, Table, columns_of
 from ...errors import ArgumentError
 from ...scenes import Scene
 from ...scenes import scene as find_scene
@@ -24,8 +23,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Panel(Drawn, ValueEquality):
-    """Work-precision charts of several scenes.
+class Panel(Drawn, Table, ValueEquality):
+    """Work-precision charts of several scenes, whose tables stand below each other.
 
     Attributes:
         charts: one for each scene.
@@ -59,14 +58,12 @@ class Panel(Drawn, ValueEquality):
         """The fronts of all charts, one after another."""
         return [row for chart in self.charts for row in chart.front(error, cost)]
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each."""
-        rows_to_csv(self.rows(), path)
+    def as_dict(self) -> list[dict[str, Any]]:
+        """The ``as_dict()`` of each chart."""
+        return [chart.as_dict() for chart in self.charts]
 
-    def to_json(self, path: str | Path) -> None:
-        """Write what each chart writes, as a list; what is not finite is null."""
-        whole = [chart.as_dict() for chart in self.charts]
-        files.write_text(checks.file("path", path), json.dumps(finite(whole), ensure_ascii=False, indent=1) + "\n")
+    def _columns(self) -> Columns:
+        return columns_of(self.rows())
 
 
 def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] | None = None, **options: Any) -> Panel:

@@ -7,20 +7,19 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import _core
 from ...analysis.stability import maps
 from ...analysis.stability.expansion import polynomials
-from ...base import checks, registry
+from ...base import checks
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.literals import RunForm
 from ...base.pictures import Drawn
-from ...base.tables import write_csv, write_json
+from ...base.tables import Table, stacked
 from ...errors import ArgumentError, ShapeError, UnsupportedError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
@@ -29,9 +28,6 @@ from ...model.systems import Oscillator, System
 from ...model.systems.base import a_system
 from ...runs.integration import integrate
 from ...runs.result import Run
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Forms that are compared, in the order of the legend.
 FORMS: tuple[RunForm, ...] = ("direct", "matrix", "power")
@@ -47,8 +43,10 @@ BITS = 320
 
 
 @dataclass(frozen=True, eq=False)
-class Powers(Drawn, ValueEquality):
+class Powers(Drawn, Table, ValueEquality):
     """Cost and error of n steps in each form.
+
+    A row for each form and number of steps. ``measured_seconds`` is not repeatable.
 
     Attributes:
         system: the system.
@@ -68,16 +66,7 @@ class Powers(Drawn, ValueEquality):
     seconds: dict[str, Array]
     errors: dict[str, Array]
     isa: str
-
-    def draw(self) -> Figure:
-        """The picture, on a new figure."""
-        figure: Figure = registry.task("draw_powers")(self)
-        return figure
-
-    def rows(self) -> list[dict[str, Any]]:
-        """A row for each number of steps and form. ``measured_seconds`` is not repeatable."""
-        columns = self._columns()
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    _painter = "draw_powers"
 
     def summary(self) -> list[dict[str, Any]]:
         """A row for each form: the largest error, and the measured time of the longest run."""
@@ -91,23 +80,14 @@ class Powers(Drawn, ValueEquality):
             for form in self.seconds
         ]
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each; every number reads back as itself."""
-        write_csv(self._columns(), path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write system, method, step, summary and rows; what is not finite is null."""
-        head = {"system": repr(self.system), "method": self.method.name, "dt": self.dt, "isa": self.isa}
-        write_json(head | {"summary": self.summary(), "rows": self.rows()}, path)
+    def _head(self) -> dict[str, Any]:
+        return {"system": repr(self.system), "method": self.method.name, "dt": self.dt, "isa": self.isa}
 
     def _columns(self) -> dict[str, list[Any]]:
-        columns: dict[str, list[Any]] = {name: [] for name in ("form", "steps", "measured_seconds", "error")}
-        for form in self.seconds:
-            columns["form"] += [form] * len(self.steps)
-            columns["steps"] += self.steps.tolist()
-            columns["measured_seconds"] += self.seconds[form].tolist()
-            columns["error"] += self.errors[form].tolist()
-        return columns
+        return stacked(
+            {"form": form, "steps": self.steps, "measured_seconds": seconds, "error": self.errors[form]}
+            for form, seconds in self.seconds.items()
+        )
 
 
 def powers(

@@ -6,7 +6,7 @@ import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ...base import registry
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn
-from ...base.tables import write_csv, write_json
+from ...base.tables import Table
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...model.systems import NBody, Particles, Pendulum3D, RestrictedThreeBody, RigidBody, Rods, Springs
 from ...runs.encounters import MAX_RERUN
@@ -24,16 +24,15 @@ from ...runs.result import Run
 from ...scenes import Scene
 from ...scenes import scene as find_scene
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 #: Times at which the exact solution is drawn.
 EXACT = 6001
 
 
 @dataclass(frozen=True, eq=False)
-class RunPicture(Drawn, ValueEquality):
+class RunPicture(Drawn, Table, ValueEquality):
     """A run of a scene, with its errors at the saved states; arrays are of shape (saved,).
+
+    A row for each saved state: time, each number of the blocks, energy and errors.
 
     Attributes:
         scene: the scene.
@@ -50,6 +49,7 @@ class RunPicture(Drawn, ValueEquality):
     energy_error: Array | None
     energy_scale: str
     state_error: Array | None
+    _painter = "draw_run"
 
     @property
     def kind(self) -> str:
@@ -155,11 +155,6 @@ class RunPicture(Drawn, ValueEquality):
         t = np.linspace(first, last, EXACT)
         return t, *self.scene.exact(t)
 
-    def draw(self) -> Figure:
-        """The picture, on a new figure."""
-        figure: Figure = registry.task("draw_run")(self)
-        return figure
-
     def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
         """Write an animation of the run; its frames are the saved states.
 
@@ -192,32 +187,13 @@ class RunPicture(Drawn, ValueEquality):
             "largest_energy_error": _largest(self.energy_error),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
-        """A row for each saved state: time, each number of the blocks, energy and errors."""
-        columns = self._columns()
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each; every number reads back as itself."""
-        write_csv(self._columns(), path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write summary and rows; what is not finite is null."""
-        write_json({"summary": self.summary(), "rows": self.rows()}, path)
-
     def columns(self) -> dict[str, Array]:
         """The saved states as arrays with the time along the first axis: t, v, y, energy and errors, as far as there are any."""
-        given: dict[str, Array] = {"t": self.run.t, "v": self.run.v, "y": self.run.y}
-        if (energy := self.energy) is not None:
-            given["energy"] = energy
-        if self.state_error is not None:
-            given["state_error"] = self.state_error
-        if self.energy_error is not None:
-            given["energy_error"] = self.energy_error
-        return given
+        errors = {"energy": self.energy, "state_error": self.state_error, "energy_error": self.energy_error}
+        known = {name: values for name, values in errors.items() if values is not None}
+        return {"t": self.run.t, "v": self.run.v, "y": self.run.y} | known
 
     def _columns(self) -> dict[str, list[Any]]:
-        """A column for each number."""
         return {
             name + (str(list(index)) if index else ""): values[(slice(None), *index)].tolist()
             for name, values in self.columns().items()

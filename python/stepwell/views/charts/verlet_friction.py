@@ -8,22 +8,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...base import checks, registry
+from ...base import checks
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn
-from ...base.tables import write_csv, write_json
+from ...base.tables import Table, stacked
 from ...errors import ArgumentError
 from ...scenes.builtin.sliding_block import sliding_block
 from ...scenes.builtin.sticking_block import sticking_block
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: More steps than this are a mistake, and no picture.
 MAX_STEPS = 100_000
@@ -55,8 +51,10 @@ class Block(ValueEquality):
 
 
 @dataclass(frozen=True, eq=False)
-class VerletFriction(Drawn, ValueEquality):
+class VerletFriction(Drawn, Table, ValueEquality):
     """Verlet with the velocity of the secant, beside what is right.
+
+    A row for each time of each block.
 
     Attributes:
         dt: the step of the blocks, in units of time.
@@ -69,43 +67,26 @@ class VerletFriction(Drawn, ValueEquality):
     blocks: tuple[Block, ...]
     damping: Array
     limits: Array
-
-    def draw(self) -> Figure:
-        """The picture, on a new figure."""
-        figure: Figure = registry.task("draw_verlet_friction")(self)
-        return figure
-
-    def rows(self) -> list[dict[str, Any]]:
-        """A row for each time of each block."""
-        return [dict(zip(self._columns(), row, strict=True)) for row in zip(*self._columns().values(), strict=True)]
+    _painter = "draw_verlet_friction"
 
     def summary(self) -> list[dict[str, Any]]:
         """A row for each block: where it is at the end, and how fast it still moves, in the mean over the last tenth."""
-        found = []
+        rows = []
         for block in self.blocks:
             tenth = max(1, len(block.t) // 10)
             for name in ("exact", "false_euler", "verlet"):
                 y = getattr(block, name)
                 speed = float((y[-1] - y[-1 - tenth]) / (block.t[-1] - block.t[-1 - tenth]))
-                found.append({"block": block.name, "by": name, "last_y": float(y[-1]), "last_speed": speed})
-        return found
+                rows.append({"block": block.name, "by": name, "last_y": float(y[-1]), "last_speed": speed})
+        return rows
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each; every number reads back as itself."""
-        write_csv(self._columns(), path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write the step, the summary, the limits and the rows."""
+    def _head(self) -> dict[str, Any]:
         limits = [{"damping": float(d), "limit": float(limit)} for d, limit in zip(self.damping, self.limits, strict=True)]
-        write_json({"dt": self.dt, "summary": self.summary(), "limits": limits, "rows": self.rows()}, path)
+        return {"dt": self.dt, "limits": limits}
 
     def _columns(self) -> dict[str, list[Any]]:
-        columns: dict[str, list[Any]] = {name: [] for name in ("block", "t", "exact", "false_euler", "verlet")}
-        for block in self.blocks:
-            columns["block"] += [block.name] * len(block.t)
-            for name in ("t", "exact", "false_euler", "verlet"):
-                columns[name] += getattr(block, name).tolist()
-        return columns
+        names = ("t", "exact", "false_euler", "verlet")
+        return stacked({"block": block.name} | {name: getattr(block, name) for name in names} for block in self.blocks)
 
 
 def verlet_friction(dt: Any = 1 / 60) -> VerletFriction:

@@ -18,7 +18,7 @@ from ...base import checks, registry
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
-from ...base.tables import write_csv, write_json
+from ...base.tables import Table, stacked
 from ...errors import ArgumentError, ShapeError
 from ...model.methods import Method, choice
 from ...model.systems import Oscillator
@@ -82,10 +82,11 @@ class Locus(ValueEquality):
         return None if self.limit.mode is None else self.limit.mode.kind
 
     @property
-    def columns(self) -> dict[str, list[Any]]:
-        """What is written of it, by name."""
+    def columns(self) -> dict[str, Any]:
+        """Its columns in the table, by name."""
         z1, z2 = self.eigenvalues
-        numbers = {
+        return {
+            "method": self.method.name,
             "phi": self.phi,
             "z1_real": z1.real,
             "z1_imag": z1.imag,
@@ -98,12 +99,11 @@ class Locus(ValueEquality):
             "stable": self.stable,
             "kind": self.kind,
         }
-        return {"method": [self.method.name] * len(self.phi)} | {k: list(np.asarray(a).tolist()) for k, a in numbers.items()}
 
 
 @dataclass(frozen=True, eq=False)
-class Stability(ValueEquality):
-    """Methods on the undamped oscillator, over the angle per step.
+class Stability(Table, ValueEquality):
+    """Methods on the undamped oscillator, over the angle per step: a row for each method and each angle.
 
     Attributes:
         phi: the angles Φ, shape (n,).
@@ -127,11 +127,6 @@ class Stability(ValueEquality):
         kind = checks.known("kind", kind, KINDS)
         return drawn(path, lambda: registry.task(f"draw_{kind}")(self))
 
-    def rows(self) -> list[dict[str, Any]]:
-        """A row for each method and each angle."""
-        columns = self._columns()
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
     def summary(self) -> list[dict[str, Any]]:
         """A row for each method: its limit, the steps per period that it needs, how it leaves the circle, its series."""
         return [
@@ -147,17 +142,8 @@ class Stability(ValueEquality):
             for locus in self.loci
         ]
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each; every number reads back as itself."""
-        write_csv(self._columns(), path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write summary and rows; what is infinite is null."""
-        write_json({"summary": self.summary(), "rows": self.rows()}, path)
-
     def _columns(self) -> dict[str, list[Any]]:
-        every = [locus.columns for locus in self.loci]
-        return {name: [value for columns in every for value in columns[name]] for name in every[0]}
+        return stacked(locus.columns for locus in self.loci)
 
 
 def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None) -> Stability:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import textwrap
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ...base import checks
-from ...base.tables import finite, write_csv, write_json
+from ...base.tables import json_text, write_csv, write_json
 from .table import lines_of, width_of_terminal
 
 
@@ -24,7 +23,7 @@ def json_option(parser: argparse.ArgumentParser) -> None:
 
 def print_json(value: Any) -> None:
     """Print a value for other programs; what is not finite is null."""
-    print(json.dumps(finite(value), ensure_ascii=False, indent=1))
+    print(json_text(value))
 
 
 #: The files into which the table of a list is written.
