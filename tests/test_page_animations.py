@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.views.charts import page_animation, run_picture
+from stepwell.views.charts.run_panels import FALLING
 from stepwell.views.charts.runs import own_picture
+from stepwell.views.charts.solids import solid_of
 from support.abroad import executed
 from support.explored import needs_node
 
@@ -72,7 +74,7 @@ def test_places_in_a_page_are_the_states(name, tmp_path):
     at = shown(chart, unpacked)
     (panel, given) = (unpacked["panels"][0], data["panels"][0])
     places = chart.places[at]
-    expected = page_animation.FALLING.flat(places) if panel["name"].startswith("seen from the front") else places[..., :2]
+    expected = FALLING.flat(places) if panel["name"].startswith("seen from the front") else places[..., :2]
     found = numbers(panel["values"]).reshape(expected.shape)
     assert np.abs(found - expected).max() <= off(expected, given["data"])
     assert given["data"]["step"] <= 1e-4 * np.ptp(expected)  # four digits of what is seen
@@ -106,9 +108,7 @@ def test_other_views_hold_the_states_and_errors(name, tmp_path):
     elif name == "chain":
         expected, found, codes = chart.run.y[at].ravel(), numbers(first["values"]), given["data"]
     else:
-        turned = page_animation.attitude_picture.rotation(chart)[..., at]
-        if name == "dzhanibekov":
-            turned = np.einsum("ij,jkn->ikn", page_animation.body_picture.upright(chart), turned)
+        turned = solid_of(chart).matrices[..., at]
         expected, found, codes = np.moveaxis(turned, -1, 0).ravel(), numbers(first["values"]), given["data"]
     assert np.abs(found - expected).max() <= off(expected, codes)
     if chart.state_error is not None:

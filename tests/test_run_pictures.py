@@ -15,7 +15,9 @@ import stepwell as sw
 from PIL import Image
 from stepwell.base.pictures import png
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
-from stepwell.views.charts import attitude_picture, body_picture, orbits_picture, runs_animation, runs_picture, style
+from stepwell.views.charts import orbits_picture, runs_animation, runs_picture, solids, solids_picture, style
+from stepwell.views.charts.kinds import KINDS as ROWS
+from stepwell.views.charts.kinds import kind_of
 from stepwell.views.charts.runs import own_picture
 
 
@@ -329,17 +331,17 @@ def test_an_aircraft_is_drawn_by_its_angles_and_its_axes(pictures):
     ]
     np.testing.assert_array_equal([line.get_ydata() for line in rates.lines], chart.run.v.T)
     # Level at t = 0: seen from behind, to the right and above, the nose is farther away and so higher, the right wing nearer.
-    level = dict(zip(attitude_picture.PARTS, figure.axes[3].patches, strict=True))
+    level = dict(zip(solids.AIRCRAFT, figure.axes[3].patches, strict=True))
     assert level["fuselage"].get_xy()[0, 1] > level["fin"].get_xy()[0, 1]
     assert level["right wing"].get_zorder() > level["left wing"].get_zorder()
     # Where it banks to the right, the right wing is down.
-    at = attitude_picture.chosen(chart)
+    at = solids_picture.attitudes(chart, solids_picture.AIRCRAFT_ATTITUDES)
     banked = next(i for i, frame in enumerate(at) if chart.run.y[frame, 0] > 20.0)
-    parts = dict(zip(attitude_picture.PARTS, figure.axes[3 + banked].patches, strict=True))
+    parts = dict(zip(solids.AIRCRAFT, figure.axes[3 + banked].patches, strict=True))
     turned = chart.run.system.rotation(chart.run.y[at[banked]])
-    tip = turned @ attitude_picture.PARTS["right wing"][0][1]
+    tip = turned @ solids.AIRCRAFT["right wing"][0][1]
     assert tip[2] < -0.3
-    screen = attitude_picture.viewed()
+    screen = solids.viewed()
     np.testing.assert_allclose(parts["right wing"].get_xy()[1], [tip @ screen.right, tip @ screen.up], rtol=0, atol=1e-15)
 
 
@@ -370,12 +372,12 @@ def turned_up(chart):
 
 def test_a_rigid_body_is_drawn_by_the_path_of_its_axis_and_as_a_box(pictures):
     chart = pictures["body"]
-    assert (chart.kind, body_picture.main_axis(chart)) == ("body", 1)
+    assert (chart.kind, solids.main_axis(chart)) == ("body", 1)
     # Two ways to the same turn: some thirty roundings of numbers up to 1, 2⁻⁵³ each, are below 1e-14.
     figure = chart.plot()
     ball, *small, omega, _, _ = figure.axes
-    assert len(small) == body_picture.ATTITUDES
-    screen, matrices = attitude_picture.viewed(elevation=body_picture.ELEVATION), turned_up(chart)
+    assert len(small) == solids_picture.BODY_ATTITUDES
+    screen, matrices = solids.viewed(elevation=solids.BODY_ELEVATION), turned_up(chart)
     tips = matrices[:, :, 1]
     drawn = [line for line in ball.lines if len(line.get_xdata()) == len(chart.run.t) and line.get_color() == "#000000"]
     seen = np.stack([tips @ screen.right, tips @ screen.up], axis=-1)
@@ -388,10 +390,10 @@ def test_a_rigid_body_is_drawn_by_the_path_of_its_axis_and_as_a_box(pictures):
     np.testing.assert_array_equal([line.get_ydata() for line in omega.lines[3:]], chart.run.v.T)
     np.testing.assert_array_equal([line.get_ydata() for line in omega.lines[:3]], chart.exact[1].T)
     # The dark face of the box is where the axis points: up at the start, down after it has turned over.
-    half = body_picture.half_sides(chart.run.system.inertia)
+    half = solids.half_sides(chart.run.system.inertia)
     heights = []
-    for axes, frame in zip(small, attitude_picture.chosen(chart, body_picture.ATTITUDES), strict=True):
-        names = body_picture.box(half, 1)
+    for axes, frame in zip(small, solids_picture.attitudes(chart, solids_picture.BODY_ATTITUDES), strict=True):
+        names = solids.box(half, 1)
         dark = dict(zip(names, axes.patches, strict=True))["+2"]
         middle = half[1] * matrices[frame, :, 1]
         assert np.abs(dark.get_xy()[:4].mean(axis=0) - [middle @ screen.right, middle @ screen.up]).max() < 1e-14
@@ -402,12 +404,12 @@ def test_a_rigid_body_is_drawn_by_the_path_of_its_axis_and_as_a_box(pictures):
 
 @pytest.mark.parametrize("inertia", [[2.0, 3.0, 4.0], [1.0, 1.0, 1.6], [5.0, 4.0, 2.0]])
 def test_a_box_has_the_moments_of_the_body(inertia):
-    a, b, c = body_picture.half_sides(np.array(inertia))
+    a, b, c = solids.half_sides(np.array(inertia))
     moments = np.array([b * b + c * c, c * c + a * a, a * a + b * b])  # of a box: m/3 of these
     np.testing.assert_allclose(moments / moments[0], np.array(inertia) / inertia[0], rtol=1e-14)
     for axis in range(3):
-        faces = body_picture.box(np.array([a, b, c]), axis)
-        assert {fill for _, fill in faces.values()} == {body_picture.FRONT, body_picture.BACK, *body_picture.SIDES}
+        faces = solids.box(np.array([a, b, c]), axis)
+        assert {fill for _, fill in faces.values()} == {solids.FRONT, solids.BACK, *solids.SIDES}
         for name, (corners, _) in faces.items():
             i = int(name[1]) - 1
             assert {corner[i] for corner in corners} == {(a, b, c)[i] * (1.0 if name[0] == "+" else -1.0)}
@@ -415,7 +417,7 @@ def test_a_box_has_the_moments_of_the_body(inertia):
 
 def test_the_path_of_a_top_has_the_vertical_up(pictures):
     chart = pictures["top"]
-    np.testing.assert_array_equal(body_picture.upright(chart), np.eye(3))
+    np.testing.assert_array_equal(solids.upright(chart), np.eye(3))
     assert "up is the third axis of space" in said(chart.plot())
     assert "up is the angular momentum" in said(pictures["body"].plot())
     # A centre of mass on the other side of the axis hangs, and so does the disc.
@@ -426,7 +428,7 @@ def test_the_path_of_a_top_has_the_vertical_up(pictures):
         disc = looked_at(top, "rk4").plot().axes[1].patches[0].get_xy()
         assert np.sign(disc[:, 1].mean()) == side
     upside_down = sw.Scene(sw.RigidBody([1.0, 1.0, 0.5]), v=[0.0, 0.0, -1.0], y=[1.0, 0.0, 0.0, 0.0], horizon=3.0)
-    found = body_picture.upright(looked_at(upside_down, "rk4"))
+    found = solids.upright(looked_at(upside_down, "rk4"))
     assert (found @ [0.0, 0.0, -1.0]).tolist() == [0.0, 0.0, 1.0]
     assert np.linalg.det(found) == 1.0
 
@@ -452,10 +454,10 @@ def test_a_frame_is_the_attitude_of_its_time(pictures):
     figure, show = runs_animation.stage(chart)
     show(90)
     show(60)
-    screen, matrices = attitude_picture.viewed(elevation=body_picture.ELEVATION), turned_up(chart)
+    screen, matrices = solids.viewed(elevation=solids.BODY_ELEVATION), turned_up(chart)
     tip = matrices[60, :, 1]
     rod = next(line for line in figure.axes[0].lines if len(line.get_xdata()) == 2 and line.get_color() == "black")
-    assert np.abs(rod.get_xydata()[1] - body_picture.REACH * np.array([tip @ screen.right, tip @ screen.up])).max() < 1e-14
+    assert np.abs(rod.get_xydata()[1] - solids.REACH * np.array([tip @ screen.right, tip @ screen.up])).max() < 1e-14
     trail = next(line for line in figure.axes[0].lines if line.get_color() == "#7a7a7a")
     assert np.abs(trail.get_xydata()[-1] - rod.get_xydata()[1]).max() < 1e-14
 
@@ -608,3 +610,17 @@ def test_a_run_back_in_time_is_drawn(scene: str, adaptive: bool, tmp_path: Path)
         assert left > right
     run.animate(tmp_path / "back.html")
     run.animate(tmp_path / "back.gif", seconds=0.5, fps=4.0)
+
+
+def test_every_system_has_a_row_that_says_how_it_is_drawn() -> None:
+    """Of a class without one, that of the class from which it is derived."""
+    assert kind_of(sw.scenes.double_pendulum().system).links(sw.scenes.double_pendulum().system) == [(0, 1)]
+    assert [point.joined for point in kind_of(sw.Pendulum3D()).fixed_points(sw.Pendulum3D())] == [(0,)]
+    assert [point.name for point in kind_of(sw.RestrictedThreeBody()).fixed_points(sw.RestrictedThreeBody(mu=0.3))] == [
+        "heavy body",
+        "light body",
+    ]
+    assert kind_of(sw.Chain(3)).owner == "mass"
+    assert kind_of(sw.Oscillator()) is ROWS[sw.System]
+    on_a_line = sw.integrate(sw.NBody([1.0, 1.0]), "rk4", v=np.zeros((2, 1)), y=[[0.0], [1.0]], dt=0.01, steps=3, every=1)
+    assert own_picture(on_a_line).kind == "rows"

@@ -61,8 +61,6 @@ if TYPE_CHECKING:
 registry.register(
     animate_run="stepwell.views.charts.animation:animate",
     draw_advice="stepwell.views.charts.advice_picture:draw",
-    draw_attitude="stepwell.views.charts.attitude_picture:draw_panels",
-    draw_body="stepwell.views.charts.body_picture:draw_panels",
     draw_control="stepwell.views.charts.control_picture:draw",
     draw_curves="stepwell.views.charts.zplane_picture:curves",
     draw_eigenvalues="stepwell.views.charts.roots_picture:draw",

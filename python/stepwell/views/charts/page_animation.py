@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
-from . import attitude_picture, body_picture
-from .orbits_picture import BODIES, links, view
+from .orbits_picture import BODIES
+from .run_panels import Series, angles, errors, falling, on_plane, side_by_side, swings
 from .runs import RunPicture
 from .runs_finding import broke_off, steps_of
+from .solids import BODY_TRAIL, HALF_SIDE, REACH, solid_of
 from .style import FAMILIES
 
 WEB = Path(__file__).parent / "web"
@@ -26,12 +27,6 @@ NONE = 2**16 - 1
 #: Bytes of codes that states and links may take, most states, and points of an exact curve: the page stays below 200 KB, since
 #: four letters hold three bytes, exact curves of five bodies take 24 KB, and the page itself 12 KB.
 BYTES, STATES, EXACT_POINTS = 110_000, 4000, 1200
-
-#: A trail is as long as this share of the run, or of the period if there is one.
-TRAIL, TRAIL_OF_PERIOD = 0.1, 0.3
-
-#: From where bodies that fall are seen: degrees from the first axis, and above the horizontal.
-FALLING = attitude_picture.viewed(-60.0, 15.0)
 
 BLUE, GREEN = FAMILIES["Runge-Kutta"], FAMILIES["leapfrog"]
 Panel = dict[str, Any]
@@ -60,7 +55,7 @@ def data(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
     """What the page is filled with: titles, the times of the states that are shown, and panels."""
     good = np.flatnonzero(chart.finite)
     each = 2 * (2 * chart.places.shape[1] if chart.kind == "orbits" else 9 + int(np.prod(chart.run.y.shape[1:]))) + 12
-    room = BYTES - (4 * len(links(chart)) if chart.kind == "orbits" else 0)
+    room = BYTES - (4 * len(chart.links) if chart.kind == "orbits" else 0)
     number = max(2, min(len(good), STATES, room // each))
     shown = good[np.round(np.linspace(0, len(good) - 1, number)).astype(int)]
     run, t = chart.run, chart.run.t[shown]
@@ -70,16 +65,15 @@ def data(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
     between = number < len(good) and number < seconds * fps
     if between:
         about += f" {number} of {len(run.t)} saved states, and straight lines between them."
-    make = {"orbits": _orbits, "swing": _swing, "rows": _rows, "attitude": _attitude, "body": _body}[chart.kind]
-    span = abs(float(t[-1] - t[0]))
+    motions = {"orbits": _orbits, "swing": _swing, "rows": _rows, "attitude": _aircraft, "body": _body}
     return {
         "title": chart.title,
         "about": about,
         "seconds": seconds,
         "between": between,
-        "digits": max(0, min(6, 2 - int(np.floor(np.log10(max(span / 100.0, 1e-300)))))),
+        "digits": chart.digits,
         "t": encoded(t),
-        "panels": make(chart, shown) + _errors(chart, shown),
+        "panels": motions[chart.kind](chart, shown) + _errors(chart, shown),
     }
 
 
@@ -104,171 +98,135 @@ def _letters(codes: Any) -> str:
 
 def _orbits(chart: RunPicture, shown: Array) -> list[Panel]:
     """Points with trails, springs and rods as lines, and what is fixed."""
-    places = chart.places[shown]
-    count, dim = places.shape[1:]
-    exact = chart.exact_places
-    joined = links(chart)
-    if dim == 3 and (len(joined) or chart.fixed_points):
-        flat, name = FALLING.flat, "seen from the front, to the right and above"
-        seen = flat(places)
-        low, high = seen.reshape(-1, 2).min(axis=0), seen.reshape(-1, 2).max(axis=0)
-        for _, point, _ in chart.fixed_points:
-            low, high = np.minimum(low, flat(np.array(point))), np.maximum(high, flat(np.array(point)))
-        centre, half = 0.5 * (low + high), 0.54 * float((high - low).max())
-    else:
-
-        def flat(points: Array) -> Array:
-            return points[..., :2]
-
-        seen, name = flat(places), "seen along z" if dim == 3 else ""
-        centre, half = view(chart, (0, 1))
-    half = max(half, 1e-12 * max(float(np.abs(centre).max()), 1.0))
-    seen = np.clip(seen, centre - 4.0 * half, centre + 4.0 * half)  # far outside; the codes are for what is seen
-    length = TRAIL * float(chart.elapsed[-1])
-    if chart.scene.period is not None:
-        length = min(length, TRAIL_OF_PERIOD * chart.scene.period)
-    some: Any = [] if exact is None or count > len(BODIES) else np.linspace(0, len(exact) - 1, EXACT_POINTS).astype(int)
-    held = [(k, i) for k, (_, _, ends) in enumerate(chart.fixed_points) for i in ends]
+    links, count = chart.links, chart.places.shape[1]
+    hanging = chart.places.shape[2] == 3 and (len(links) or chart.fixed_points)
+    view = falling(chart) if hanging else on_plane(chart)
+    few = count <= len(BODIES)
+    centre, half = view.centre, max(view.half, 1e-12 * max(float(np.abs(view.centre).max()), 1.0))
+    seen = np.clip(view.places[shown], centre - 4.0 * half, centre + 4.0 * half)  # far outside; the codes are for what is seen
+    curves = []
+    if view.exact is not None and few:
+        at = np.linspace(0, len(view.exact) - 1, EXACT_POINTS).astype(int)
+        curves = [{"data": encoded(view.exact[at, i])} for i in range(count)]
     panel = {
         "type": "points",
         "rect": (0.02, 0.06, 0.5, 0.92),
-        "limits": _limits(centre, half),
+        "limits": [float(x) for x in (centre[0] - half, centre[0] + half, centre[1] - half, centre[1] + half)],
         "equal": True,
-        "name": name,
+        "name": view.name,
         "count": count,
-        "colours": [body["color"] for body in BODIES[:count]] if count <= len(BODIES) else [BLUE],
-        "radius": (0.0 if count > 200 else 3.0) if count > len(BODIES) else 8.0,
-        "trail": 0.0 if len(joined) > len(BODIES) else length,
-        "joined": {"low": 0, "step": 1, "codes": _letters(joined)},
-        "held": held,
+        "colours": [body["color"] for body in BODIES[:count]] if few else [BLUE],
+        "radius": 8.0 if few else 3.0 if count <= 200 else 0.0,
+        "trail": 0.0 if len(links) > len(BODIES) else chart.trail,
+        "joined": {"low": 0, "step": 1, "codes": _letters(links)},
+        "held": [(k, i) for k, point in enumerate(view.fixed) for i in point.joined],
         "fixed": [
-            {"at": flat(np.array(point)).tolist(), "name": name, "radius": 9.0 if not ends else 4.0, "colour": "#555"}
-            for name, point, ends in chart.fixed_points
+            {"at": point.place, "name": point.name, "radius": 4.0 if point.joined else 9.0, "colour": "#555"}
+            for point in view.fixed
         ],
-        "exact": [{"data": encoded(flat(exact[some, i]))} for i in range(count)] if len(some) and exact is not None else [],
+        "exact": curves,
         "data": encoded(seen),
     }
     return [panel]
 
 
-def _limits(centre: Array, half: float) -> tuple[float, ...]:
-    return tuple(float(x) for x in (centre[0] - half, centre[0] + half, centre[1] - half, centre[1] + half))
-
-
 def _swing(chart: RunPicture, shown: Array) -> list[Panel]:
     """Coordinate and velocity as they grow."""
-    t = chart.run.t[shown]
-    known = chart.scene.exact(t) if chart.scene.exact is not None and t[-1] <= chart.scene.until else None
-    panels = []
-    blocks = (("y", chart.run.y[shown], BLUE), ("v", chart.run.v[shown], GREEN))
-    given = [block for block in blocks if block[1][0].size]  # a system of first order has no v
-    for k, (name, values, colour) in enumerate(given):
-        lines = [] if known is None else [{"data": encoded(known[1 - k]), "exact": True}]
-        size = float(np.abs(values if known is None else known[1 - k]).max()) or 1.0
-        size = min(3.0 * size, max(size, float(np.abs(values).max())))
-        lines.append({"data": encoded(np.clip(values, -4.0 * size, 4.0 * size)), "colour": colour})
-        panels.append(
-            _series(name, lines, t, (-1.1 * size, 1.1 * size), (0.07, 0.06 + 0.48 * k, 0.46, 0.4 if len(given) > 1 else 0.88))
-        )
-    return panels
+    panels, exact = swings(chart), chart.exact_at(shown)
+    height = 0.4 if len(panels) > 1 else 0.88
+    return [
+        _series(chart, series, shown, (0.07, 0.06 + 0.48 * k, 0.46, height), colour, None if exact is None else exact[1 - k])
+        for k, (series, colour) in enumerate(zip(panels, (BLUE, GREEN), strict=False))
+    ]
 
 
 def _rows(chart: RunPicture, shown: Array) -> list[Panel]:
     """The coordinates side by side."""
-    y = chart.run.y[shown].reshape(len(shown), -1)
-    t, n = chart.run.t[shown], y.shape[1]
-    known = None
-    if chart.scene.exact is not None and t[-1] <= chart.scene.until:
-        known = chart.scene.exact(t)[1].reshape(len(t), -1)
-    size = float(np.abs(y[:1] if known is None else known).max()) or 1.0
-    size = min(3.0 * size, max(size, float(np.abs(y).max())))
+    values, size = side_by_side(chart)
+    exact = chart.exact_at(shown)
     panel = {
         "type": "rows",
         "rect": (0.03, 0.08, 0.5, 0.84),
-        "limits": (0.0, n + 1.0, -1.1 * size, 1.1 * size),
+        "limits": (0.0, values.shape[1] + 1.0, -1.1 * size, 1.1 * size),
         "name": "the coordinates, side by side by their number",
-        "count": n,
+        "count": values.shape[1],
         "colours": [BLUE],
-        "data": encoded(np.clip(y, -4.0 * size, 4.0 * size)),
+        "data": encoded(np.clip(values[shown], -4.0 * size, 4.0 * size)),
     }
-    return [panel | ({} if known is None else {"exact": {"data": encoded(known)}})]
+    return [panel | ({} if exact is None else {"exact": {"data": encoded(exact[1])}})]
 
 
-def _attitude(chart: RunPicture, shown: Array) -> list[Panel]:
+def _aircraft(chart: RunPicture, shown: Array) -> list[Panel]:
     """An aircraft in space, and its angles."""
-    faces = [(corners, fill) for corners, fill in attitude_picture.PARTS.values()]
-    matrices = np.moveaxis(attitude_picture.rotation(chart), -1, 0)[shown]
-    panels = [_solid(faces, matrices, attitude_picture.viewed(), attitude_picture.HALF_SIDE)]
-    t, angles = chart.run.t[shown], chart.run.y[shown]
-    if chart.run.y.shape[1] != len(attitude_picture.ANGLES):
-        system: Any = chart.run.system
-        angles = system.angles(chart.run.y, axis=1)[shown]
-    for k, name in enumerate(attitude_picture.ANGLES):
-        values = np.clip(angles[:, k], -attitude_picture.LARGEST, attitude_picture.LARGEST)
-        size = 1.1 * float(np.abs(values).max()) or 1.0
-        line = [{"data": encoded(values), "colour": tuple(FAMILIES.values())[k + 1]}]
-        panels.append(_series(f"{name}, degrees", line, t, (-size, size), (0.6, 0.06 + 0.32 * k, 0.38, 0.24)))
-    return panels
+    places = [(0.6, 0.06 + 0.32 * k, 0.38, 0.24) for k in range(3)]
+    panels = zip(angles(chart), places, tuple(FAMILIES.values())[1:], strict=False)
+    return [_solid(chart, shown), *(_series(chart, series, shown, place, colour) for series, place, colour in panels)]
 
 
 def _body(chart: RunPicture, shown: Array) -> list[Panel]:
     """A rigid body as a box or a top, and the trail of its axis."""
-    up, axis = body_picture.upright(chart), body_picture.main_axis(chart)
-    matrices = np.einsum("ij,jkn->nik", up, attitude_picture.rotation(chart)[..., shown])
-    shape, reach = body_picture.parts(chart.run.system, axis)
-    panel = _solid(
-        list(shape.values()), matrices, attitude_picture.viewed(elevation=body_picture.ELEVATION), attitude_picture.HALF_SIDE
-    )
+    solid = solid_of(chart)
+    assert solid.axis is not None
     tip = np.zeros(3)
-    tip[axis] = np.copysign(body_picture.REACH, reach)
-    length = body_picture.TRAIL * float(chart.elapsed[-1])
-    return [panel | {"tip": tip.tolist(), "trail": length, "name": f"the tip of axis {axis + 1} leaves a trail"}]
+    tip[solid.axis] = np.copysign(REACH, solid.reach)
+    trail = {"tip": tip.tolist(), "trail": BODY_TRAIL * float(chart.elapsed[-1])}
+    return [_solid(chart, shown) | trail | {"name": f"the tip of axis {solid.axis + 1} leaves a trail"}]
 
 
-def _solid(faces: list[Any], matrices: Array, screen: attitude_picture.Seen, reach: float) -> Panel:
+def _solid(chart: RunPicture, shown: Array) -> Panel:
+    solid = solid_of(chart)
     return {
         "type": "solid",
         "rect": (0.02, 0.06, 0.5, 0.92),
-        "limits": (-reach, reach, -reach, reach),
+        "limits": (-HALF_SIDE, HALF_SIDE, -HALF_SIDE, HALF_SIDE),
         "equal": True,
         "name": "",
         "colours": [BLUE],
-        "faces": faces,
-        "screen": [axis.tolist() for axis in screen],
-        "data": encoded(matrices),
+        "faces": list(solid.parts.values()),
+        "screen": [axis.tolist() for axis in solid.screen],
+        "data": encoded(np.moveaxis(solid.matrices, -1, 0)[shown]),
     }
 
 
 def _errors(chart: RunPicture, shown: Array) -> list[Panel]:
-    """The errors that are known, on a scale of powers of ten."""
-    panels = []
+    """The errors that are known; beside an aircraft there are its angles."""
     if chart.kind == "attitude":
         return []
-    for k, (name, error) in enumerate((("energy error", chart.energy_error), ("state error", chart.state_error))):
-        if error is None:
-            continue
-        with np.errstate(divide="ignore", invalid="ignore"):
-            powers = np.log10(error[shown])
-        known = powers[np.isfinite(powers)]
-        if not known.size:
-            continue
-        high = float(known.max()) + 0.3
-        low = min(max(float(known.min()), float(known.max()) - 9.0) - 0.3, high - 2.0)
-        line = {"data": encoded(np.where(powers >= low, powers, np.nan)), "colour": "#333"}
-        rect = (0.64, 0.06 + 0.48 * k, 0.34, 0.4)
-        panels.append(_series(f"{name}, relative", [line], chart.run.t[shown], (low, high), rect, log=True))
-    return panels
+    return [
+        _series(chart, series, shown, (0.64, 0.06 + 0.48 * k, 0.34, 0.4), "#333")
+        for k, series in enumerate(errors(chart))
+        if series.log and np.isfinite(series.lines[0].values[shown]).any()
+    ]
 
 
 def _series(
-    name: str, lines: list[Panel], t: Array, limits: tuple[float, float], rect: tuple[float, ...], *, log: bool = False
+    chart: RunPicture, series: Series, shown: Array, rect: tuple[float, ...], colour: str, exact: Array | None = None
 ) -> Panel:
-    """Values over time."""
-    low, high = limits
-    if log:
+    """The main curve of a panel over time, above the exact one; an error by its power of ten."""
+    assert series.limits is not None
+    low, high = series.limits
+    values, t = series.lines[0].values[shown], chart.run.t[shown]
+    if series.log:
+        low, high = np.log10(series.limits).tolist()
+        low = min(low, high - 2.0)
+        powers = np.log10(values)
+        values = np.where(powers >= low, powers, np.nan)
         whole = np.arange(np.ceil(low), np.floor(high) + 1)
         ticks = [(float(p), f"1e{int(p)}") for p in whole[:: max(1, len(whole) // 4)]]
     else:
-        ticks = [(value, f"{value:.3g}") for value in (0.9 * low, 0.0, 0.9 * high)]
-    scale = (float(t[0]), float(t[-1]), low, high)
-    return {"type": "series", "rect": rect, "limits": scale, "name": name, "lines": lines, "ticks": ticks}
+        if series.angles:  # a gap where an angle jumps by more than half a turn
+            values = np.where(np.abs(np.diff(values, append=values[-1])) > 180.0, np.nan, values)
+        values = np.clip(values, 4.0 * low, 4.0 * high)
+        apart = 0.1 * (high - low)
+        ticks = [(x, f"{x:.3g}") for x in (0.9 * low, 0.0, 0.9 * high) if x == 0.0 or abs(x) > apart]
+    lines: list[Panel] = [] if exact is None else [{"data": encoded(exact), "exact": True}]
+    lines.append({"data": encoded(values), "colour": colour})
+    limits = (float(t[0]), float(t[-1]), low, high)
+    return {
+        "type": "series",
+        "rect": rect,
+        "limits": limits,
+        "name": series.title or series.label,
+        "lines": lines,
+        "ticks": ticks,
+    }

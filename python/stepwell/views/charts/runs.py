@@ -16,16 +16,22 @@ from ...base.immutable import ValueEquality
 from ...base.pictures import Drawn
 from ...base.tables import Table
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
-from ...model.systems import NBody, Particles, Pendulum3D, RestrictedThreeBody, RigidBody, Rods, Springs
 from ...runs.encounters import MAX_RERUN
 from ...runs.integration import integrate
 from ...runs.known_energy import keeps_energy
 from ...runs.result import Run
 from ...scenes import Scene
 from ...scenes import scene as find_scene
+from .kinds import FixedPoint, kind_of
 
 #: Times at which the exact solution is drawn.
 EXACT = 6001
+
+#: States of a broken run are drawn up to this size.
+LARGEST = 1e9
+
+#: A trail is as long as this share of the run, or of the period if there is one.
+TRAIL, TRAIL_OF_PERIOD = 0.1, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +60,10 @@ class RunPicture(Drawn, Table, ValueEquality):
     @property
     def kind(self) -> str:
         """``"orbits"`` of bodies and points, an aircraft's ``"attitude"``, a rigid ``"body"``, a ``"swing"`` or ``"rows"``."""
-        if isinstance(self.run.system, (NBody, Particles, Rods, Springs)) and self.run.system.y_shape[-1] > 1:
-            return "orbits"
-        if isinstance(self.run.system, (RestrictedThreeBody, Pendulum3D)):
-            return "orbits"  # of one point, beside what is fixed
-        if hasattr(self.run.system, "commanded"):
-            return "attitude"
-        if isinstance(self.run.system, RigidBody):
-            return "body"
-        return "rows" if self.scene.system.y_shape else "swing"
+        shape, picture = self.scene.system.y_shape, kind_of(self.run.system).picture
+        if picture == "curves" or (picture == "orbits" and shape[-1] == 1):  # points on a line have no orbits
+            return "rows" if shape else "swing"
+        return picture
 
     @property
     def places(self) -> Array:
@@ -71,31 +72,34 @@ class RunPicture(Drawn, Table, ValueEquality):
 
     @property
     def exact_places(self) -> Array | None:
-        """The same of the exact solution at the times of ``exact``, or None."""
+        """The places of the exact solution at the times of ``exact``, or None."""
         return None if self.exact is None else _of_points(self.exact[2])
 
     @property
-    def fixed_points(self) -> list[tuple[str, tuple[float, ...], tuple[int, ...]]]:
-        """Name, place, and the points at the other ends of its rods, of each body or end of a rod that does not move."""
-        system: Any = self.run.system
-        if isinstance(system, RestrictedThreeBody):
-            mu = float(system.mu)
-            names = ("earth", "moon") if mu == float(RestrictedThreeBody().mu) else ("heavy body", "light body")
-            return [(names[0], (-mu, 0.0), ()), (names[1], (1.0 - mu, 0.0), ())]
-        if isinstance(system, Pendulum3D):
-            return [("", (0.0, 0.0, 0.0), (0,))]
-        if not isinstance(system, Rods):
-            return []
-        ends = [(rod, anchor) for anchor in system.anchors for rod in system.rods if anchor in rod]
-        return [
-            ("", tuple(anchor), tuple(end for rod, one in ends if one == anchor for end in rod if isinstance(end, int)))
-            for anchor in system.anchors
-        ]
+    def fixed_points(self) -> list[FixedPoint]:
+        """The bodies and the ends of rods that do not move."""
+        return kind_of(self.run.system).fixed_points(self.run.system)
+
+    @property
+    def links(self) -> np.ndarray[Any, np.dtype[np.int64]]:
+        """The pairs of points that springs or rods join, shape (pairs, 2)."""
+        return np.asarray(kind_of(self.run.system).links(self.run.system), dtype=np.int64).reshape(-1, 2)
+
+    @property
+    def trail(self) -> float:
+        """How long the trail of a moving point is, in units of time: a share of the run, or of a short period."""
+        length = TRAIL * float(self.elapsed[-1])
+        return length if self.scene.period is None else min(length, TRAIL_OF_PERIOD * self.scene.period)
 
     @property
     def elapsed(self) -> Array:
         """How long after the first saved state each was, which ascends for a run back in time too."""
         return np.asarray(np.abs(self.run.t - self.run.t[0]))
+
+    @property
+    def digits(self) -> int:
+        """Digits after the point of a time in an animation: a hundredth of the run is seen."""
+        return max(0, min(6, 2 - int(np.floor(np.log10(max(float(self.elapsed[-1]) / 100.0, 1e-300))))))
 
     @property
     def title(self) -> str:
@@ -110,7 +114,7 @@ class RunPicture(Drawn, Table, ValueEquality):
             return None
         first, second = (round((float(t) - run.t0) / run.dt) for t in run.t[:2])
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what befalls it is drawn
+            warnings.simplefilter("ignore")  # the picture shows what they would say
             free = integrate(
                 run.system.uncontrolled,
                 run.method,
@@ -154,6 +158,11 @@ class RunPicture(Drawn, Table, ValueEquality):
             last = min(last, first + self.scene.period)  # the rest is the same curve
         t = np.linspace(first, last, EXACT)
         return t, *self.scene.exact(t)
+
+    def exact_at(self, saved: Any) -> tuple[Array, Array] | None:
+        """Blocks v and y of the exact solution at some saved states; None where it is not known at the last of them."""
+        t = self.run.t[saved]
+        return self.scene.exact(t) if self.scene.exact is not None and t[-1] <= self.scene.until else None
 
     def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
         """Write an animation of the run; its frames are the saved states.
@@ -251,14 +260,14 @@ def own_picture(run: Run) -> RunPicture:
 
 
 def _begins(scene: Scene, run: Run) -> bool:
-    """Whether the first state is the scene's start, but for the rounding of a method that makes v from something else.
+    """Whether the first state is the scene's start, up to the rounding of methods that compute v from what they carry.
 
-    In float32 the start is rounded, by up to 2⁻²⁴ of a number, and so is what such a method makes.
+    In float32 the start itself is rounded, by up to 2⁻²⁴ of a number.
     """
     pairs = ((run.v[0], scene.v), (run.y[0], scene.y))
     scale = max(float(np.abs(block).max(initial=0.0)) for _, block in pairs)  # a system of first order has no v
     near = (2.0**-21 if run.dtype == "float32" else 1e-9) * scale
-    return all(np.allclose(found, block, rtol=0.0, atol=near) for found, block in pairs)
+    return all(np.allclose(saved, block, rtol=0.0, atol=near) for saved, block in pairs)
 
 
 def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:

@@ -29,6 +29,15 @@ PEERS = "1234+|"
 LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 3: (0, (8, 1.8)), 5: (0, (12, 1.5)), 8: (0, (24, 1.2))}
 GREY = "#666666"
 
+#: The exact motion of a run, below all else.
+EXACT: dict[str, Any] = {"color": "#d4d4d4", "linewidth": 5.0, "zorder": 1, "solid_capstyle": "round"}
+
+#: A curve of more states than this is drawn thin and without dashes, and as pixels in files of lines.
+LONG_CURVE = 3000
+
+#: Where the panels of a run's picture are, as shares of width and height.
+BOTTOM, TOP, RIGHT = 0.165, 0.87, 0.978
+
 #: Sizes in points, for pictures of about 1600 pixels' width at 100 dots per inch.
 FONT: Any = {"font.size": 14.0, "axes.labelsize": 14.0, "legend.fontsize": 12.0}
 
