@@ -622,5 +622,6 @@ def test_every_system_has_a_row_that_says_how_it_is_drawn() -> None:
     ]
     assert kind_of(sw.Chain(3)).owner == "mass"
     assert kind_of(sw.Oscillator()) is ROWS[sw.System]
-    on_a_line = sw.integrate(sw.NBody([1.0, 1.0]), "rk4", v=np.zeros((2, 1)), y=[[0.0], [1.0]], dt=0.01, steps=3, every=1)
+    y = np.array([[0.0], [1.0]])
+    on_a_line = sw.integrate(sw.Particles([1.0, 1.0]), "rk4", v=0.0 * y, y=y, dt=0.01, steps=3, every=1)
     assert own_picture(on_a_line).kind == "rows"
