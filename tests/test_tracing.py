@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.model.systems.base import flat
+from stepwell.model.parameters import flat
 from stepwell.reference import adaptive, contact
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine

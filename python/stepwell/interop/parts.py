@@ -237,4 +237,4 @@ def is_whole(run: Run) -> None:
     """Raise if parts of a run do not fit together, as those that another version wrote may not."""
     system: System = run.system
     repr(run)
-    system.all_given(run.status.shape)
+    system.all_parameters(run.status.shape)

@@ -114,7 +114,7 @@ def goes_back(system: System, control: Any) -> None:
             f'got {system!r}. Use way="spring"; or of a motion without friction and loss step −v with dt above zero'
         )
     control = system.keeper if control is None else control
-    if getattr(control, "pushes", False) or isinstance(control, (Control, NormControl)):
+    if isinstance(control, (EnergyControl, Control, NormControl)):
         raise UnsupportedError(
             f"dt: below zero time runs back, and {control!r} drives back to its target as time goes on, so away from it as time "
             f"goes back; use a projection"

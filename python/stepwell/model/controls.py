@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -13,6 +12,7 @@ from ..base.arrays import Array, Shape
 from ..base.immutable import Immutable, ValueEquality, changed
 from ..errors import ArgumentError, ControlWarning, DTypeError
 from ..reference import control as reference
+from .around import Part
 
 if TYPE_CHECKING:
     from ..base.literals import ControlForm
@@ -20,7 +20,22 @@ if TYPE_CHECKING:
 FORMS: tuple[ControlForm, ...] = ("limited", "printed")
 
 
-class EnergyControl(Immutable, ValueEquality):
+class OfEnergy(Part):
+    """What acts on the energy of a system, to keep it constant."""
+
+    kind = "control"
+
+    @property
+    def keeps_energy(self) -> bool:
+        """It is meant to."""
+        return True
+
+    def repr_arguments(self) -> list[str]:
+        """Nothing: a system shows its control by itself."""
+        return []
+
+
+class EnergyControl(OfEnergy):
     """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity.
 
     It pushes in every stage of a method; by PEFRL, in whose stages v and y belong to different times, after every step. With a
@@ -56,14 +71,11 @@ class EnergyControl(Immutable, ValueEquality):
         #: Whether it pushes between steps: ``integrate`` sets it for methods in whose stages v and y belong to different times.
         self.between = False
 
-    #: It acts on rates, and is no projection.
-    pushes: ClassVar[bool] = True
-
     @property
     def batch(self) -> Shape:
         """The shape to which its numbers broadcast."""
-        given = {"gain": self.gain, "relative": self.relative, "target": self.target}
-        return checks.batch_shape({name: each.shape for name, each in given.items() if each is not None})
+        numbers = {"gain": self.gain, "relative": self.relative, "target": self.target}
+        return checks.batch_shape({name: each.shape for name, each in numbers.items() if each is not None})
 
     def __repr__(self) -> str:
         strength = f"gain={self.gain}" if self.relative is None else f"relative={self.relative}"
@@ -91,19 +103,16 @@ class EnergyControl(Immutable, ValueEquality):
             )
         return aimed
 
-    def around(self, s: Any, h: float) -> reference.Controlled:
-        """The NumPy reference of the control, wrapped around that of a system, both scaled to the step h."""
-        return reference.Controlled(s, h, self.form, np.asarray(self.gain), np.asarray(self.target), between=self.between)
-
-    def given(self) -> dict[str, Any]:
-        """Its parameters for the core, in addition to those of the system."""
+    def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
+        """Its form, when it acts, its gain and its target."""
         numbers = {"control.gain": np.asarray(self.gain), "control.target": np.asarray(self.target)}
         words = {"control": "energy", "control.form": self.form} | ({"control.when": "between"} if self.between else {})
         return words | numbers
 
-    def member(self, one: Callable[[Array], Array]) -> EnergyControl:
-        """The same for a single member."""
-        return changed(self, gain=one(np.asarray(self.gain)), target=one(np.asarray(self.target)))
+    def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> reference.Controlled:
+        """The system, pushed."""
+        gain, target = parameters["control.gain"], parameters["control.target"]
+        return reference.Controlled(s, h, self.form, gain, target, between=self.between)
 
 
 class Control(Immutable, ValueEquality):
@@ -164,8 +173,8 @@ class Control(Immutable, ValueEquality):
             )
         return aimed
 
-    def given(self) -> dict[str, Any]:
-        """Its parameters, in addition to those of the system."""
+    def own_parameters(self) -> dict[str, Any]:
+        """Its parameters, which stand among those of the equations: it is a part of the rates."""
         return {"control.gain": self.gain, "control.target": np.asarray(self.target)}
 
 
@@ -245,7 +254,7 @@ class NormControl(ConstraintControl):
 WAYS = ("scaling", "nacozy")
 
 
-class Projection(Immutable, ValueEquality):
+class Projection(OfEnergy):
     """Projects the state back to the target energy, or to that of another invariant, after every step.
 
     ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the smallest change of the state
@@ -274,8 +283,7 @@ class Projection(Immutable, ValueEquality):
         self.invariant = "energy" if self.way in WAYS else self.way
         self.target = None if target is None else checks.numbers("target", target)
 
-    #: It acts on the state after a step, and not on rates.
-    pushes: ClassVar[bool] = False
+    acts_on_rates = False
 
     @property
     def batch(self) -> Shape:
@@ -289,22 +297,18 @@ class Projection(Immutable, ValueEquality):
         """The same projection with a number for its target."""
         return self if self.target is not None else changed(self, target=np.asarray(energy))
 
-    def around(self, s: Any, h: float) -> reference.Projected:
-        """The NumPy reference of the control, wrapped around that of a system, both scaled to the step h."""
-        return reference.Projected(s, h, self._known_way, np.asarray(self.target))
-
-    def given(self) -> dict[str, Any]:
-        """Its parameters for the core, in addition to those of the system."""
+    def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
+        """Its way and its target."""
         return {"control": "projection", "control.way": self._known_way, "control.target": np.asarray(self.target)}
+
+    def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> reference.Projected:
+        """The system whose states are projected."""
+        return reference.Projected(s, h, self._known_way, parameters["control.target"])
 
     @property
     def _known_way(self) -> str:
         """How the core projects: onto an invariant along its gradient."""
         return self.way if self.way in WAYS else "nacozy"
-
-    def member(self, one: Callable[[Array], Array]) -> Projection:
-        """The same for a single member."""
-        return changed(self, target=one(np.asarray(self.target)))
 
 
 AnyControl = EnergyControl | Projection | Control | ConstraintControl

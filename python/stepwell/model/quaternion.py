@@ -16,7 +16,7 @@ from ..errors import ArgumentError, ShapeError
 from ..reference import trig
 from ..reference.systems import rigid_body as reference
 from .inputs import LAST_ANGLE
-from .systems.base import aligned
+from .parameters import aligned
 
 
 def from_axis_angle(axis: Any, angle: Any) -> Array:

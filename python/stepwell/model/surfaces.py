@@ -13,6 +13,9 @@ from ..base.arrays import Array, Shape
 from ..base.immutable import Immutable, ValueEquality, changed
 from ..base.reprs import brief
 from ..errors import ArgumentError, DTypeError, ShapeError
+from ..reference import contact
+from .around import Part
+from .parameters import aligned
 
 if TYPE_CHECKING:
     from ..base.literals import ContactWay
@@ -52,8 +55,8 @@ class Surface(Immutable, ValueEquality, ABC):
     @property
     def batch(self) -> Shape:
         """The shape to which its numbers broadcast."""
-        given = {"restitution": self.restitution, "friction": self.friction, "omega": self.omega}
-        shapes = {name: each.shape for name, each in given.items() if each is not None}
+        numbers = {"restitution": self.restitution, "friction": self.friction, "omega": self.omega}
+        shapes = {name: each.shape for name, each in numbers.items() if each is not None}
         return checks.batch_shape(shapes | self._shapes())
 
     @abstractmethod
@@ -69,8 +72,8 @@ class Surface(Immutable, ValueEquality, ABC):
     def place(self, dim: int) -> dict[str, Any]:
         """Where it is, by name, in so many dimensions; vectors have their components along the first axis."""
 
-    def given(self, dim: int) -> dict[str, Any]:
-        """Its parameters by name."""
+    def parameters(self, dim: int) -> dict[str, Any]:
+        """Its parameters by name, in so many dimensions."""
         common: dict[str, Any] = {"way": self.way}
         if self.way == "spring":
             common["omega"] = self.omega
@@ -79,19 +82,19 @@ class Surface(Immutable, ValueEquality, ABC):
         return common | {"friction": self.friction} | self.place(dim)
 
     def member(self, one: Callable[..., Array]) -> Surface:
-        """The same for a single member."""
+        """The same for one member of a batch."""
         numbers = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         return changed(self, **{name: one(value, 1 if name in VECTORS else 0) for name, value in numbers.items()})
 
     def __repr__(self) -> str:
         names = (*self.own, "restitution", "friction", "way", "omega")
         values = {name: getattr(self, name) for name in names}
-        said = (
+        arguments = (
             f"{name}={brief(value)}"
             for name, value in values.items()
             if value is not None and not (name == "restitution" and value.ndim == 0 and value == 1.0)
         )
-        return f"{type(self).__name__}({', '.join(said)})"
+        return f"{type(self).__name__}({', '.join(arguments)})"
 
 
 class Floor(Surface):
@@ -235,36 +238,66 @@ def _unit(vector: Array) -> Array:
     return np.asarray(scaled / np.sqrt(square))
 
 
-def surfaces(argument: str, value: Any) -> tuple[Surface, ...]:
+class Surfaces(Part):
+    """The surfaces that the points of a system meet, in this order."""
+
+    kind = "surfaces"
+
+    def __init__(self, surfaces: tuple[Surface, ...]) -> None:
+        self.surfaces = surfaces
+
+    @property
+    def batch(self) -> Shape:
+        """The shape to which the numbers of all broadcast."""
+        return checks.batch_shape(batches(self.surfaces))
+
+    def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
+        """How many there are, and of each its kind, its way and its numbers."""
+        parameters: dict[str, Any] = {"contacts": len(self.surfaces)}
+        for i, surface in enumerate(self.surfaces):
+            parameters[f"contact_{i}"] = surface.kind
+            for name, value in surface.parameters(y_shape[-1]).items():
+                parameters[f"contact_{i}_{name}"] = aligned(value, 1, batch) if name in VECTORS else value
+        return parameters
+
+    def own_axes(self, name: str) -> int:
+        """One, of vectors."""
+        return 1 if name.endswith(VECTORS) else 0
+
+    def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> contact.Touching:
+        """The system whose points meet them."""
+        return contact.Touching(s, h, contact.surfaces(h, parameters))
+
+    def member(self, one: Callable[..., Array]) -> Surfaces:
+        """The same for one member of a batch."""
+        return Surfaces(tuple(surface.member(one) for surface in self.surfaces))
+
+    def repr_arguments(self) -> list[str]:
+        """The argument ``floor``."""
+        return [f"floor={self.surfaces[0] if len(self.surfaces) == 1 else list(self.surfaces)}"]
+
+
+def floors(argument: Any) -> tuple[Surface, ...]:
     """The argument ``floor``: a surface, a list of them, or None."""
-    if value is None:
+    if argument is None:
         return ()
-    found = tuple(value) if isinstance(value, (list, tuple)) else (value,)
-    for each in found:
-        if not isinstance(each, Surface):
-            raise DTypeError(f"{argument}: expected a Floor, a Sphere, a list of them or None, got {type(each).__name__}")
-    return found
+    surfaces = tuple(argument) if isinstance(argument, (list, tuple)) else (argument,)
+    for surface in surfaces:
+        if not isinstance(surface, Surface):
+            raise DTypeError(f"floor: expected a Floor, a Sphere, a list of them or None, got {type(surface).__name__}")
+    return surfaces
 
 
-def batches(given: tuple[Surface, ...]) -> dict[str, Shape]:
+def around(surfaces: tuple[Surface, ...]) -> tuple[Part, ...]:
+    """What surfaces put around a system: nothing, if there are none."""
+    return (Surfaces(surfaces),) if surfaces else ()
+
+
+def batches(surfaces: tuple[Surface, ...]) -> dict[str, Shape]:
     """The batch shapes of surfaces, with a name for each."""
-    return {f"floor {i}": each.batch for i, each in enumerate(given)}
+    return {f"floor {i}": surface.batch for i, surface in enumerate(surfaces)}
 
 
-def dimensions(given: tuple[Surface, ...]) -> dict[str, int]:
+def dimensions(surfaces: tuple[Surface, ...]) -> dict[str, int]:
     """In how many dimensions surfaces are, where that is known, with a name for each."""
-    return {f"floor {i}": each.dim for i, each in enumerate(given) if each.dim is not None}
-
-
-def parameters(given: tuple[Surface, ...], dim: int, batch: Shape) -> dict[str, Any]:
-    """The parameters of surfaces by name, in the form of ``System.given``; none if there are no surfaces."""
-    if not given:
-        return {}
-    found: dict[str, Any] = {"contacts": len(given)}
-    for i, each in enumerate(given):
-        found[f"contact_{i}"] = each.kind
-        for name, value in each.given(dim).items():
-            if name in VECTORS:
-                value = value.reshape((len(value), *(1,) * (len(batch) - value.ndim + 1), *value.shape[1:]))
-            found[f"contact_{i}_{name}"] = value
-    return found
+    return {f"floor {i}": surface.dim for i, surface in enumerate(surfaces) if surface.dim is not None}

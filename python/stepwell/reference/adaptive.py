@@ -14,7 +14,7 @@ import numpy as np
 from ..base.arrays import Array, Scaled, Whole
 from . import tableau
 from .acceptance import Acceptance
-from .around import Forced
+from .around import Bound, wrapped
 from .bits import and_bits, at_most, less, where
 from .tableau import Increments, Weights
 
@@ -265,29 +265,31 @@ class Stretched:
 
 
 class Attempted:
-    """How an attempt uses a system: its rates for a step under control and force, and the projection of the state after it.
+    """How an attempt uses a system: its rates for a step, with what acts on them, and the projection of the state after it.
 
-    ``s`` is the system scaled to a step of 1. A control, which has ``pushes``, needs the step; a projection does not.
+    ``s`` is the system scaled to a step of 1. What is around it and acts on rates needs the step; a projection does not.
 
     Attributes:
-        unit: the rates for a step of 1, under the force and without control.
+        unit: the rates for a step of 1, with all that acts on them but a control.
     """
 
-    def __init__(self, s: Any, control: Any = None, force: Any = None) -> None:
-        self.s, self.push = s, control if control is not None and control.pushes else None
-        self.projected = s if control is None or control.pushes else control.around(s, 1.0)
-        self.force = force
-        self.unit = self._forced(s, 1.0)
+    def __init__(self, s: Any, parts: Sequence[Bound] = ()) -> None:
+        self.s = s
+        self.acting = [part for part in parts if part[0].acts_on_rates]
+        self.projected = wrapped(s, 1.0, [part for part in parts if not part[0].acts_on_rates])
+        self.unit = self._acting(s, 1.0, without="control")
 
     def rates(self, step: Any) -> Any:
         """The rates for a step, which may be another for each member."""
         stretched = self.s.stretched(step) if hasattr(self.s, "stretched") else Stretched(self.s, step)
-        return self._forced(stretched if self.push is None else self.push.around(stretched, step), step)
+        return self._acting(stretched, step)
 
-    def _forced(self, rates: Any, step: Any) -> Any:
-        if self.force is None:
-            return rates
-        return Forced(rates, -step if isinstance(self.s, Backward) else step, self.force)
+    def _acting(self, rates: Any, step: Any, without: str = "") -> Any:
+        """Rates with what acts on them; where time runs backward, that sees the step and the time of the system."""
+        parts = [part for part in self.acting if part[0].kind != without]
+        if not parts or not isinstance(self.s, Backward):
+            return wrapped(rates, step, parts)
+        return Backward(wrapped(Backward(rates), -step, parts))
 
     def project(self, v: Array, y: Array) -> tuple[Array, Array, Any]:
         """The state after the step, and the energy that this added; None without a projection."""
@@ -491,7 +493,7 @@ def attempt(
     rests = at_most(total(error) + total(absolute(new - old)), 0.0)
     following, goes_on = decided(pace, order > LOW, r, rests, least, outlook)
     v1, y1, work = system.project(v1, y1)
-    done = work if system.push is None else s.work / step
+    done = s.work / step if hasattr(s, "work") else work
     if done is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + done, pace.work))
     return following, where(goes_on, v1, v), where(goes_on, y1, y)

@@ -1,6 +1,6 @@
-"""A force from outside, and friction: systems around a system, itself scaled to the step."""
+"""What is around a system: parts that wrap it one after the other, each a system itself, scaled to the step."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -8,11 +8,24 @@ import numpy as np
 from ..base.arrays import Array, Blocks, Scaled
 from . import bits
 
+#: The kinds of parts, from the inside out: friction resists all other forces, so it comes last.
+ORDER = ("surfaces", "control", "force", "friction")
+
+#: A part, and its parameters by name: numbers, or symbols.
+Bound = tuple[Any, dict[str, Any]]
+
+
+def wrapped(s: Any, h: Any, parts: Iterable[Bound]) -> Any:
+    """A system, scaled to the step h, with these parts around it."""
+    for part, parameters in sorted(parts, key=lambda each: ORDER.index(each[0].kind)):
+        s = part.wrap(s, h, parameters)
+    return s
+
 
 class Around:
-    """A system with all that another one has."""
+    """A system around another one, which has whatever it does not define itself."""
 
-    def __init__(self, s: Scaled) -> None:
+    def __init__(self, s: Any) -> None:
         self.s = s
 
     def __getattr__(self, name: str) -> Any:
@@ -20,12 +33,12 @@ class Around:
 
     @property
     def work(self) -> Any:
-        """What a control within it has added up, if there is one."""
-        return self.s.work  # type: ignore[attr-defined]
+        """The sum that a control within it accumulates; an AttributeError without one."""
+        return self.s.work
 
     @work.setter
     def work(self, work: Any) -> None:
-        self.s.work = work  # type: ignore[attr-defined]
+        self.s.work = work
 
 
 class Forced(Around):
@@ -71,12 +84,6 @@ class Rubbing(Around):
 
     def _within(self, x: Array) -> Any:
         return bits.at_most(-self.limit, x) & bits.at_most(x, self.limit)
-
-
-def surrounded(s: Any, h: float, force: Array | None, friction: Array | None) -> Any:
-    """A system with what is given: friction comes last, for it resists all other forces."""
-    s = s if force is None else Forced(s, h, force)
-    return s if friction is None else Rubbing(s, h, friction)
 
 
 def whole_step(step: Callable[..., Blocks], s: Any, t: float, h: float, v: Array, y: Array) -> Blocks:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import bits
-from .around import whole_step
+from .around import Around, whole_step
 from .signal import of_step, over
 
 #: A distance is known to within so many times the numbers that it is computed from: eight roundings.
@@ -290,24 +290,25 @@ class Sphere(Surface):
         return [c + scale * w for c, w in zip(self.centre, way, strict=True)]
 
 
-def surfaces(h: Any, given: dict[str, Any]) -> list[Surface]:
-    """The surfaces that are given by name."""
-    found: list[Surface] = []
-    for i in range(given.get("contacts", 0)):
-        of = {name.removeprefix(f"contact_{i}_"): value for name, value in given.items() if name.startswith(f"contact_{i}_")}
+def surfaces(h: Any, parameters: dict[str, Any]) -> list[Surface]:
+    """Surfaces by their parameters."""
+    all_of_them: list[Surface] = []
+    for i in range(parameters["contacts"]):
+        first = f"contact_{i}_"
+        of = {name.removeprefix(first): value for name, value in parameters.items() if name.startswith(first)}
         common = h, of["way"], of.get("restitution"), of.get("friction"), of.get("omega")
-        if given[f"contact_{i}"] == "plane":
-            found.append(Plane(*common, of["normal"], of["offset"]))
+        if parameters[f"contact_{i}"] == "plane":
+            all_of_them.append(Plane(*common, of["normal"], of["offset"]))
         else:
-            found.append(Sphere(*common, of["side"], of["centre"], of["radius"]))
-    return found
+            all_of_them.append(Sphere(*common, of["side"], of["centre"], of["radius"]))
+    return all_of_them
 
 
-class Touching:
-    """A system whose points meet surfaces. All else is the system's own."""
+class Touching(Around):
+    """A system whose points meet surfaces."""
 
     def __init__(self, s: Any, h: Any, met: list[Surface]) -> None:
-        self.s = s
+        super().__init__(s)
         self.h = h
         #: Points that surfaces act on: all but those that are led along.
         self.free = getattr(s, "free", slice(None))
@@ -319,9 +320,6 @@ class Touching:
         self.on_rods: Any = None
         if hasattr(s, "contacts"):
             self.on_rods = s.contacts(h, self.met)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.s, name)
 
     def dv(self, t: Any, v: Any, y: Any) -> Any:
         """h·v̇ and the push of the springs."""
@@ -372,11 +370,6 @@ class Touching:
             [bits.where(stays, 0.0, factor * each) for each in v],
             [bits.where(stays, at, each) for at, each in zip(step.y0, y, strict=True)],
         )
-
-
-def around(s: Any, h: Any, given: dict[str, Any]) -> Any:
-    """A system and the surfaces that are given, or the system itself if there are none."""
-    return Touching(s, h, surfaces(h, given)) if given else s
 
 
 def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any) -> Any:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base.arrays import Array, Blocks, Scaled
 from . import bits
+from .around import Around
 
 #: The square of what velocities are multiplied by is held between these, the factor between ½ and 2.
 MIN_SQUARE, MAX_SQUARE = 0.25, 4.0
@@ -27,37 +28,19 @@ class Conserving(Scaled, Protocol):
         """A quantity of a state."""
 
 
-class Kept:
-    """A system, and what was changed of its energy."""
+class EnergyKeeping(Around):
+    """What both have: the target, and the sum of what was changed of the energy."""
+
+    #: h times that sum.
+    work: Any = 0.0
 
     def __init__(self, s: Conserving, h: Any, target: Array) -> None:
-        self.s = s
+        super().__init__(s)
         self.h = h
         self.target = h * target
-        self.work: Any = 0.0  # h times what was changed of the energy
-
-    def dv(self, t: float, v: Array, y: Array) -> Array:
-        """h·v̇."""
-        return self.s.dv(t, v, y)
-
-    def dy(self, t: float, v: Array, y: Array) -> Array:
-        """h·ẏ."""
-        return self.s.dy(t, v, y)
-
-    def velocity(self, d: Array) -> Array:
-        """The v whose increment of y is d."""
-        return self.s.velocity(d)
-
-    def project(self, v: Array, y: Array) -> Blocks:
-        """The state after a step, set right."""
-        return v, y
-
-    def record(self, name: str, v: Array, y: Array) -> Array:
-        """A quantity of a state."""
-        return self.s.record(name, v, y)
 
 
-class Controlled(Kept):
+class Controlled(EnergyKeeping):
     """As printed g = h·C·ΔE; limited, 1 − g is the root of 1 − 2hC·ΔE/(1 + 2hC·K), held in ½ … 2."""
 
     def __init__(self, s: Conserving, h: Any, form: str, gain: Array, target: Array, *, between: bool = False) -> None:
@@ -69,7 +52,7 @@ class Controlled(Kept):
     def dv(self, t: float, v: Array, y: Array) -> Array:
         """h·v̇ and the push."""
         if self.between:
-            return self.s.dv(t, v, y)
+            return np.asarray(self.s.dv(t, v, y))
         dv, kinetic, energy = self.s.energies(v, y)
         return np.asarray(dv - self.push(kinetic, energy) * v)
 
@@ -93,7 +76,7 @@ class Controlled(Kept):
         return g
 
 
-class Projected(Kept):
+class Projected(EnergyKeeping):
     """Back onto the energy: all velocities by one factor, or the least change of the state along the energy's gradient.
 
     At rest there is nothing to scale, and where the gradient is zero no way to go: the state stays as it is.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from copy import copy
@@ -58,6 +58,10 @@ class Constant:
     def __init__(self, value: Array) -> None:
         self.value = value
 
+    def parts(self) -> dict[str, Array]:
+        """Its numbers, by what is put behind its name."""
+        return {"": self.value}
+
     def at(self, t: float) -> Array:
         """The value."""
         return self.value
@@ -72,6 +76,10 @@ class Sine:
 
     def __init__(self, amplitude: Array, omega: Array, phase: Array) -> None:
         self.amplitude, self.omega, self.phase = amplitude, omega, phase
+
+    def parts(self) -> dict[str, Array]:
+        """Its numbers, by what is put behind its name."""
+        return {".amplitude": self.amplitude, ".omega": self.omega, ".phase": self.phase}
 
     def at(self, t: float) -> Array:
         """The value at time t."""
@@ -194,3 +202,23 @@ class Curve:
         other = copy(self)
         other.factor = factor
         return other
+
+
+#: Signals that consist of numbers, or of tables of samples, as ``parts`` names them.
+COMPOSED = (Constant, Sine, Stepped, Curve)
+
+
+def converted(value: Any, numbers: Callable[[Array], Any], table: Callable[[Held], Any]) -> Any:
+    """A parameter whose numbers and tables of samples are converted; words and the like stay as they are."""
+    match value:
+        case np.ndarray():
+            return numbers(value)
+        case list():
+            return [converted(each, numbers, table) for each in value]
+        case Held():
+            return table(value)
+        case _ if isinstance(value, COMPOSED):
+            signal: Any = type(value)
+            return signal(*(converted(part, numbers, table) for part in value.parts().values()))
+        case _:
+            return value

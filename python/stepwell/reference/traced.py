@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ..base.immutable import changed
 from . import adaptive, contact, series_pace
 from .acceptance import Acceptance
-from .around import surrounded
+from .around import Bound, wrapped
 from .run import linear_step
-from .signal import Constant, Curve, Held, Sine, Stepped, of_slot, over
+from .signal import Held, converted, of_slot, over
 
 
 def _array(shape: tuple[int, ...], symbols: Any) -> Any:
@@ -59,50 +58,35 @@ class Tracer:
         return _array(self.system.v_shape, symbols), _array(self.system.y_shape, symbols), symbols
 
     def symbols(self, value: Any, batch: tuple[int, ...]) -> Any:
-        """What is given, with symbols for its numbers."""
-        match value:
-            case list():
-                return [self.symbols(each, batch) for each in value]
-            case Constant():
-                return Constant(self.symbols(value.value, batch))
-            case Sine():
-                return Sine(*(self.symbols(each, batch) for each in (value.amplitude, value.omega, value.phase)))
-            case Stepped() | Curve():
-                return type(value)(*(self.symbols(each, batch) for each in value.parts().values()))
-            case Held():
-                self.tables.append(value)
-                return Sampled(self.tape, next(self._tables))
-            case np.ndarray():
-                own = value.shape[: max(0, value.ndim - len(batch))]
-                self.numbers += [value[index] for index in np.ndindex(own)]
-                return _array(own, self._params)
-            case _:
-                return value
+        """A parameter with symbols for its numbers; behind the axes of their own these have as many axes as the batch."""
+        return converted(value, lambda numbers: self._numbers(numbers, max(0, numbers.ndim - len(batch))), self._table)
+
+    def _numbers(self, numbers: Any, own: int) -> Any:
+        shape = numbers.shape[:own]
+        self.numbers += [numbers[index] for index in np.ndindex(shape)]
+        return _array(shape, self._params)
+
+    def _table(self, table: Held) -> Sampled:
+        self.tables.append(table)
+        return Sampled(self.tape, next(self._tables))
+
+    def _own(self) -> dict[str, Any]:
+        """The parameters of the system's own equations, with symbols."""
+        batch = self.system.batch
+        return {name: self.symbols(value, batch) for name, value in self.system.own_parameters(batch).items()}
+
+    def _parts(self) -> list[Bound]:
+        """What is around the system, with symbols for its parameters, which come behind the system's own."""
+
+        def of(part: Any, name: str, value: Any) -> Any:
+            return converted(value, lambda numbers: self._numbers(numbers, part.own_axes(name)), self._table)
+
+        parts = self.system.parts(self.system.batch, self.force)
+        return [(part, {name: of(part, name, value) for name, value in parameters.items()}) for part, parameters in parts]
 
     def scaled(self, h: Any) -> Any:
-        """The system under its control, scaled to the step h."""
-        batch = self.system.batch
-        given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
-        surfaces = {name: self.symbols(value, batch) for name, value in self.system.given_contacts(batch).items()}
-        s, control = contact.around(self.system.reference(h, **given), h, surfaces), self._control()
-        s = s if control is None else control.around(s, h)
-        stick_friction = self.system.stick_friction
-        if stick_friction is not None:
-            stick_friction = self.symbols(stick_friction, stick_friction.shape)
-        return surrounded(s, h, self._force(), stick_friction)
-
-    def _force(self) -> Any:
-        """The force from outside with symbols for its numbers, which come last; None without one."""
-        return None if self.force is None else self.symbols(self.force, self.force.shape[len(self.system.v_shape) :])
-
-    def _control(self) -> Any:
-        """The control with symbols for its numbers, which come behind those of the system; None without one."""
-        control: Any = self.system.control
-        if control is None:
-            return None
-        numbers = {name: value for name, value in control.given().items() if isinstance(value, np.ndarray)}
-        symbols = {name.removeprefix("control."): self.symbols(value, value.shape) for name, value in numbers.items()}
-        return changed(control, **symbols)
+        """The system and all that is around it, scaled to the step h."""
+        return wrapped(self.system.reference(h, **self._own()), h, self._parts())
 
     def step(self, method: Any, choice: int = 0) -> list[Any]:
         """The state after a step, and what a control has added up by then."""
@@ -122,9 +106,9 @@ class Tracer:
 
     def attempted(self, *, backward: bool = False) -> adaptive.Attempted:
         """How an attempt at an adaptive step uses the system."""
-        given = {name: self.symbols(value, self.system.batch) for name, value in self.system.given(self.system.batch).items()}
-        s = adaptive.Backward(self.system.reference(-1.0, **given)) if backward else self.system.reference(1.0, **given)
-        return adaptive.Attempted(s, self._control(), self._force())
+        own = self._own()
+        s = adaptive.Backward(self.system.reference(-1.0, **own)) if backward else self.system.reference(1.0, **own)
+        return adaptive.Attempted(s, self._parts())
 
     def pace(self, acceptance: Acceptance, more: Iterator[Any]) -> adaptive.Pace:
         """The pace as a part of the state."""

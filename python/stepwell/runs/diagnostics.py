@@ -14,8 +14,8 @@ from ..base.reprs import in_words, of_member, share
 from ..errors import AccuracyWarning, ControlWarning
 from ..model.controls import EnergyControl
 from ..model.methods import method
+from ..model.parameters import aligned
 from ..model.systems import NBody
-from ..model.systems.base import aligned
 from . import encounters, engine, known_energy
 from .request import time_of
 from .result import Run

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..base import checks
 from ..base.arrays import Array
+from ..model.parameters import aligned
 from ..model.systems import NBody
-from ..model.systems.base import aligned
 from . import engine
 
 #: Encounters that turn a pair by less than this, in radians, are no matter.

@@ -54,7 +54,7 @@ def rounded_step(dt: float) -> float:
 
 def check_inputs(system: System, last: float) -> None:
     """Raise if an input is not defined in float32 up to a time."""
-    for name, given in system.given_inputs().items():
+    for name, given in system.all_inputs().items():
         if isinstance(given, Sampled) and not given.constant:
             raise UnsupportedError(
                 f"dtype: float32 does not go with samples, whose times take more digits than it has, and {name} has some; use "

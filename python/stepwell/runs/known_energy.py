@@ -47,7 +47,9 @@ ROUNDING = 2.0**-40
 def keeps_energy(run: Run) -> bool:
     """Whether nothing takes or gives energy in the true motion: no damping, drag, friction, floors, inputs or torques."""
     system: System = run.system.uncontrolled
-    if run.force is not None or getattr(system, "torques_act", False) or system.contacts:
+    if run.force is not None or getattr(system, "torques_act", False):
+        return False
+    if not all(part.keeps_energy for part in system.around):
         return False
     if system.kernel == KERNEL_OF_EQUATIONS:
         return True  # its energy is what was declared to be constant

@@ -11,8 +11,8 @@ from ...base.arrays import Array, Shape
 from ...errors import UnsupportedError
 from ...model.equations.series import derivatives_of_functions
 from ...model.inputs import Input
+from ...model.parameters import CoreParameters, flat
 from ...model.systems import System
-from ...model.systems.base import Given, flat
 from ...model.systems.own import RATES
 from ...reference.tape.evaluate import Evaluation
 from ...reference.traced import Tracer
@@ -55,7 +55,7 @@ class Variational(System):
     second_order = False
 
     def __init__(self, system: System, disturbances: int) -> None:
-        if system.keeper is not None or system.contacts or system.stick_friction is not None:
+        if system.keeper is not None or system.around:
             raise UnsupportedError(
                 f"tolerance: Lyapunov exponents have none where there is a control, a surface or friction, got {system!r}; give "
                 f"dt= and steps="
@@ -81,9 +81,9 @@ class Variational(System):
 
     def given(self, batch: Shape) -> dict[str, Any]:
         """The parameters of the system."""
-        return self.of.given(batch)
+        return self.of.own_parameters(batch)
 
-    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> Given:
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
         """The operations of all rates, and the parameters of the system."""
         given = {name: value for name, value in self.given(batch).items() if name != RATES and not callable(value)}
         return [(RATES, self._core), *flat(given, batch)]

@@ -23,8 +23,8 @@ from ...base.arrays import Array
 from ...model.compatibility import fits_together
 from ...model.methods import Method
 from ...model.methods import method as find_method
+from ...model.parameters import aligned
 from ...model.systems import LinearSystem, Springs
-from ...model.systems.base import aligned
 from .limit import stability_limit
 
 #: Oscillators that are tried along each of the two upper bounds.

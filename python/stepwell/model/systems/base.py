@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from math import inf, prod
+from math import inf
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
@@ -14,25 +14,16 @@ from ...base.arrays import Array, Shape
 from ...base.immutable import Immutable, ValueEquality, changed
 from ...base.reprs import MAX_LINE, facts, shortened
 from ...errors import ArgumentError, DTypeError, UnsupportedError
-from ...reference import contact
-from ...reference.around import surrounded
-from ...reference.signal import Constant, Curve, Held, Sine, Stepped
+from ...reference.around import ORDER, Bound, wrapped
+from ..around import FORCE, Force, Part
 from ..inputs import Sampled
-from ..surfaces import parameters
+from ..parameters import CoreParameters, flat, of_shape
 
 if TYPE_CHECKING:
     from ..controls import AnyControl, ConstraintControl, EnergyControl, Projection
     from ..inputs import Input
     from ..methods import Method
     from ..surfaces import Surface
-
-#: A description as the core takes it: names with words, whole numbers, lists of whole numbers (as bytes, four for each), rows of
-#: numbers for each member (or one for all), and tables of samples: start, interval, a row for each sample.
-Given = list[tuple[str, Any]]
-
-
-#: The strides of an array of floats along one axis, one after the other in memory.
-CONTIGUOUS = (8,)
 
 #: A step so short that no gain of a control is too large for it.
 TINY = 1e-200
@@ -54,11 +45,9 @@ class System(Immutable, ValueEquality, ABC):
             to its derivatives; those of other systems come from their tape.
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
-        control: the control or projection of its energy, or None; ``integrate`` sets it.
-        stick_friction: how much friction that sticks slows each velocity in a unit of time, or None; broadcasts over the batch.
+        around: the parts that are around its equations, from the inside out; see ``model/around.py``.
         constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
         kept: that control or projection, or None; ``integrate`` sets it.
-        contacts: surfaces that its points meet, if the rows of its blocks are points.
 
     Example:
         >>> system = sw.Oscillator(omega=[1.0, 2.0, 3.0])
@@ -77,12 +66,12 @@ class System(Immutable, ValueEquality, ABC):
     velocity_term: str | None = None
     input_names: tuple[str, ...] = ()
     batch: Shape = ()
-    control: EnergyControl | Projection | None = None
-    stick_friction: Array | None = None
+    around: tuple[Part, ...] = ()
     constraint: ClassVar[str | None] = None
     kept: ConstraintControl | Projection | None = None
-    contacts: tuple[Surface, ...] = ()
     _free: System | None = None
+    #: The parameters of some members of a batch, of a system that was taken for them: see ``of_members``.
+    _members: tuple[dict[str, Any], list[Bound]] | None = None
 
     @property
     def kind_name(self) -> str:
@@ -95,6 +84,28 @@ class System(Immutable, ValueEquality, ABC):
             f"make another {self.kind_name}, with what is to change; for a number that changes each frame use force=, or a state "
             f"whose rate is zero. A World that goes on from here: World(system, method, dt=world.dt, **world.resume)"
         )
+
+    def part(self, kind: str) -> Any:
+        """The part of that kind around its equations, or None."""
+        return next((part for part in self.around if part.kind == kind), None)
+
+    @property
+    def control(self) -> EnergyControl | Projection | None:
+        """The control or projection of its energy, or None; ``integrate`` sets it."""
+        control: EnergyControl | Projection | None = self.part("control")
+        return control
+
+    @property
+    def stick_friction(self) -> Array | None:
+        """By how much friction that sticks slows each velocity in a unit of time, or None; broadcasts over the batch."""
+        friction = self.part("friction")
+        return None if friction is None else friction.limit
+
+    @property
+    def contacts(self) -> tuple[Surface, ...]:
+        """The surfaces that its points meet, if the rows of its blocks are points."""
+        surfaces = self.part("surfaces")
+        return () if surfaces is None else surfaces.surfaces
 
     @property
     def keeper(self) -> AnyControl | None:
@@ -111,14 +122,17 @@ class System(Immutable, ValueEquality, ABC):
         """Its arguments, for its repr."""
 
     def __repr__(self) -> str:
-        said = self.repr_arguments() + ([] if self.keeper is None else [repr(self.keeper)])
-        return shortened(f"{type(self).__name__}({', '.join(said)})", 2 * MAX_LINE)
+        control = [] if self.keeper is None else [repr(self.keeper)]
+        return shortened(f"{type(self).__name__}({', '.join([*self._all_arguments(), *control])})", 2 * MAX_LINE)
+
+    def _all_arguments(self) -> list[str]:
+        return [*self.repr_arguments(), *(argument for part in self.around for argument in part.repr_arguments())]
 
     def _repr_html_(self) -> str:
         """The same as a table, for notebooks, with what its states are."""
         arguments = [
             (name, value) if equal else ("", name)
-            for name, equal, value in (each.partition("=") for each in self.repr_arguments())
+            for name, equal, value in (each.partition("=") for each in self._all_arguments())
         ]
         words = [value for name, value in arguments if not name]
         return facts(
@@ -149,54 +163,77 @@ class System(Immutable, ValueEquality, ABC):
         return ()
 
     def reference_at_step(self, h: float, batch: Shape) -> Any:
-        """The NumPy reference of this system, scaled to the step h, for states of that batch shape; control left out."""
-        return self.reference(h, **self.given(batch))
+        """The NumPy reference of this system, scaled to the step h, for states of that batch shape; without what is around it."""
+        return self.reference(h, **self.own_parameters(batch))
 
     def scaled(self, h: float, batch: Shape, force: Array | None = None) -> Any:
-        """The NumPy reference of this system with surfaces, control and friction, scaled to the step h, for states of that batch.
+        """The NumPy reference of this system and all that is around it, scaled to the step h, for states of that batch.
 
         ``force`` is added to v̇.
         """
-        s = contact.around(self.reference_at_step(h, batch), h, self.given_contacts(batch))
-        s = s if self.control is None else self.control.around(s, h)
-        return s if force is None and self.stick_friction is None else surrounded(s, h, force, self.stick_friction)
+        return wrapped(self.reference_at_step(h, batch), h, self.parts(batch, force))
 
-    def given_contacts(self, batch: Shape) -> dict[str, Any]:
-        """The parameters of the surfaces that its points meet, by name."""
-        return parameters(self.contacts, self.y_shape[-1], batch) if self.contacts else {}
+    def own_parameters(self, batch: Shape) -> dict[str, Any]:
+        """The parameters of its own equations by name: ``given``, or those of the members for which it was taken."""
+        return self.given(batch) if self._members is None else of_shape(self._members[0], batch)
 
-    def said_of_contacts(self) -> list[str]:
-        """The surfaces as an argument, for its repr."""
-        if not self.contacts:
-            return []
-        return [f"floor={self.contacts[0] if len(self.contacts) == 1 else list(self.contacts)}"]
+    def parts(self, batch: Shape, force: Array | None = None) -> list[Bound]:
+        """Each part around its equations with its parameters by name, and last the force from outside, if there is one."""
+        if self._members is None:
+            parts = [(part, part.parameters(self.y_shape, batch)) for part in self.around]
+        else:
+            parts = [(part, of_shape(parameters, batch)) for part, parameters in self._members[1]]
+        if force is not None:
+            parts.append((Force(len(self.v_shape)), {FORCE: force}))
+        return parts
 
-    def given_around(self) -> dict[str, Any]:
-        """Parameters of what is around its equations, by name: control and friction."""
-        given = {} if self.control is None else self.control.given()
-        return given if self.stick_friction is None else given | {"friction.limit": self.stick_friction}
+    def surrounded(self, part: Part) -> Self:
+        """The same system with a part around its equations, in the place of one of the same kind.
 
-    def all_given(self, batch: Shape) -> dict[str, Any]:
-        """The parameters of this system, of its surfaces, its control and its friction, by name."""
-        given = dict(self.given(batch))
-        if self.contacts:
-            given |= self.given_contacts(batch)
-        if self.control is not None or self.stick_friction is not None:
-            given |= self.given_around()
-        return given
+        Args:
+            part: what acts on the system, such as a spring to a moving anchor; see docs/developing/adding.md.
+
+        Raises:
+            ArgumentError: if the batch of the part does not broadcast with that of the system.
+        """
+        if not isinstance(part, Part):
+            raise DTypeError(f"part: expected something around a system, got {checks.short(part)} ({type(part).__name__})")
+        return changed(
+            self,
+            around=self._around_with(part),
+            batch=checks.batch_shape({"system": self.batch, part.kind: part.batch}),
+            linear=False,
+            complex_step=False,
+            velocity_term=self.velocity_term if self.velocity_term is not None else part.velocity_term,
+        )
+
+    def _around_with(self, part: Part) -> tuple[Part, ...]:
+        parts = [each for each in self.around if each.kind != part.kind]
+        return tuple(sorted([*parts, part], key=lambda each: ORDER.index(each.kind)))
+
+    def of_members(self, batch: Shape, own: dict[str, Any], parts: list[Bound]) -> Self:
+        """The same system for some members of a batch, of which these are the parameters, with one batch axis."""
+        return changed(self, batch=batch, _members=(own, parts))
+
+    def all_parameters(self, batch: Shape) -> dict[str, Any]:
+        """The parameters of this system, and of what is around it, by name."""
+        parameters = dict(self.own_parameters(batch))
+        for _, of_part in self.parts(batch):
+            parameters |= of_part
+        return parameters
 
     @property
     def chooses(self) -> bool:
         """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
         return False
 
-    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> Given:
-        """The parameters of this system, of its surfaces, its control and its friction, in the form that the core takes.
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
+        """The parameters of this system, and of what is around it, in the form that the core takes.
 
         A system of own equations tells more of them to a method that needs the ``series`` of a solution. ``single`` is whether
         steps are computed in float32; the parameters are the same, operations among them are not.
         """
-        return flat(self.all_given(batch), batch)
+        return flat(self.all_parameters(batch), batch)
 
     def named(self, name: str, index: Shape) -> str:
         """The name of a number among the parameters: that of an argument, and the index in it."""
@@ -231,8 +268,8 @@ class System(Immutable, ValueEquality, ABC):
 
     def check_time(self, last: float) -> None:
         """Raise if an input of the system is not defined up to a time."""
-        for given in self.given_inputs().values():
-            given.check(last)
+        for each in self.all_inputs().values():
+            each.check(last)
 
     def doubt(self, y: Array) -> str | None:
         """A message if the rates are meaningless at some of these coordinates, or None."""
@@ -290,13 +327,13 @@ class System(Immutable, ValueEquality, ABC):
             raise UnsupportedError(f"control: {self!r} meets surfaces, and a control of its energy would undo what they do")
         if (name := getattr(control, "constraint", None)) is not None:
             raise UnsupportedError(f"control: {control!r} keeps a {name}, and {self!r} has no such constraint")
-        if getattr(control, "way", "scaling") not in ("scaling", "nacozy") or not hasattr(control, "around"):
+        if getattr(control, "way", "scaling") not in ("scaling", "nacozy") or not isinstance(control, Part):
             raise UnsupportedError(f"control: {control!r} is for an invariant of an own system, and {self!r} has none")
         if not hasattr(self.reference, "energies"):
             raise UnsupportedError(f"control: {self!r} has no energy control")
 
     def _held_by(self, control: EnergyControl | Projection) -> Self:
-        return changed(self, _free=self.uncontrolled, control=control, velocity_term="energy control")
+        return changed(self, _free=self.uncontrolled, around=self._around_with(control), velocity_term="energy control")
 
     def stepped_by(self, method: Method) -> Self:
         """The same system, its control acting between steps where v and y of the method's stages belong to different times."""
@@ -305,7 +342,7 @@ class System(Immutable, ValueEquality, ABC):
         between = method.needs_acceleration or method.has_series
         if getattr(self.control, "between", between) == between:
             return self
-        return changed(self, control=changed(self.control, between=between))
+        return changed(self, around=self._around_with(changed(self.control, between=between)))
 
     # What the transition-matrix form and the analysis ask of a linear system.
 
@@ -313,17 +350,25 @@ class System(Immutable, ValueEquality, ABC):
         """Its inputs by name, without those that were not given."""
         return {}
 
+    def all_inputs(self) -> dict[str, Input]:
+        """The inputs of its equations and of what is around them, by name."""
+        inputs = self.given_inputs()
+        for part in self.around:
+            inputs = inputs | part.inputs
+        return inputs
+
     @property
     def samples(self) -> tuple[float, float]:
         """The shortest time from one sample of an input to the next, and the time of the last; infinite if none changes so."""
-        held = [each for each in self.given_inputs().values() if isinstance(each, Sampled) and not each.constant]
-        if not held:
+        sampled = [each for each in self.all_inputs().values() if isinstance(each, Sampled) and not each.constant]
+        if not sampled:
             return inf, -inf
-        return min(each.interval for each in held), max(each.start + each.interval * (len(each.values) - 1) for each in held)
+        last = max(each.start + each.interval * (len(each.values) - 1) for each in sampled)
+        return min(each.interval for each in sampled), last
 
     def jumps(self, begin: float, end: float) -> Array:
         """When its inputs or their derivatives jump, from ``begin`` to ``end``: ascending, each time once."""
-        return np.unique(np.concatenate([np.empty(0), *(each.jumps(begin, end) for each in self.given_inputs().values())]))
+        return np.unique(np.concatenate([np.empty(0), *(each.jumps(begin, end) for each in self.all_inputs().values())]))
 
     @property
     def reads_time(self) -> bool:
@@ -336,10 +381,10 @@ class System(Immutable, ValueEquality, ABC):
 
     def over_steps(self, method: Method, t0: Any, dt: float) -> Self:
         """The same system, whose held samples of less than a step are given by their means over the steps, of each ``t0``."""
-        held = [each for each in self.given_inputs().values() if isinstance(each, Sampled)]
+        sampled = [each for each in self.all_inputs().values() if isinstance(each, Sampled)]
         # Rates of methods that carry something in place of v belong to the middle of what is stepped over.
         first = t0 if method.carry is None else t0 - 0.5 * dt
-        if all(each.over_steps(first, dt) is each for each in held):
+        if all(each.over_steps(first, dt) is each for each in sampled):
             return self
 
         def means(value: Any) -> Any:
@@ -347,14 +392,20 @@ class System(Immutable, ValueEquality, ABC):
                 return type(value)({name: means(each) for name, each in value.items()})
             if isinstance(value, tuple):
                 return tuple(map(means, value))
+            if isinstance(value, Part):
+                return of(value)
             return value.over_steps(first, dt) if isinstance(value, Sampled) else value
 
-        return changed(self, **{name: means(value) for name, value in vars(self).items() if not name.startswith("_")})
+        def of(value: Any) -> Any:
+            return changed(value, **{name: means(each) for name, each in vars(value).items() if not name.startswith("_")})
+
+        whole: Self = of(self)
+        return whole
 
     @property
     def has_time(self) -> bool:
         """Whether its rates may depend on the time."""
-        return bool(self.given_inputs())
+        return bool(self.all_inputs())
 
     def without_inputs(self) -> System:
         """The same system without inputs."""
@@ -388,57 +439,3 @@ def shown(**given: Any) -> list[str]:
     """Arguments for a repr: those that are not None, arrays by their shape."""
     short = {k: f"array{v.shape}" if isinstance(v, np.ndarray) and v.ndim else v for k, v in given.items() if v is not None}
     return [f"{k}={v}" for k, v in short.items()]
-
-
-def flat(given: dict[str, Any], batch: Shape) -> Given:
-    """A description as the core takes it: what is not there is left out, a list is its length and its parts."""
-    entries: Given = []
-    for name, value in given.items():
-        if value is None:
-            continue
-        if type(value) is np.ndarray:  # the most frequent case, first because the others take longer
-            entries.append((name, rows(value, batch)))
-            continue
-        match value:
-            case str() | int() | bytes():
-                entries.append((name, value))
-            case list():
-                entries.append((name, len(value)))
-                entries += flat({f"{name}[{i}]": each for i, each in enumerate(value)}, batch)
-            case Sine():
-                parts = {"amplitude": value.amplitude, "omega": value.omega, "phase": value.phase}
-                entries += flat({f"{name}.{part}": each for part, each in parts.items()}, batch)
-            case Constant():
-                entries.append((name, rows(value.value, batch)))
-            case Stepped() | Curve():
-                entries += flat({name + behind: each for behind, each in value.parts().items()}, batch)
-            case Held():
-                entries.append((name, (value.start, value.interval, rows(value.values, batch, 1))))
-            case _:
-                entries.append((name, rows(value, batch)))
-    return entries
-
-
-def rows(values: Array, batch: Shape, own: int | None = None) -> Array:
-    """Numbers as rows for the core, of one for each member or one for all.
-
-    ``own`` is how many axes there are before those of the batch; if None, those that are more than the batch has.
-    """
-    if not batch:
-        return np.ascontiguousarray(values).reshape(-1, 1)
-    if not own and values.strides == CONTIGUOUS and values.shape == batch:
-        return values.reshape(1, -1)  # what is given most often of a batch: one number for each member along one axis
-    own = max(0, values.ndim - len(batch)) if own is None else own
-    counted, over = values.shape[:own], values.shape[own:]
-    if all(size == 1 or stride == 0 for size, stride in zip(over, values.strides[own:], strict=True)):
-        for _ in over:
-            values = values[..., 0]
-        return np.ascontiguousarray(values.reshape(-1, 1))
-    if over != batch:
-        values = np.broadcast_to(aligned(values, own, batch), (*counted, *batch))
-    return np.ascontiguousarray(values.reshape(prod(counted), prod(batch)))
-
-
-def aligned(values: Array, own: int, batch: Shape) -> Array:
-    """Numbers with so many axes of their own first, and then as many axes as the batch has."""
-    return values.reshape((*values.shape[:own], *(1,) * (len(batch) - values.ndim + own), *values.shape[own:]))

@@ -10,7 +10,8 @@ from ...base import checks
 from ...base.arrays import Array, Shape
 from ...errors import ShapeError
 from ...reference.systems.chain import Chain as Reference
-from .base import System, aligned
+from ..parameters import aligned
+from .base import System
 
 
 class Chain(System):
@@ -56,7 +57,7 @@ class Chain(System):
 
     def energy(self, v: Array, y: Array) -> Array:
         """½·Σ m·v² + ½·Σ k·(difference of neighbours)², the walls at 0."""
-        k, m = self.given(y.shape[1:]).values()
+        k, m = self.own_parameters(y.shape[1:]).values()
         wall = np.zeros_like(y[:1])
         stretch = np.diff(np.concatenate([wall, y, wall]), axis=0)
         return np.asarray(0.5 * (m * v * v).sum(axis=0) + 0.5 * (k * stretch * stretch).sum(axis=0))

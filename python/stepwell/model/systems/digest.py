@@ -18,7 +18,7 @@ def digest(system: OwnSystem) -> str:
     """What the operations of an own system are known by: of its rates, its invariants, and the gradient of one that is kept."""
     known: Any = system if system.equations is not None else system.for_state_shapes()
     tape = _core.Tape()
-    tracer = Tracer(changed(known, control=None), tape)
+    tracer = Tracer(changed(known, around=()), tape)
     v, y, _ = tracer.state()
     s = tracer.scaled(tape.step())
     values = tracer.flat(*s.rates(tape.time(), v, y))

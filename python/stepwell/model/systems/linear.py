@@ -14,7 +14,8 @@ from ...errors import ArgumentError, ShapeError
 from ...reference.product import times
 from ...reference.systems.linear import Linear as Reference
 from ..inputs import Input, Pulse, as_input
-from .base import System, aligned
+from ..parameters import aligned
+from .base import System
 
 #: A run of many states holds so many copies of A: as it is given, by rows, and as the core steps it.
 COPIES_OF_A = 5

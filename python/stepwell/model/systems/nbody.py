@@ -12,7 +12,8 @@ from ...base.immutable import changed
 from ...errors import ShapeError
 from ...reference.systems import nbody as reference
 from .. import surfaces
-from .base import System, aligned
+from ..parameters import aligned
+from .base import System
 
 if TYPE_CHECKING:
     from ...base.literals import BodyForce
@@ -71,23 +72,24 @@ class NBody(System):
         self.G = checks.numbers("G", G, positive=True)
         self.softening = checks.not_negative("softening", softening, "lengths")
         self.dim = None if dim is None else checks.count("dim", dim, 2, 3)
-        self.contacts = surfaces.surfaces("floor", floor)
+        floors = surfaces.floors(floor)
+        self.around = surfaces.around(floors)
         size = self.dim
-        for name, found in surfaces.dimensions(self.contacts).items():
+        for name, found in surfaces.dimensions(floors).items():
             if found not in (2, 3) or found != (size or found):
                 raise ShapeError(f"{name}: expected a vector of {size or '2 or 3'} components, as many as dim, got {found}")
             size = found
         self.dim = size
         self.v_shape = self.y_shape = (len(self.masses), size or 2)
         shapes = {"masses": self.masses.shape[1:], "G": self.G.shape, "softening": self.softening.shape}
-        self.batch = checks.batch_shape(shapes | surfaces.batches(self.contacts))
+        self.batch = checks.batch_shape(shapes | surfaces.batches(floors))
 
     def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
         n = len(self.masses)
         masses = self.masses.tolist() if self.masses.ndim == 1 and n <= 5 else f"{n} bodies"
         softening = [f"softening={self.softening}"] * bool(self.softening.any())
-        return [f"masses={masses}", f"force={self.force!r}", f"G={self.G}", *softening, *self.said_of_contacts()]
+        return [f"masses={masses}", f"force={self.force!r}", f"G={self.G}", *softening]
 
     def for_state_shapes(self, *states: Any) -> NBody:
         """The same bodies in as many dimensions as the states, v and y, have."""
@@ -115,8 +117,7 @@ class NBody(System):
             return checks.member(np.broadcast_to(aligned(values, own, batch), (*values.shape[:own], *batch)), index)
 
         numbers = {"masses": one(self.masses, 1), "G": one(self.G), "softening": one(self.softening)}
-        alone = changed(self, **numbers, batch=(), contacts=tuple(each.member(one) for each in self.contacts))
-        return alone if self.control is None else changed(alone, control=self.control.member(one))
+        return changed(self, **numbers, batch=(), around=tuple(part.member(one) for part in self.around))
 
     def closest(self, y: Array) -> tuple[tuple[int, int], float]:
         """The two bodies that are nearest to each other in one state, and their distance."""

@@ -10,6 +10,7 @@ from ...base import checks
 from ...base.arrays import Array, Shape
 from ...errors import ArgumentError
 from ...reference.systems.oscillator import Oscillator as Reference
+from ..around import StickFriction
 from ..inputs import Input, Pulse, as_input, signal
 from .base import System, shown
 
@@ -98,7 +99,8 @@ class Oscillator(System):
         self.batch = checks.batch_shape(shapes)
         if self.friction is not None:
             self.linear = self.complex_step = False
-            self.stick_friction = self.friction if self.form == "physical" else np.asarray(self.friction / self.omega)
+            limit = self.friction if self.form == "physical" else np.asarray(self.friction / self.omega)
+            self.around = (StickFriction(limit),)
 
     def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""

@@ -24,7 +24,8 @@ from ..equations.recognised import Unknown, told
 from ..equations.series import derivatives_of_functions
 from ..equations.trace import Equations
 from ..inputs import Input, Sampled, Sinusoid
-from .base import TINY, Given, System, aligned, flat, shown
+from ..parameters import CoreParameters, aligned, flat
+from .base import TINY, System, shown
 
 #: The name of the function among those of parameters; no parameter can have it.
 RATES = "equations()"
@@ -97,8 +98,8 @@ class OwnSystem(System):
         return shown(**self.parameters_given)
 
     def __repr__(self) -> str:
-        said = self.repr_arguments() + [repr(each) for each in (self.control, self.push) if each is not None]
-        return f"{self.definition.name}({', '.join(said)})"
+        controls = [repr(each) for each in (self.control, self.push) if each is not None]
+        return f"{self.definition.name}({', '.join([*self._all_arguments(), *controls])})"
 
     def _held(self) -> dict[str, Any]:
         return {name: value for name, value in super()._held().items() if name not in FOUND_LATER}
@@ -107,10 +108,8 @@ class OwnSystem(System):
         return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
-        again = changed(self, parameters_given=copy.deepcopy(self.parameters_given, memo), _bounds={}, _met={})
-        if self.control is not None:
-            complete(again, control=copy.deepcopy(self.control, memo))
-        return again
+        own = {name: copy.deepcopy(vars(self)[name], memo) for name in ("parameters_given", "around") if name in vars(self)}
+        return changed(self, **own, _bounds={}, _met={})
 
     def own_axes(self, name: str) -> int:
         """How many axes of its own a parameter has."""
@@ -246,7 +245,7 @@ class OwnSystem(System):
         """The rates as operations; with marks also the derivatives of the functions among them."""
         equations, definition = self.equations, self.definition
         assert equations is not None
-        plain = changed(self, control=None)  # a projection comes after the step, and is the core's
+        plain = changed(self, around=())  # what is around the equations is the core's
         tape = _core.Tape()
         traced = []
         for _ in range(2):
@@ -301,14 +300,14 @@ class OwnSystem(System):
                 made[name] = aligned(value, own, batch) if own else value
             else:
                 made[name] = value
-        return made if self.push is None else made | self.push.given()
+        return made if self.push is None else made | self.push.own_parameters()
 
-    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> Given:
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
         """The operations of the function, and parameters by name, as the core takes them; for ``series`` with derivatives."""
         bound = self._retraced()
         rates = bound._in_single() if single else bound._series_rates() if series else bound._core
-        given = {name: value for name, value in bound.given(batch).items() if name != RATES and not callable(value)}
-        return [(RATES, rates), *flat(given | ({} if self.control is None else self.control.given()), batch)]
+        own = {name: value for name, value in bound.all_parameters(batch).items() if name != RATES and not callable(value)}
+        return [(RATES, rates), *flat(own, batch)]
 
     def _in_single(self) -> Any:
         """The operations of the function in float32. Invariants are not among them."""
@@ -316,7 +315,7 @@ class OwnSystem(System):
             equations = self.equations
             assert equations is not None
             tape = _core.Tape(single=True)
-            tracer = Tracer(self, tape)
+            tracer = Tracer(changed(self, around=()), tape)
             v, y, _ = tracer.state()
             dv, dy = (tracer.flat(rate) for rate in tracer.scaled(tape.step()).rates(tape.time(), v, y))
             self._single = tape.equations(dv if equations.v_shape != (0,) else [], None if equations.second_order else dy)
@@ -338,7 +337,7 @@ class OwnSystem(System):
         assert bound.equations is not None
         if (known := bound.equations.constant_switching_times) is not None:
             return known
-        parameters = {name: value for name, value in bound.given(bound.batch).items() if name in self.parameters_given}
+        parameters = {name: value for name, value in bound.own_parameters(bound.batch).items() if name in self.parameters_given}
         return bound.equations.switching_times(parameters, begin, end)
 
     def _series_rates(self) -> Any:
@@ -430,7 +429,7 @@ class OwnSystem(System):
             batch=checks.batch_shape({"system": known.batch, "control": control.batch}),
             equations=known.equations.keeping(name, limited=pushed and control.form == "limited", pushed=pushed),
         )
-        complete(kept, **({"push": control, "second_order": False} if pushed else {"control": control}))
+        complete(kept, **({"push": control, "second_order": False} if pushed else {"around": known._around_with(control)}))
         kept._trace()
         complete(kept, velocity_term=kept.velocity_term or "a control of an invariant")
         return kept

@@ -12,7 +12,8 @@ from ...base.immutable import changed
 from ...errors import ShapeError
 from ...reference.systems.particles import Particles as Reference
 from .. import surfaces
-from .base import System, aligned, shown
+from ..parameters import aligned
+from .base import System, shown
 
 
 class Particles(System):
@@ -56,13 +57,14 @@ class Particles(System):
         self.gravity = checks.numbers("gravity", gravity, unit="length per unit of time squared")
         self.drag = None if drag is None else checks.not_negative("drag", drag)
         self.velocity_term = None if drag is None else "drag"
-        self.contacts = surfaces.surfaces("floor", floor)
+        floors = surfaces.floors(floor)
+        self.around = surfaces.around(floors)
         self.dim = None if dim is None else checks.count("dim", dim, 1, surfaces.MOST_DIMENSIONS)
         if self.gravity.ndim and not 1 <= len(self.gravity) <= surfaces.MOST_DIMENSIONS:
             raise ShapeError(f"gravity: expected a number, or a vector along the first axis, got shape {self.gravity.shape}")
         self.points = len(self.masses) if self.masses.ndim else None
         vectors = {"gravity": len(self.gravity)} if self.gravity.ndim else {}
-        vectors |= surfaces.dimensions(self.contacts)
+        vectors |= surfaces.dimensions(floors)
         self.dim = next(iter(vectors.values()), None) if self.dim is None else self.dim
         if different := [f"{name} {size}" for name, size in vectors.items() if size != self.dim]:
             raise ShapeError(f"{', '.join(different)}: expected vectors of {self.dim} components, as many as the points have")
@@ -72,13 +74,13 @@ class Particles(System):
                 "gravity": self.gravity.shape[1:],
                 "drag": () if self.drag is None else self.drag.shape,
             }
-            | surfaces.batches(self.contacts)
+            | surfaces.batches(floors)
         )
         self.v_shape = self.y_shape = (self.points or 1, self.dim or 2)
 
     def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
-        return [*shown(masses=self.masses, gravity=self.gravity, drag=self.drag), *self.said_of_contacts()]
+        return [*shown(masses=self.masses, gravity=self.gravity, drag=self.drag)]
 
     def for_state_shapes(self, *states: Any) -> Particles:
         """The same for as many points in as many dimensions as the states, v and y, have."""
@@ -111,6 +113,6 @@ class Particles(System):
 
     def energy(self, v: Array, y: Array) -> Array:
         """Σ m·(½v² − g·y); a spring of a floor is not counted."""
-        given = self.given(y.shape[2:])
+        given = self.own_parameters(y.shape[2:])
         fall = (given["gravity"] * y).sum(axis=1)
         return np.asarray((given["masses"] * (0.5 * (v * v).sum(axis=1) - fall)).sum(axis=0))

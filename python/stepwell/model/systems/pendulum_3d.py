@@ -46,13 +46,14 @@ class Pendulum3D(RodSystem):
     def __init__(self, length: Any = 1.0, gravity: Any = 1.0, *, floor: Any = None) -> None:
         self.length = checks.numbers("length", length, positive=True)
         self.gravity = checks.numbers("gravity", gravity)
-        self.contacts, _ = surfaces_for_rods(floor, {3})
+        floors, _ = surfaces_for_rods(floor, {3})
+        self.around = surfaces.around(floors)
         shapes = {"length": self.length.shape, "gravity": self.gravity.shape}
-        self.batch = checks.batch_shape(shapes | surfaces.batches(self.contacts))
+        self.batch = checks.batch_shape(shapes | surfaces.batches(floors))
 
     def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
-        return [*shown(length=self.length, gravity=self.gravity), *self.said_of_contacts()]
+        return shown(length=self.length, gravity=self.gravity)
 
     def for_state_shapes(self, *states: Any) -> Pendulum3D:
         """The same pendulum.

@@ -11,7 +11,8 @@ from ...base.arrays import Array, Shape
 from ...errors import ArgumentError, ShapeError
 from ...reference.systems import rigid_body as reference
 from ..inputs import Input, as_input, signal
-from .base import System, aligned, shown
+from ..parameters import aligned
+from .base import System, shown
 
 #: A moment may exceed the sum of the others by this share of it: in a flat body they are equal, but for rounding.
 FLAT_SLACK = 1e-12

@@ -15,7 +15,8 @@ from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...reference.elimination import factored
 from ...reference.systems import rods as reference
 from .. import surfaces
-from .base import System, aligned, shown
+from ..parameters import aligned
+from .base import System, shown
 
 #: The most rods: if all of them meet in one point, a step has some m³/3 operations for each evaluation of the rates.
 MAX_RODS = 100
@@ -71,8 +72,8 @@ def surfaces_for_rods(floor: Any, given: set[int]) -> tuple[tuple[surfaces.Surfa
         ShapeError: if a surface is in another number of dimensions.
         UnsupportedError: for a way other than "safe".
     """
-    found, given = surfaces.surfaces("floor", floor), set(given)
-    for i, each in enumerate(found):
+    floors, given = surfaces.floors(floor), set(given)
+    for i, each in enumerate(floors):
         if each.way != "safe":
             raise UnsupportedError(
                 f'floor {i}: expected way="safe", got {each.way!r}; impulses of surfaces and pulls of rods have to be found '
@@ -85,7 +86,7 @@ def surfaces_for_rods(floor: Any, given: set[int]) -> tuple[tuple[surfaces.Surfa
                     f"floor {i}: expected vectors of {' or '.join(map(str, sorted(expected)))} components, got {each.dim}"
                 )
             given.add(each.dim)
-    return found, given
+    return floors, given
 
 
 class Rods(RodSystem):
@@ -131,12 +132,13 @@ class Rods(RodSystem):
         given = anchored | (set() if dim is None else {checks.count("dim", dim, 2, 3)})
         if len(given) > 1:
             raise ShapeError(f"rods, dim: expected one number of dimensions, got {' and '.join(map(str, sorted(given)))}")
-        self.contacts, given = surfaces_for_rods(floor, given)
+        floors, given = surfaces_for_rods(floor, given)
+        self.around = surfaces.around(floors)
         self.dim = next(iter(given), None)
-        if len(self.contacts) * len(self.masses) > MAX_CONTACTS:
+        if len(floors) * len(self.masses) > MAX_CONTACTS:
             raise ArgumentError(
                 f"floor: expected at most {MAX_CONTACTS} pairs of a point and a surface, got {len(self.masses)} points and "
-                f"{len(self.contacts)} surfaces"
+                f"{len(floors)} surfaces"
             )
         lengths = checks.numbers("lengths", lengths, positive=True)
         if lengths.ndim and len(lengths) != len(self.rods):
@@ -147,7 +149,7 @@ class Rods(RodSystem):
         if len(self.rods) > np.prod(self.y_shape):
             raise ArgumentError(f"rods: expected at most as many as coordinates, {np.prod(self.y_shape)}, got {len(self.rods)}")
         shapes = {"masses": self.masses.shape[1:], "lengths": self.lengths.shape[1:], "gravity": self.gravity.shape}
-        self.batch = checks.batch_shape(shapes | surfaces.batches(self.contacts))
+        self.batch = checks.batch_shape(shapes | surfaces.batches(floors))
 
     @property
     def anchors(self) -> tuple[tuple[float, ...], ...]:
@@ -176,7 +178,7 @@ class Rods(RodSystem):
         n = len(self.masses)
         masses = self.masses.tolist() if self.masses.ndim == 1 and n <= 5 else f"{n} points"
         rods = list(self.rods) if len(self.rods) <= 5 else f"{len(self.rods)} rods"
-        return [str(masses), str(rods), *shown(gravity=self.gravity), *self.said_of_contacts()]
+        return [str(masses), str(rods), *shown(gravity=self.gravity)]
 
     def for_state_shapes(self, *states: Any) -> Rods:
         """The same rods in as many dimensions as the states, v and y, have.

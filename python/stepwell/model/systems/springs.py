@@ -13,7 +13,8 @@ from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...reference.systems import springs as reference
 from ...reference.systems.nbody import square
 from .. import surfaces
-from .base import System, aligned, shown
+from ..parameters import aligned
+from .base import System, shown
 
 if TYPE_CHECKING:
     from ..methods import Method
@@ -83,8 +84,9 @@ class Springs(System):
         self.masses = _per_row("masses", checks.numbers("masses", masses, positive=True), None, "particles")
         self.n = self._count(placed)
         self.gravity = None if gravity is None else _gravity(gravity)
-        self.contacts = surfaces.surfaces("floor", floor)
-        self.dim = _dimensions(dim, placed, self.gravity, surfaces.dimensions(self.contacts))
+        floors = surfaces.floors(floor)
+        self.around = surfaces.around(floors)
+        self.dim = _dimensions(dim, placed, self.gravity, surfaces.dimensions(floors))
         self.fixed = _particles("fixed", fixed, self.n)
         if len(self.fixed) == self.n:
             raise ArgumentError(f"fixed: expected at least one particle that is free, got all {self.n}")
@@ -105,7 +107,7 @@ class Springs(System):
         self.v_shape = self.y_shape = (self.n, self.dim or 2)
         arrays = {name: getattr(self, name) for name in ("stiffness", "rest", "damping", "masses", "gravity", "drag")}
         shapes = {name: each.shape[1:] for name, each in arrays.items() if each is not None}
-        self.batch = checks.batch_shape(shapes | surfaces.batches(self.contacts))
+        self.batch = checks.batch_shape(shapes | surfaces.batches(floors))
 
     def _count(self, placed: Array | None) -> int:
         """How many particles there are, if all that says so agrees."""
@@ -123,7 +125,7 @@ class Springs(System):
         optional = {"damping": self.damping, "gravity": self.gravity, "drag": self.drag}
         shorter = {name: each[0] if each is not None and each.shape == (1,) else each for name, each in optional.items()}
         fixed = [f"fixed={len(self.fixed)} particles"] * bool(len(self.fixed))
-        return [f"{len(self.pairs)} springs, {self.n} particles", *fixed, *shown(**shorter), *self.said_of_contacts()]
+        return [f"{len(self.pairs)} springs, {self.n} particles", *fixed, *shown(**shorter)]
 
     def for_state_shapes(self, *states: Any) -> Springs:
         """The same net in as many dimensions as the states, v and y, have."""

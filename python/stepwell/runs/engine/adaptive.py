@@ -11,8 +11,8 @@ import numpy as np
 from ... import _core
 from ...base.arrays import Array, Whole
 from ...model.methods import Method
+from ...model.parameters import rows
 from ...model.systems import System
-from ...model.systems.base import rows
 from .by_tape import blocks_of, evaluated, rows_of
 from .plan import Plan, model
 
@@ -196,7 +196,7 @@ def attempted_system(plan: Plan) -> Attempted:
     from ...reference import adaptive
 
     s = plan.system.reference_at_step(-1.0 if plan.backward else 1.0, plan.batch)
-    return adaptive.Attempted(adaptive.Backward(s) if plan.backward else s, plan.system.control, plan.force)
+    return adaptive.Attempted(adaptive.Backward(s) if plan.backward else s, plan.system.parts(plan.batch, plan.force))
 
 
 def pace_of(plan: Plan, numbers: Array) -> Pace:

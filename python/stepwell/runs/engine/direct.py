@@ -11,7 +11,7 @@ import numpy as np
 from ... import _core
 from ...base import buffer_pool
 from ...base.arrays import Array, Blocks, Whole
-from ...model.systems.base import rows
+from ...model.parameters import rows
 from ...reference import contact
 from ...reference import run as reference
 from ...reference.signal import of_slot, over

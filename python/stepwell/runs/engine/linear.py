@@ -12,8 +12,8 @@ import numpy as np
 from ... import _core
 from ...base import checks
 from ...base.arrays import Array, Blocks, Whole
+from ...model.parameters import flat
 from ...model.systems import Sampled
-from ...model.systems.base import flat
 from ...reference import run as reference
 from .direct import Looped, advance_direct, finished, looped, run_by_core, to_slot, to_velocity
 from .plan import BEGINS, Outcome, Plan

@@ -11,10 +11,11 @@ import numpy as np
 from ... import _core
 from ...base import checks
 from ...base.arrays import Array, Shape, Whole
+from ...model.around import FORCE
 from ...model.controls import EnergyControl
 from ...model.methods import Method
+from ...model.parameters import rows
 from ...model.systems import System
-from ...model.systems.base import rows
 from ...reference.acceptance import Acceptance
 
 #: Under this name the core takes the times of step 0 of members that have their own.
@@ -151,33 +152,25 @@ class Outcome(NamedTuple):
 
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
-    if plan.single:
-        return _single_model(plan)
-    given = plan.system.parameters(plan.batch, series=plan.method.has_series)
-    if isinstance(plan.t0, np.ndarray) and plan.system.has_time:
-        given.append((BEGINS, rows(plan.t0, plan.batch, 0)))
+    series = plan.method.has_series and not plan.single
+    parameters = plan.system.parameters(plan.batch, series=series, single=plan.single)
+    if isinstance(plan.t0, np.ndarray) and plan.system.has_time and not plan.single:
+        parameters.append((BEGINS, rows(plan.t0, plan.batch, 0)))
     if plan.force is not None:
-        given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
+        parameters.append((FORCE, rows(np.asarray(plan.force, np.float64), plan.batch, len(plan.system.v_shape))))
     if plan.watched is not None:
-        given.append(("watched()", plan.watched.quantities))
-    special = plan.order or plan.backward or plan.acceptance != Acceptance()
-    if not plan.record and not plan.fused and not special:
-        return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
-    options: Any = {"record": list(plan.record), "fused": plan.fused, "order": plan.order}
-    if special:
-        options |= {"acceptance": tuple(plan.acceptance), "backward": plan.backward}
-    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, **options)
-
-
-def _single_model(plan: Plan) -> _core.ModelSpec:
-    """The same for steps of float32."""
-    given = plan.system.parameters(plan.batch, single=True)
-    if plan.force is not None:
-        given.append(("added.force", rows(np.asarray(plan.force, np.float64), plan.batch, len(plan.system.v_shape))))
-    for name, value in given:
-        if isinstance(value, np.ndarray):
-            checks.fits_single(name, value)
-    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, fused=plan.fused, single=True)
+        parameters.append(("watched()", plan.watched.quantities))
+    options: Any = {}
+    if plan.record or plan.fused:
+        options = {"record": list(plan.record), "fused": plan.fused}
+    if plan.order or plan.backward or plan.acceptance != Acceptance():
+        options |= {"order": plan.order, "acceptance": tuple(plan.acceptance), "backward": plan.backward}
+    if plan.single:
+        for name, value in parameters:
+            if isinstance(value, np.ndarray):
+                checks.fits_single(name, value)
+        options = {"fused": plan.fused, "single": True}
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, parameters, **options)
 
 
 def per_step(plan: Plan, work: Array | None) -> Array | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import _core
 from ...base.arrays import Array, Whole
-from ...model.systems.base import rows as rows_of
+from ...model.parameters import rows as rows_of
 from ...reference.bits import less, where
 from .. import engine
 from .members import Members

@@ -20,7 +20,7 @@ from ... import _core
 from ...base.arrays import Shape
 from ...reference import adaptive
 from ...reference.acceptance import Acceptance
-from ...reference.signal import Constant, Curve, Held, Sine, Stepped
+from ...reference.signal import COMPOSED, Held
 from ...reference.tape import increments
 from ...reference.tape.operations import Operation, in_order, needed
 from ...reference.traced import Tracer
@@ -142,7 +142,7 @@ def parameters(plan: Plan) -> tuple[list[str], list[str]]:
         inputs = system.given_inputs()
         given = matrix_of(plan) | {name: each.signal() for name, each in inputs.items()}
     else:
-        given = system.all_given(plan.batch)
+        given = system.all_parameters(plan.batch)
     return named_numbers(plan, given)
 
 
@@ -164,16 +164,11 @@ def named_numbers(plan: Plan, given: Mapping[str, Any]) -> tuple[list[str], list
             case list():
                 for i, each in enumerate(value):
                     add(f"{name}[{i}]", each)
-            case Constant():
-                add(name, value.value)
-            case Sine():
-                for part in ("amplitude", "omega", "phase"):
-                    add(f"{name}.{part}", getattr(value, part))
-            case Stepped() | Curve():
-                for behind, table in value.parts().items():
-                    add(name + behind, table)
             case Held():
                 tables.append(named(name, ()))
+            case _ if isinstance(value, COMPOSED):
+                for behind, part in value.parts().items():
+                    add(name + behind, part)
             case np.ndarray():
                 axes = max(0, value.ndim - len(plan.batch))
                 numbers.extend(named(name, index) for index in np.ndindex(value.shape[:axes]))

@@ -18,8 +18,9 @@ from ...model.compatibility import fits_together, forced
 from ...model.controls import AnyControl, ConstraintControl, EnergyControl, a_control
 from ...model.methods import Method
 from ...model.methods import method as find_method
+from ...model.parameters import aligned
 from ...model.systems import System
-from ...model.systems.base import a_system, aligned
+from ...model.systems.base import a_system
 from ...runs import engine, float32
 from .c import C
 from .head import head

@@ -12,7 +12,7 @@ from ... import _core
 from ...base import checks
 from ...base.arrays import Shape
 from ...errors import UnsupportedError
-from ...model.systems.base import aligned
+from ...model.parameters import aligned
 from ...reference.signal import Held
 from ...runs import engine
 from ..explanation.listing import Body, Named, increments_last, indexed, parameters

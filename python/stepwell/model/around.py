@@ -1,0 +1,137 @@
+"""What is around a system's own equations: its parts, each of which wraps what is within it.
+
+``System.around`` lists them from the inside out. The order of all kinds is ``ORDER`` of ``reference/around.py``; the core has the
+same in ``rust/core/src/model/around/mod.rs``. Whoever steps, traces or describes a system goes through that list, so that a new
+kind of part is one class here, one that wraps in ``reference/``, and one in the core.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..base.arrays import Array, Shape
+from ..base.immutable import Immutable, ValueEquality, changed
+from ..reference import around as reference
+from .inputs import Input, Sampled, Sinusoid
+
+
+class Part(Immutable, ValueEquality, ABC):
+    """One thing around a system's equations.
+
+    Attributes:
+        kind: its place in ``ORDER``.
+        velocity_term: what of it depends on the velocity, so that methods for ÿ = a(t, y) refuse it; or None.
+        acts_on_rates: whether it changes the rates in every stage. Otherwise it changes the state after a step.
+    """
+
+    kind: ClassVar[str]
+    velocity_term: ClassVar[str | None] = None
+    acts_on_rates: ClassVar[bool] = True
+
+    @property
+    def batch(self) -> Shape:
+        """The shape to which its numbers broadcast."""
+        return ()
+
+    @property
+    def inputs(self) -> dict[str, Input]:
+        """Its inputs, by name; of a part without any there are none."""
+        return {}
+
+    @property
+    def keeps_energy(self) -> bool:
+        """Whether the energy of the system stays constant with it."""
+        return False
+
+    @abstractmethod
+    def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
+        """Its parameters by name, as the core takes them, for coordinates and a batch of these shapes; see ``System.given``."""
+
+    def own_axes(self, name: str) -> int:
+        """How many axes of its own a parameter has, before those of the batch."""
+        return 0
+
+    @abstractmethod
+    def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> Any:
+        """The NumPy reference ``s``, scaled to the step h, with this around it; parameters are numbers or symbols."""
+
+    def member(self, one: Callable[..., Array]) -> Self:
+        """The same for one member of a batch: ``one(numbers)`` takes its number, ``one(numbers, n)`` with n axes of their own."""
+
+        def of(value: Any) -> Any:
+            if isinstance(value, Sinusoid):
+                return Sinusoid(*(one(each) for each in (value.amplitude, value.omega, value.phase)))
+            if isinstance(value, Sampled):
+                return changed(value, values=one(value.values, 1))
+            return one(value) if isinstance(value, np.ndarray) else value
+
+        return changed(self, **{name: of(value) for name, value in vars(self).items()})
+
+    def repr_arguments(self) -> list[str]:
+        """How the repr of a system shows it, among its arguments."""
+        return [repr(self)]
+
+
+#: The parameter that is the force from outside.
+FORCE = "added.force"
+
+
+class Force(Part):
+    """A force from outside, which is added to v̇ in every stage; the run has its numbers.
+
+    Args:
+        axes: how many axes a block of v has.
+    """
+
+    kind = "force"
+
+    def __init__(self, axes: int) -> None:
+        self.axes = axes
+
+    def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
+        """None: they are those of a run."""
+        return {}
+
+    def own_axes(self, name: str) -> int:
+        """Those of the block."""
+        return self.axes
+
+    def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> Any:
+        """The force, added."""
+        return reference.Forced(s, h, parameters[FORCE])
+
+
+class StickFriction(Part):
+    """Coulomb's friction that sticks; ``limit`` is by how much it slows each velocity in a unit of time, over the batch."""
+
+    kind = "friction"
+    velocity_term = "friction"
+
+    def __init__(self, limit: Array) -> None:
+        self.limit = limit
+
+    @property
+    def batch(self) -> Shape:
+        """The shape of the limit."""
+        return self.limit.shape
+
+    @property
+    def keeps_energy(self) -> bool:
+        """Only where there is none."""
+        return not self.limit.any()
+
+    def repr_arguments(self) -> list[str]:
+        """Nothing: it is among the arguments of its system."""
+        return []
+
+    def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
+        """The limit."""
+        return {"friction.limit": self.limit}
+
+    def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> Any:
+        """Friction around all other forces."""
+        return reference.Rubbing(s, h, parameters["friction.limit"])
