@@ -12,7 +12,7 @@ from ..base.arrays import Array, Shape
 from ..base.reprs import counted, first_of, share
 from ..errors import ToleranceWarning
 from ..model.systems import System
-from ..reference.around import surrounded
+from ..reference.around import wrapped
 from . import engine
 from .positive import name_of, places_of
 from .result import Run, Status
@@ -173,9 +173,10 @@ def _component(block: str, index: Shape) -> str:
 
 
 def rates_of(system: System, batch: Shape, t: Any, state: State, force: Array | None = None) -> State:
-    """v̇ and ẏ of states of all members, each at its own time."""
+    """v̇ and ẏ of states of all members, each at its own time; without control."""
     v, y = state
     with np.errstate(all="ignore"):
-        alone = surrounded(system.reference_at_step(1.0, batch), 1.0, force, None)
-        dv, dy = alone.dv(t, v, y), alone.dy(t, v, y)
+        acting = [part for part in system.parts(batch, force) if part[0].acts_on_rates and part[0].kind != "control"]
+        s = wrapped(system.reference_at_step(1.0, batch), 1.0, acting)
+        dv, dy = s.dv(t, v, y), s.dy(t, v, y)
     return np.broadcast_to(dv, v.shape), np.broadcast_to(dy, y.shape)
