@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
-from support.cases import SYSTEMS, Case, assert_same, cases, thinned
+from support.cases import SYSTEMS, Case, assert_same, by_both_backends, cases
 
 METHODS = [m.name for m in sw.methods()]
 
@@ -32,11 +32,7 @@ def quietly(system: Any, method: str, **options: Any) -> sw.Run:
         return sw.integrate(system, method, **options)
 
 
-ALL = list(cases())
-
-
-@pytest.mark.parametrize("case", thinned(ALL, {"direct": 2, "matrix": 2, "power": 2}, "own times"))
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize(("case", "backend"), by_both_backends(cases(), {"direct": 1, "matrix": 1, "power": 1}, "own times"))
 def test_each_member_is_a_run_of_its_own_time(case: Case, backend: Any) -> None:
     """Its bits and times are those of the batch that all begins when it does, of which it is the same member."""
     begins = np.array([0.0, -1.3, 2.75, 100.0, 7e5 / 3.0])
@@ -196,7 +192,7 @@ def test_the_same_cases_are_the_reference() -> None:
     """Core and reference, of a few cases of every form, in one comparison of all that a run keeps."""
     for form in ("direct", "matrix", "power"):
         for case in [
-            case for case in ALL if case.form == form and SYSTEMS[case.system](np.random.default_rng(0), 1).given_inputs()
+            case for case in cases() if case.form == form and SYSTEMS[case.system](np.random.default_rng(0), 1).given_inputs()
         ][:6]:
             system, given = case.make(3)
             given |= {"steps": 23, "every": 5, "t0": np.array([0.0, 1.5, -2.0])}
