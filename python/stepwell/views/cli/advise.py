@@ -6,16 +6,13 @@ That is, of those that are accurate enough; and how far they are from blowing up
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...base import checks
 from ...errors import ArgumentError
-from ...model.methods import method
 from ...scenes import scene
 from ...studies.advice import COSTS, advise
 from ...studies.advice.result import COLUMNS, REASONS
-from . import show
+from . import options, show
 
 if TYPE_CHECKING:
     from ...base.literals import Dtypes
@@ -23,11 +20,7 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument(
-        "scene",
-        metavar="SCENE",
-        help="a scene (see stepwell scenes), with arguments as in energy_control:pair=printed, or a Python file that makes one",
-    )
+    options.scene(parser)
     parser.add_argument(
         "--frame",
         default="1/60",
@@ -36,20 +29,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--tolerance", type=float, default=1e-2, metavar="E", help="largest state error allowed (default: 0.01)")
     parser.add_argument("--budget", type=float, metavar="S", help="seconds of computing in a frame (default: the frame)")
-    parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
+    options.methods(parser)
     parser.add_argument("--cost", default="time", metavar="COST", help=f"what to rank by: {' or '.join(COSTS)} (default: time)")
     parser.add_argument("--fixed", action="store_true", help="fixed steps only, none adaptive")
     parser.add_argument("--float32", action="store_true", help="also fixed steps in float32, beside float64")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write all of it: .json")
-    show.json_option(parser)
+    options.file(parser, "write all of it: .json")
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """Find, write, tell."""
     chosen, frame = scene(args.scene), _frame(args.frame)
-    methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
-    if args.output is not None:
-        checks.file("-o", args.output, (".json",))
+    methods = options.chosen(args)
+    options.check_file(args, (".json",))
 
     dtype: Dtypes = "both" if args.float32 else "float64"
     found = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed, dtype=dtype)

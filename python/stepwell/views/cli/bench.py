@@ -11,11 +11,11 @@ from typing import Any
 
 from ... import isa
 from ...errors import UnsupportedError
-from ...model.methods import Method, method, methods
+from ...model.methods import Method, methods
 from ...runs.engine import evaluations
 from ...scenes import Scene, scene
 from ...studies.measuring.measure import REPEATS, members_of, refusal, step_times
-from . import show
+from . import options, show
 
 COLUMNS = ("method", "ns a step>", "±>", "ns an evaluation>", "times the least>", "share of all>", "steps a second>")
 
@@ -29,20 +29,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE",
         help="a scene (see stepwell scenes), or a Python file that makes one (default: oscillator)",
     )
-    parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
+    options.methods(parser)
     parser.add_argument(
         "--members", type=int, metavar="N", help="trajectories in the batch; 1 for a single one (default: some hundreds)"
     )
-    parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
-    show.output_option(parser)
-    show.json_option(parser)
+    options.fused(parser)
+    options.file(parser, show.TABLE_TEXT)
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """Time, list."""
     one = scene(args.scene)
-    chosen = list(methods()) if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
-    show.check_output(args)
+    chosen = options.chosen(args) or list(methods())
+    options.check_file(args, show.TABLE_FILES)
     refused = {each.name: why for each in chosen if (why := refusal(one, each)) is not None}
     able = [each for each in chosen if each.name not in refused]
     if not able:

@@ -7,19 +7,14 @@ from __future__ import annotations
 
 import argparse
 import math
-from contextlib import nullcontext
 from functools import partial
-from pathlib import Path
 from typing import Any
 
-from ...base import checks
-from ...base.pictures import new_figure
-from ...model.methods import method
 from ...scenes import scene
 from ...studies.measuring.data import ERRORS, TARGETS
 from ..charts import Panel, WorkPrecision, work_precision
 from ..charts.picture import title_of
-from . import show
+from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,38 +25,30 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE",
         help="a scene (see stepwell scenes), with arguments as in kepler:e=0.5, or a Python file that makes one",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        default=Path(),
-        metavar="DIR",
-        help="a folder for what is drawn and written (default: this one)",
-    )
-    parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
+    options.folder(parser, here=True)
+    options.methods(parser)
     parser.add_argument("--panel", action="store_true", help="one picture and one table of all scenes")
     parser.add_argument("--fused", action="store_true", help="also with fused multiply-adds, a second curve of each method")
     parser.add_argument("--float32", action="store_true", help="also in float32, a further curve of each method")
     parser.add_argument("--error", choices=ERRORS, default=ERRORS[0], help="which error the pictures show (default: %(default)s)")
-    show.json_option(parser)
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """Measure, draw, write, summarise."""
     # All names and requirements are checked before any work.
     chosen = [scene(name) for name in args.scenes]
-    methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
+    methods = options.chosen(args)
     names = ["panel"] if args.panel else [one.name for one in chosen]
-    checks.folder("-o", args.output, [name + ending for name in names for ending in (".png", ".csv", ".json")])
-    new_figure(1.0, 1.0)  # raises if there can be no picture
+    options.check_folder(args, [name + ending for name in names for ending in (".png", ".csv", ".json")])
     args.output.mkdir(parents=True, exist_ok=True)
 
     written = show.Written()
     done: list[tuple[WorkPrecision, list[str]]] = []
     for one in chosen:
-        with nullcontext(None) if args.json else show.progress(one.title) as told:
+        with show.progress(one.title, args) as progress:
             ways: Any = {"fused": "both" if args.fused else False, "dtype": "both" if args.float32 else "float64"}
-            chart = work_precision(one, methods, **ways, progress=told)
+            chart = work_precision(one, methods, **ways, progress=progress)
         if args.panel:
             done.append((chart, []))
             continue
@@ -93,10 +80,10 @@ def _summary(chart: WorkPrecision, files: list[str]) -> None:
         (
             curve.title,
             "–" if curve.method.order is None else str(curve.method.order),
-            *(_number(curve.cheapest(error)) for error in TARGETS),
-            _number(row["least_error"]),
+            *(show.number(curve.cheapest(error)) for error in TARGETS),
+            show.number(row["least_error"]),
             "all" if curve.largest_stable_step == math.inf else f"{curve.largest_stable_step:#.3g}",
-            _number(float(f"{curve.step_time.median:.2g}")),
+            show.number(float(f"{curve.step_time.median:.2g}")),
         )
         for curve, row in zip(chart.curves, chart.summary(), strict=True)
     ]
@@ -126,7 +113,3 @@ def _best(chart: WorkPrecision) -> list[str]:
 
 def _how(row: dict[str, Any]) -> str:
     return f"dt = {row['dt']:.3g}" if row["tolerance"] is None else f"tolerance {row['tolerance']:.3g}"
-
-
-def _number(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "–"

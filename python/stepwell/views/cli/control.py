@@ -6,37 +6,28 @@ To what it keeps and to the motion: the energy of bodies, or the lengths of rods
 from __future__ import annotations
 
 import argparse
-import math
-from contextlib import nullcontext
-from pathlib import Path
 from typing import Any
 
-from ...base import checks
-from ...base.pictures import new_figure
 from ...errors import ArgumentError
 from ...model.methods import method
 from ...scenes import scene
 from ..charts import ControlSweep, control
 from ..charts.picture import title_of
-from . import show
+from . import options, show
+
+#: The columns of the summary that the table shows.
+LEAST = ("least_state_error", "state_at_relative", "least_energy_error", "diverged_from")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("scene", metavar="SCENE", help="a scene of bodies or rods, or a Python file that makes one")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        default=Path(),
-        metavar="DIR",
-        help="a folder for what is drawn and written (default: this one)",
-    )
+    options.folder(parser, here=True)
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: four)")
     parser.add_argument("--gains", metavar="A,B,…", help="which gains: h·C·K at the start of bodies, c of rods")
     parser.add_argument("--evaluations", metavar="N,M,…", help="function evaluations of a run; each number is another step")
     parser.add_argument("--horizon", type=float, metavar="T", help="the time of each run (default: the scene's)")
-    show.json_option(parser)
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
@@ -50,11 +41,10 @@ def command(args: argparse.Namespace) -> None:
     if args.evaluations is not None:
         given["evaluations"] = _numbers("--evaluations", args.evaluations, int)
     name = f"{one.name}-control"
-    checks.folder("-o", args.output, [name + ending for ending in (".png", ".csv")])
-    new_figure(1.0, 1.0)  # raises if there can be no picture
+    options.check_folder(args, [name + ending for ending in (".png", ".csv")])
     args.output.mkdir(parents=True, exist_ok=True)
-    with nullcontext(None) if args.json else show.progress(one.title) as told:
-        chart = control(one, progress=told, **given)
+    with show.progress(one.title, args) as progress:
+        chart = control(one, progress=progress, **given)
     written = show.Written()
     written.write(args.output / f"{name}.png", chart.plot)
     written.write(args.output / f"{name}.csv", chart.to_csv)
@@ -80,7 +70,10 @@ def _summary(chart: ControlSweep, files: list[str]) -> None:
             title_of(row["method"]),
             row["kind"],
             f"{row['dt']:.4g}",
-            *(_number(row[name]) for name in ("least_state_error", "state_at_relative", "least_energy_error", "diverged_from")),
+            *(
+                show.number(row[name])
+                for name in ("least_state_error", "state_at_relative", "least_energy_error", "diverged_from")
+            ),
         )
         for row in chart.summary()
     ]
@@ -92,7 +85,3 @@ def _summary(chart: ControlSweep, files: list[str]) -> None:
         + [f"{title_of(name)}, {kind}, is refused: {why}" for (name, kind), why in chart.refused.items()]
         + [f"written: {', '.join(files)}"],
     )
-
-
-def _number(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "–"

@@ -6,39 +6,35 @@ They are stability, frequency, operations and the largest step (§1).
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from ...analysis.stability import Criteria, criteria
 from ...analysis.stability.criterion import PHI
-from ...base import checks
 from ...errors import ArgumentError
-from ...model.methods import method
-from . import show
+from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
+    options.method_words(parser)
     default = ",".join(f"{phi:g}" for phi in PHI)
     parser.add_argument(
         "--phi", default=default, metavar="A,B,…", help=f"Φ = ω₀·dt at which errors are shown (default: {default})"
     )
     parser.add_argument("--markdown", action="store_true", help="print one table in Markdown")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it: .json or .md")
-    show.json_option(parser)
+    options.file(parser, "write it: .json or .md")
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """Find, write, tell."""
-    methods = [method(name) for name in args.methods] or None
+    methods = options.chosen(args)
     try:
         phi = [float(text) for text in args.phi.split(",")]
     except ValueError:
         raise ArgumentError(f"--phi: expected numbers in rad, such as 0.1,0.5, got {args.phi!r}") from None
     if args.json and args.markdown:
         raise ArgumentError("--markdown: expected either this or --json, got both")
-    if args.output is not None:
-        checks.file("-o", args.output, (".json", ".md"))
+    options.check_file(args, (".json", ".md"))
 
     found = criteria(methods, phi=phi)
     written = show.Written()

@@ -6,7 +6,6 @@ With how often each is computed, and its machine code.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from ...base import checks
 from ...errors import ArgumentError, StepwellError, UnknownNameError
@@ -15,33 +14,27 @@ from ...model.controls import AnyControl
 from ...model.systems import System
 from ...scenes import FILE, scene, scenes
 from ...source.explanation import explain
-from . import show
+from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument(
-        "system",
-        metavar="SYSTEM",
-        help="a scene (see stepwell scenes), a Python file that makes one, or a system by its class, such as Pendulum",
-    )
+    options.system(parser)
     parser.add_argument("method", metavar="METHOD", help="a method; see stepwell methods")
     parser.add_argument("--members", type=int, metavar="N", help="how many trajectories go together (default: 1)")
-    parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
-    parser.add_argument("--float32", action="store_true", help="in float32, with half the digits")
+    options.numbers(parser)
     parser.add_argument("--attempt", action="store_true", help="an attempt at an adaptive step")
     parser.add_argument("--form", default="direct", choices=("direct", "matrix"), help="a step by the transition matrix, or not")
-    parser.add_argument("--start", metavar="HOW", help="how a method with a choice starts; see stepwell methods")
+    options.start(parser)
     parser.add_argument("--record", action="append", default=[], metavar="NAME", help="a quantity to list, too, such as energy")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it: .json, .html or .txt")
-    show.json_option(parser)
+    options.file(parser, "write it: .json, .html or .txt")
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """Look up, explain, write, tell."""
     system, control = system_and_control(args.system)
-    if args.output is not None:
-        checks.file("-o", args.output, (".json", ".html", ".txt"))
+    options.check_file(args, (".json", ".html", ".txt"))
     explained = explain(
         system,
         args.method,
@@ -52,7 +45,7 @@ def command(args: argparse.Namespace) -> None:
         form=args.form,
         start=args.start,
         record=args.record,
-        dtype="float32" if args.float32 else "float64",
+        dtype=options.dtype(args),
     )
     written = show.Written()
     if args.output is not None:

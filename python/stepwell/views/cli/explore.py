@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
-from ...base import checks
 from ...scenes import scene as find_scene
 from ..explorer import explore
 from ..explorer.page import offered
-from . import show
+from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,14 +20,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--scene", metavar="SCENE", help="the scene that is shown first, or a Python file that makes one (default: clover)"
     )
     parser.add_argument("--only", action="store_true", help="leave out all other scenes")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the page there instead of opening it: .html")
-    show.json_option(parser)
+    options.file(parser, "write the page there instead of opening it: .html")
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """Make the page, then write or open it, and report where it is."""
-    if args.output is not None:
-        checks.file("-o", args.output, (".html", ".htm"))
+    options.check_file(args, (".html", ".htm"))
     chosen = offered()
     if args.scene is not None:
         first = next((each for each in chosen if each.name == args.scene), None) or find_scene(args.scene)

@@ -6,37 +6,25 @@ The samples of each method on the undamped oscillator (§5 to §11), and the har
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from ...analysis.stability.criterion import signed
-from ...base import checks
-from ...base.pictures import new_figure
-from ...model.methods import method
 from ..charts import figures
-from . import show
+from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        default=Path(),
-        metavar="DIR",
-        help="a folder for what is drawn and written (default: this one)",
-    )
+    options.method_words(parser)
+    options.folder(parser, here=True)
     parser.add_argument("--phi", type=float, default=0.5, metavar="RAD", help="Φ = ω₀·dt (default: 0.5)")
     parser.add_argument("--periods", type=float, default=4.0, metavar="N", help="how many periods (default: 4)")
-    show.json_option(parser)
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """Run, draw, write, list."""
-    methods = [method(name) for name in args.methods] or None
-    checks.folder("-o", args.output)
-    new_figure(1.0, 1.0)  # raises if there can be no picture
+    methods = options.chosen(args)
+    options.check_folder(args)
 
     chart = figures(methods, phi=args.phi, periods=args.periods)
     written = show.Written()

@@ -7,14 +7,14 @@ from typing import Any
 
 from ...errors import ArgumentError
 from ...model.methods import Method, method, methods
-from . import show
+from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("name", nargs="?", help="a method by any of its names, such as false_euler or RK4")
-    show.output_option(parser)
-    show.json_option(parser)
+    options.file(parser, show.TABLE_TEXT)
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:

@@ -6,20 +6,17 @@ Every statement, what it finds here, and every figure.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from ...base import checks
-from ...base.pictures import new_figure
 from ...errors import StepwellError
 from .. import paper
-from . import show
+from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("section", nargs="?", metavar="SECTION", help='one section, such as 7 or "App. C" (default: all)')
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="a folder: draw the figures into it, too")
-    show.json_option(parser)
+    options.folder(parser, "a folder: draw the figures into it, too")
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
@@ -28,9 +25,7 @@ def command(args: argparse.Namespace) -> None:
     if section is not None:
         section = f"§{section}" if section.isdigit() else f"App. {section}" if len(section) == 1 else section
     chosen = paper.entries(section)
-    if args.output is not None:
-        checks.folder("-o", args.output)
-        new_figure(1.0, 1.0)  # raises if there can be no picture
+    options.check_folder(args)
 
     found = [entry.run() for entry in chosen]
     written = show.Written()

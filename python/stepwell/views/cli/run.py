@@ -23,7 +23,7 @@ from ...scenes import Scene
 from ..charts import RunPicture, run_picture
 from ..charts.runs_animation import ENDINGS as ANIMATIONS
 from ..charts.runs_animation import need as need_for_animation
-from . import show
+from . import options, show
 from .settings import scene_with
 from .verdict import verdict
 
@@ -44,11 +44,7 @@ NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument(
-        "scene",
-        metavar="SCENE",
-        help="a scene (see stepwell scenes), with arguments as in energy_control:pair=printed, or a Python file that makes one",
-    )
+    options.scene(parser)
     parser.add_argument("--method", required=True, metavar="NAME", help="a method; see stepwell methods")
     parser.add_argument("--dt", type=float, metavar="TIME", help="the step (default: the scene's)")
     parser.add_argument("--steps", type=int, metavar="N", help="how many steps (default: up to the scene's horizon)")
@@ -57,7 +53,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter or the start, as omega=3 or y=2"
     )
     parser.add_argument("--tolerance", type=float, metavar="E", help="adaptive steps, whose estimated error stays below this")
-    parser.add_argument("--start", metavar="HOW", help="how a method with a choice starts; see stepwell methods NAME")
+    options.start(parser)
     parser.add_argument(
         "--form", default="direct", choices=FORMS, help="step directly, by the transition matrix, or by its powers"
     )
@@ -67,8 +63,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="what keeps the energy of bodies: a gain and a form, such as 0.3 or 0.3:printed; a projection, scaling or nacozy; "
         "off for none (default: the scene's)",
     )
-    parser.add_argument("--fused", action="store_true", help="compute with fused multiply-adds")
-    parser.add_argument("--float32", action="store_true", help="compute in float32, with half the digits")
+    options.numbers(parser)
     parser.add_argument(
         "-o",
         "--output",
@@ -78,7 +73,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="how long an animation lasts (default: 10)")
     parser.add_argument("--fps", type=float, default=20.0, metavar="N", help="frames a second of an animation (default: 20)")
-    show.json_option(parser)
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:

@@ -8,13 +8,13 @@ from __future__ import annotations
 import argparse
 
 from ...scenes import scenes
-from . import show
+from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    show.output_option(parser)
-    show.json_option(parser)
+    options.file(parser, show.TABLE_TEXT)
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:

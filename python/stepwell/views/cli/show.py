@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from ...base import checks
 from ...base.tables import json_text, write_csv, write_json
+from . import options
 from .table import lines_of, width_of_terminal
-
-
-def json_option(parser: argparse.ArgumentParser) -> None:
-    """Let a command print JSON instead of a table."""
-    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
 
 def print_json(value: Any) -> None:
@@ -28,11 +24,7 @@ def print_json(value: Any) -> None:
 
 #: The files into which the table of a list is written.
 TABLE_FILES = (".csv", ".json", ".md")
-
-
-def output_option(parser: argparse.ArgumentParser) -> None:
-    """Let a command that lists something write the list."""
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"write the table: {', '.join(TABLE_FILES)}")
+TABLE_TEXT = f"write the table: {', '.join(TABLE_FILES)}"
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], notes: Sequence[str] = ()) -> None:
@@ -57,7 +49,7 @@ def listing(
     notes: Sequence[str] = (),
 ) -> None:
     """Print a list as a table or as JSON, and write it if a file is asked for; ``data`` has all of it for programs."""
-    check_output(args)
+    options.check_file(args, TABLE_FILES)
     written = Written()
     if args.output is not None:
         written.write(args.output, lambda path: _write(path, columns, rows, data))
@@ -66,12 +58,6 @@ def listing(
     else:
         table(title, columns, rows, [*notes, *written.notes()])
     written.close()
-
-
-def check_output(args: argparse.Namespace) -> None:
-    """Raise if the list cannot be written, before any work is done."""
-    if args.output is not None:
-        checks.file("-o", args.output, TABLE_FILES)
 
 
 def _write(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]], data: list[dict[str, Any]]) -> None:
@@ -118,8 +104,13 @@ class Written:
             raise self.error
 
 
-def progress(title: str) -> AbstractContextManager[Callable[[float], object]]:
-    """A progress bar; gives the function that takes the share that is done."""
+def progress(title: str, args: argparse.Namespace) -> AbstractContextManager[Callable[[float], object] | None]:
+    """A progress bar, and the function that takes the share that is done; none beside JSON."""
     from ...base.progress import bar
 
-    return bar(title)
+    return nullcontext() if args.json else bar(title)
+
+
+def number(value: float) -> str:
+    """A number in the digits that are looked at."""
+    return f"{value:.3g}" if math.isfinite(value) else "–"

@@ -10,12 +10,11 @@ from functools import partial
 from pathlib import Path
 
 from ...base import checks
-from ...base.pictures import new_figure
 from ...errors import ArgumentError, UnsupportedError
 from ...model.methods import method
 from ..charts import Stability, powers, stability, stability_map
 from ..charts.zplane import KINDS, ladder, within
-from . import show
+from . import options, show
 
 #: The default drawings: the pictures of all methods, and the map of each. Powers are drawn if asked for.
 USUAL = (*KINDS, "map")
@@ -24,25 +23,23 @@ CHARTS = (*USUAL, "powers")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="a folder for pictures and numbers")
+    options.method_words(parser)
+    options.folder(parser, "a folder for pictures and numbers")
     parser.add_argument("--charts", metavar="A,B,…", help=f"which of {', '.join(CHARTS)} to draw (default: all but powers)")
     parser.add_argument("--phi", type=float, metavar="RAD", help="the largest Φ = ω₀·dt (default: past the largest limit)")
-    show.json_option(parser)
+    options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """Analyse, draw, write, tell."""
     # All names and requirements are checked before any work.
-    methods = [method(name) for name in args.methods] or None
+    methods = options.chosen(args)
     asked = USUAL if args.charts is None else tuple(name.strip() for name in args.charts.split(","))
     kinds = [checks.known("--charts", name, CHARTS) for name in dict.fromkeys(asked)]
     if args.charts is not None and args.output is None:
         raise ArgumentError("-o: expected a folder for what --charts asks for")
     top = None if args.phi is None else within("--phi", checks.number("--phi", args.phi, positive=True, unit="rad"))
-    if args.output is not None:
-        checks.folder("-o", args.output, ["stability.csv", *(f"stability-{kind}.png" for kind in kinds)])
-        new_figure(1.0, 1.0)  # raises if there can be no picture
+    options.check_folder(args, ["stability.csv", *(f"stability-{kind}.png" for kind in kinds)])
 
     chart = stability(methods, phi=None if top is None else ladder(top))
     written = show.Written()
