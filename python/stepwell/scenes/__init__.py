@@ -59,8 +59,8 @@ def scene(name: str | Scene) -> Scene:
         return name
     if not isinstance(name, str):
         raise DTypeError(f"scene: expected a Scene or its name, got {type(name).__name__}")
-    if (found := FILE.fullmatch(name)) is not None:
-        return _from_file(*found.groups())
+    if (file := FILE.fullmatch(name)) is not None:
+        return _from_file(*file.groups())
     name, _, arguments = name.partition(":")
     make = _makers()[checks.known("scene", name, _makers())]
     return make(**_arguments(name, make, arguments)) if arguments else make()
@@ -73,7 +73,7 @@ def _arguments_of(name: str) -> tuple[str, ...]:
 
 def _arguments(name: str, make: Callable[..., Scene], written: str) -> dict[str, Any]:
     """What ``pair=printed,eps=0`` says: numbers where they are, else words."""
-    found: dict[str, Any] = {}
+    arguments: dict[str, Any] = {}
     for each in written.split(","):
         key, equals, value = (part.strip() for part in each.partition("="))
         if not equals:
@@ -81,11 +81,11 @@ def _arguments(name: str, make: Callable[..., Scene], written: str) -> dict[str,
         key = checks.known(f"scene {name}", key, inspect.signature(make).parameters)
         for kind in (int, float, str):
             try:
-                found[key] = kind(value)
+                arguments[key] = kind(value)
                 break
             except ValueError:
                 continue
-    return found
+    return arguments
 
 
 #: A user's file, and a variable of it.
@@ -114,15 +114,17 @@ def _from_file(path: str, variable: str | None) -> Scene:
         raise
     except Exception as error:
         raise ArgumentError(f"scene: the file {path} cannot be run: {type(error).__name__}: {error}") from error
-    made = {key: value for key, value in vars(module).items() if isinstance(value, Scene)}
+    scenes = {key: value for key, value in vars(module).items() if isinstance(value, Scene)}
     if variable is not None:
-        found = made[checks.known("scene", variable, made)]
-        return replace(found, name=variable, title="") if found.name == "unnamed" else found
-    if len(made) != 1:
-        if not made:
+        chosen = scenes[checks.known("scene", variable, scenes)]
+        return replace(chosen, name=variable, title="") if chosen.name == "unnamed" else chosen
+    if len(scenes) != 1:
+        if not scenes:
             raise ArgumentError(f"scene: {path} makes no Scene; write scene = sw.Scene(system, v=…, y=…, until=…)")
-        raise ArgumentError(f"scene: expected one Scene in {path}, got {', '.join(made)}; name one: {path}:{next(iter(made))}")
-    ((key, only),) = made.items()
+        raise ArgumentError(
+            f"scene: expected one Scene in {path}, got {', '.join(scenes)}; name one: {path}:{next(iter(scenes))}"
+        )
+    ((key, only),) = scenes.items()
     return replace(only, name=name if key == "scene" else key, title="") if only.name == "unnamed" else only
 
 
@@ -136,11 +138,11 @@ def _remembering(make: Callable[..., Scene]) -> Callable[..., Scene]:
     """The same function, whose scenes have an ``exact`` that can be pickled: it remembers with what the function was called."""
 
     @wraps(make)
-    def made(*args: Any, **kwargs: Any) -> Scene:
+    def remembering(*args: Any, **kwargs: Any) -> Scene:
         scene = make(*args, **kwargs)
         return scene if scene.exact is None else replace(scene, exact=Exact(make.__name__, args, kwargs, scene.exact))
 
-    return made
+    return remembering
 
 
 class Exact:

@@ -96,15 +96,15 @@ class Scene(ValueEquality):
             raise ArgumentError("y: expected the coordinates at t = 0, got None")
         y = checks.numbers("y", self.y)
         system = a_system(self.system).for_state_shapes(None if self.v is None else checks.numbers("v", self.v), y)
-        given = [checks.numbers("v", velocities(system, self.v)), y]
+        blocks = [checks.numbers("v", velocities(system, self.v)), y]
         if system.batch:
             raise ArgumentError(f"system: expected a system of one member, got parameters of shape {system.batch}")
-        found: dict[str, Any] = {"system": system}
-        for name, block, shape in zip("vy", given, (system.v_shape, system.y_shape), strict=True):
+        checked: dict[str, Any] = {"system": system}
+        for name, block, shape in zip("vy", blocks, (system.v_shape, system.y_shape), strict=True):
             block = checks.block(name, block, shape, system.axes)
             if block.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape} of a scene's one member, got {block.shape}")
-            found[name] = frozen(name, block)
+            checked[name] = frozen(name, block)
         until = math.inf if self.until is None else self.until
         forever = isinstance(until, float) and until == math.inf
         if not forever and (until := checks.number("until", until, unit="units of time")) < 0.0:
@@ -112,17 +112,17 @@ class Scene(ValueEquality):
         horizon = until if self.horizon is None else self.horizon
         if self.horizon is None and until == math.inf:
             raise ArgumentError("horizon: expected the time over which errors are measured, in units of time, got None")
-        found["horizon"] = horizon = checks.number("horizon", horizon, positive=True, unit="units of time")
+        checked["horizon"] = horizon = checks.number("horizon", horizon, positive=True, unit="units of time")
         dt = 1e-3 * horizon if self.dt is None else self.dt
-        found |= {"dt": checks.number("dt", dt, positive=True, unit="units of time"), "until": until}
+        checked |= {"dt": checks.number("dt", dt, positive=True, unit="units of time"), "until": until}
         if self.exact is not None and not callable(self.exact):
             raise DTypeError(f"exact: expected a function of times, or None, got {type(self.exact).__name__}")
         a_control(self.control)
         if self.jumps is not None:
-            found["jumps"] = tuple(np.atleast_1d(checks.numbers("jumps", self.jumps, unit="units of time")).ravel().tolist())
+            checked["jumps"] = tuple(np.atleast_1d(checks.numbers("jumps", self.jumps, unit="units of time")).ravel().tolist())
         if self.max_step is not None:
-            found["max_step"] = checks.number("max_step", self.max_step, positive=True, unit="units of time")
-        for name, value in (found | {"title": self.title or self.name}).items():
+            checked["max_step"] = checks.number("max_step", self.max_step, positive=True, unit="units of time")
+        for name, value in (checked | {"title": self.title or self.name}).items():
             object.__setattr__(self, name, value)
 
     def run(self, method: str | Method, dt: float | None = None, *, steps: int | None = None, **options: Any) -> Run:
@@ -146,13 +146,13 @@ class Scene(ValueEquality):
         Warns:
             DivergenceWarning: if the state left the range of finite numbers.
         """
-        if given := [name for name in ("system", "v", "y") if name in options]:
+        if taken := [name for name in ("system", "v", "y") if name in options]:
             raise ArgumentError(
-                f"{', '.join(given)}: expected the scene's own, which need not be given; for others there is stepwell.integrate"
+                f"{', '.join(taken)}: expected the scene's own, which need not be given; for others there is stepwell.integrate"
             )
         if "tolerance" in options or "at" in options:
-            asked: dict[str, Any] = {"control": self.control, "at": [self.horizon]} | self.adaptive_options | options
-            return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **asked)
+            run_options: dict[str, Any] = {"control": self.control, "at": [self.horizon]} | self.adaptive_options | options
+            return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **run_options)
         dt = self.dt if dt is None else dt
         steps = self.steps_for(dt) if steps is None else steps
         return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
@@ -296,12 +296,12 @@ class Scene(ValueEquality):
         """The exact blocks, and at which times they are known; at the others they are those of the last known time."""
         if self.exact is None:
             raise ArgumentError(f"scene: {self.name} has no exact solution, so there is no error to measure")
-        found = self.exact(np.minimum(t, self.until))
+        blocks = self.exact(np.minimum(t, self.until))
         try:
-            v, y = (np.asarray(block, dtype=np.float64) for block in found)
+            v, y = (np.asarray(block, dtype=np.float64) for block in blocks)
         except (TypeError, ValueError):
             raise ArgumentError(
-                f"exact: expected the blocks v and y, arrays of real numbers, got {type(found).__name__}"
+                f"exact: expected the blocks v and y, arrays of real numbers, got {type(blocks).__name__}"
             ) from None
         for name, block, shape in zip("vy", (v, y), self._shapes, strict=True):
             if block.shape != (len(t), *shape):

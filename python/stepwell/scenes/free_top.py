@@ -116,8 +116,8 @@ class FreeTop(ValueEquality):
         k = 2.0 * math.pi * np.arange(1, len(self.series)) / (2.0 * self.quarter)
 
         def waves(u: Any) -> Array:
-            found: Array = (np.exp(1j * np.multiply.outer(u, k)) @ (self.series[1:] / (1j * k))).real
-            return found
+            value: Array = (np.exp(1j * np.multiply.outer(u, k)) @ (self.series[1:] / (1j * k))).real
+            return value
 
         return np.asarray(
             self.series[0].real * t + 2.0 / self.rate * (waves(self.rate * t + self.first) - waves(np.asarray(self.first)))

@@ -10,10 +10,10 @@ from ..errors import ArgumentError
 
 def within(argument: str, value: Any, least: float, most: float, unit: str = "") -> float:
     """Return ``value`` as one float between two bounds."""
-    found = number(argument, value, unit=unit)
-    if not least <= found <= most:
-        raise ArgumentError(f"{argument}: expected {least:g} to {most:g}{f' {unit}' if unit else ''}, got {found:g}")
-    return found
+    checked = number(argument, value, unit=unit)
+    if not least <= checked <= most:
+        raise ArgumentError(f"{argument}: expected {least:g} to {most:g}{f' {unit}' if unit else ''}, got {checked:g}")
+    return checked
 
 
 #: The smallest and the largest of numbers above zero whose squares, quotients and products must be numbers above zero.

@@ -35,12 +35,12 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
         if number > MAX_INTERVALS:
             return exact
         # At the nodes and between them, to see how good it is.
-        asked = begins[:, np.newaxis] + length * np.concatenate([NODES, CHECK_POINTS])
-        blocks = [block.reshape(*asked.shape, *block.shape[1:]) for block in exact(np.minimum(asked, until).ravel())]
+        times = begins[:, np.newaxis] + length * np.concatenate([NODES, CHECK_POINTS])
+        blocks = [block.reshape(*times.shape, *block.shape[1:]) for block in exact(np.minimum(times, until).ravel())]
         close_enough = np.ones(len(begins), dtype=bool)
         for block, scale in zip(blocks, scales, strict=True):
-            found = np.tensordot(_shares(CHECK_POINTS), block[:, : len(NODES)], axes=(0, 1)).swapaxes(0, 1)
-            missed = np.abs(found - block[:, len(NODES) :]).reshape(len(begins), -1).max(axis=1, initial=0.0)
+            approximated = np.tensordot(_shares(CHECK_POINTS), block[:, : len(NODES)], axes=(0, 1)).swapaxes(0, 1)
+            missed = np.abs(approximated - block[:, len(NODES) :]).reshape(len(begins), -1).max(axis=1, initial=0.0)
             close_enough &= missed <= close * scale
         v, y = (block[close_enough, : len(NODES)] for block in blocks)
         good.append((begins[close_enough], np.full(len(v), length), v, y))
@@ -72,13 +72,13 @@ class Table(ValueEquality):
         """Both blocks at these times."""
         piece = np.clip(np.searchsorted(self.starts, t, "right") - 1, 0, len(self.starts) - 1)
         shares = _shares((t - self.starts[piece]) / self.lengths[piece])
-        found = []
+        blocks = []
         for table, shape in zip(self.tables, self.shapes, strict=True):
             value = np.zeros((table.shape[1], len(t)))
             for share, at_node in zip(shares, table, strict=True):
                 value += share * np.take(at_node, piece, axis=1)
-            found.append(np.ascontiguousarray(value.T).reshape(len(t), *shape))
-        return found[0], found[1]
+            blocks.append(np.ascontiguousarray(value.T).reshape(len(t), *shape))
+        return blocks[0], blocks[1]
 
 
 def _shares(u: Array) -> Array:

@@ -64,17 +64,17 @@ class Orbit:
         self._reach(float(t.max(initial=0.0)))
         if (t < -self._times[1]).any():
             raise ArgumentError(f"t: the exact solution begins at 0, got {t.min():g}")
-        found = np.empty((len(t), *self._terms[0].shape[1:]))
+        values = np.empty((len(t), *self._terms[0].shape[1:]))
         step_of = np.clip([bisect_right(self._times, each) - 1 for each in t.tolist()], 0, len(self._terms) - 1)
         for step in np.unique(step_of).tolist():
             here = step_of == step
             begin, end = self._times[step : step + 2]
             share = ((t[here] - begin) / (end - begin))[:, np.newaxis, np.newaxis]
-            value = np.zeros((len(share), *found.shape[1:]))
+            value = np.zeros((len(share), *values.shape[1:]))
             for term in self._terms[step][::-1]:
                 value = value * share + term
-            found[here] = value
-        return found[:, 0].reshape(-1, *self.shape), found[:, 1].reshape(-1, *self.shape)
+            values[here] = value
+        return values[:, 0].reshape(-1, *self.shape), values[:, 1].reshape(-1, *self.shape)
 
     @property
     def steps(self) -> int:

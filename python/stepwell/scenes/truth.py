@@ -58,9 +58,9 @@ class Tight:
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
         """Both blocks at these times."""
-        asked, place = np.unique(np.asarray(t, dtype=np.float64), return_inverse=True)
-        since = np.maximum(np.searchsorted([begin for begin, _, _ in self._places], asked, side="right") - 1, 0)
-        runs = [self._part(asked[since == i], i)[0] for i in np.unique(since).tolist()]
+        times, place = np.unique(np.asarray(t, dtype=np.float64), return_inverse=True)
+        since = np.maximum(np.searchsorted([begin for begin, _, _ in self._places], times, side="right") - 1, 0)
+        runs = [self._part(times[since == i], i)[0] for i in np.unique(since).tolist()]
         v, y = (np.concatenate([getattr(run, name) for run in runs]) for name in "vy")
         return v[place.reshape(-1)], y[place.reshape(-1)]
 

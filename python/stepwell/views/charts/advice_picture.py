@@ -46,8 +46,8 @@ def draw(advice: Advice) -> Figure:
         axes.set_ylim(errors.min() / LOWER, advice.tolerance * HIGHER)
         axes.axhspan(advice.tolerance, advice.tolerance * HIGHER, color="#f0f0f0", linewidth=0.0, zorder=0.4)
         axes.axhline(advice.tolerance, color="black", linewidth=1.6)
-        asked = f"asked for: {advice.tolerance:g} or less"
-        axes.text(0.01, advice.tolerance, asked, transform=axes.get_yaxis_transform(), va="bottom", size=12)
+        allowed = f"asked for: {advice.tolerance:g} or less"
+        axes.text(0.01, advice.tolerance, allowed, transform=axes.get_yaxis_transform(), va="bottom", size=12)
         labels = []
         for i in sorted(range(len(costs)), key=lambda i: (i not in leading, i)):
             row, style = advice.ranked[i], look(advice.ranked[i].method)

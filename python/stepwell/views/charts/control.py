@@ -91,21 +91,21 @@ class ControlSweep(Drawn, Table, ValueEquality):
 
         Better is the smaller error of the last state; gains at which the run diverged are left out.
         """
-        found: dict[str, tuple[bool, ...]] = {}
+        by_method: dict[str, tuple[bool, ...]] = {}
         for name in dict.fromkeys(line.method.name for line in self.lines if line.kind == LENGTH_KINDS[1] and self.exact):
             pairs = [[self.line(name, kind, count) for kind in LENGTH_KINDS] for count in self.evaluations]
-            found[name] = tuple(
+            by_method[name] = tuple(
                 bool(np.median([*held.state_error[~held.diverged], np.inf][:-1] or [np.inf]) < reset.state_error[0])
                 for held, reset in pairs
             )
-        return found
+        return by_method
 
     @property
     def answer(self) -> str:
         """Of rods, in a sentence: for which methods control is better than resetting, as the document supposes (§12)."""
         titles: dict[str, list[str]] = {"control": [], "resetting": [], "depends": []}
-        for name, found in self.better.items():
-            titles["control" if all(found) else "depends" if any(found) else "resetting"].append(find_method(name).title)
+        for name, better in self.better.items():
+            titles["control" if all(better) else "depends" if any(better) else "resetting"].append(find_method(name).title)
         parts = [f"{each} is better for {_listed(names)}" for each, names in titles.items() if names and each != "depends"]
         parts += [f"for {_listed(titles['depends'])} it depends on the step"] * bool(titles["depends"])
         return f"Rods under control, or reset after every step: {'; '.join(parts)}" if parts else ""
@@ -207,7 +207,7 @@ def control(
         rods = scene.system.constraint == "length"
         if rods and exact is None:
             scene = chartable(scene)[0]
-        given: Any = scene.system
+        bare: Any = scene.system
         v, y = (b if a is None else a for a, b in ((v, scene.v), (y, scene.y)))
         horizon = scene.horizon
         if evaluations is None:
@@ -216,19 +216,19 @@ def control(
             exact = scene.exact
         title = scene.title if title is None else title
     else:
-        given = scene
-    if not isinstance(given, NBody) and not (isinstance(given, System) and given.constraint == "length"):
-        raise DTypeError(f"scene: expected a scene of bodies or rods, its name, or such a system, got {type(given).__name__}")
+        bare = scene
+    if not isinstance(bare, NBody) and not (isinstance(bare, System) and bare.constraint == "length"):
+        raise DTypeError(f"scene: expected a scene of bodies or rods, its name, or such a system, got {type(bare).__name__}")
     for name, argument in {"v": v, "y": y, "horizon": horizon, "evaluations": evaluations}.items():
         if argument is None:
             raise ArgumentError(
-                f"{name}: expected it beside {'an' if isinstance(given, NBody) else 'a'} {given.kind_name} system, got None"
+                f"{name}: expected it beside {'an' if isinstance(bare, NBody) else 'a'} {bare.kind_name} system, got None"
             )
     chosen = choice(METHODS if methods is None else methods)
-    kinds = _kinds(given, forms, ways)
+    kinds = _kinds(bare, forms, ways)
     progress = checks.callback("progress", progress)
 
-    system = given.for_state_shapes(v, y)
+    system = bare.for_state_shapes(v, y)
     v, y = (checks.block(name, a, system.v_shape, system.axes) for name, a in (("v", v), ("y", y)))
     if system.batch or v.shape != system.v_shape or y.shape != system.y_shape:
         raise ShapeError(f"scene: expected one start of shape {system.v_shape}, got a batch; the gains are the batch here")
@@ -258,9 +258,10 @@ def _kinds(system: System, forms: Any, ways: Any) -> list[str]:
     """What is run: nothing that keeps anything, each form of the control, each way of projection."""
     known = ((LENGTH_KINDS[0],), (LENGTH_KINDS[1],)) if system.constraint == "length" else (controls.FORMS, WAYS)
     kinds = ["none"]
-    for argument, given, names in zip(("forms", "ways"), (forms, ways), known, strict=True):
+    for argument, wanted, names in zip(("forms", "ways"), (forms, ways), known, strict=True):
         kinds += [
-            checks.known(argument, each, names) for each in checks.several(argument, names if given is None else given, argument)
+            checks.known(argument, each, names)
+            for each in checks.several(argument, names if wanted is None else wanted, argument)
         ]
     return kinds
 

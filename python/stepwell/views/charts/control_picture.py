@@ -86,8 +86,8 @@ def finding(chart: ControlSweep) -> str:
     if not factors:
         return "energy and state under control"
     better = sum(1 for factor in factors if factor > 1.0)
-    said = f"control lowers the energy error of {better} of {len(factors)} runs"
-    return f"{said}, by a factor of {float(np.median(factors)):.2g}" if better == len(factors) else said
+    better_in = f"control lowers the energy error of {better} of {len(factors)} runs"
+    return f"{better_in}, by a factor of {float(np.median(factors)):.2g}" if better == len(factors) else better_in
 
 
 def _look(chart: ControlSweep, method: Method) -> dict[str, Any]:

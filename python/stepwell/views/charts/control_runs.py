@@ -100,10 +100,10 @@ class Runs:
                 raise ShapeError(f"exact: expected a function of n times that returns v and y of shape (n, {str(shape)[1:]}")
             self.end = blocks[0][-1], blocks[1][-1]
             return blocks
-        given = checks.several("exact", exact, "blocks, v and y at the end")
-        if len(given) != 2:
-            raise ShapeError(f"exact: expected a pair of blocks, v and y at the end, got {len(given)} of them")
-        pair = [checks.block("exact", block, shape, self.system.axes) for block in given]
+        pair = checks.several("exact", exact, "blocks, v and y at the end")
+        if len(pair) != 2:
+            raise ShapeError(f"exact: expected a pair of blocks, v and y at the end, got {len(pair)} of them")
+        pair = [checks.block("exact", block, shape, self.system.axes) for block in pair]
         self.end = pair[0], pair[1]
         return np.stack([self.v, pair[0]]), np.stack([self.y, pair[1]])
 

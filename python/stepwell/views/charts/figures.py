@@ -146,12 +146,12 @@ class Figures(Table, ValueEquality):
         """
         if method is None:
             return drawn(path, lambda: registry.task("draw_figures")(self))
-        how = find_method(method)
-        found = [samples for samples in self.samples if samples.method is how]
-        if not found:
+        chosen = find_method(method)
+        shown = [samples for samples in self.samples if samples.method is chosen]
+        if not shown:
             names = ", ".join(samples.method.name for samples in self.samples)
-            raise ArgumentError(f"method: expected one of these figures, {names}, got {how.name!r}")
-        return drawn(path, lambda: registry.task("draw_figure")(self, found[0]))
+            raise ArgumentError(f"method: expected one of these figures, {names}, got {chosen.name!r}")
+        return drawn(path, lambda: registry.task("draw_figure")(self, shown[0]))
 
     def plot_harmonic(self, path: str | Path | None = None) -> Figure:
         """Draw the harmonic cases of §4, and write the picture to ``path`` if given.
@@ -260,15 +260,15 @@ def _harmonic(degrees: int) -> HarmonicCase:
 def _samples(method: Method, phi: float, steps: int) -> Samples:
     start = DOCUMENTS_START if DOCUMENTS_START in method.starts else None
     run = integrate(Oscillator(), method, v=0.0, y=1.0, dt=phi, steps=steps, every=1, start=start)
-    found = analyse(Oscillator(), method, dt=phi)
+    analysis = analyse(Oscillator(), method, dt=phi)
     return Samples(
         method=method,
         start=start,
         t=run.t,
         v=run.v,
         y=run.y,
-        r1_squared=float(found.radius**2),
-        ratio=float(found.frequency_ratio),
-        kind=str(found.kind),
+        r1_squared=float(analysis.radius**2),
+        ratio=float(analysis.frequency_ratio),
+        kind=str(analysis.kind),
         limit=stability_limit(Oscillator(), method),
     )

@@ -72,18 +72,18 @@ def groups(chart: Figures) -> tuple[list[list[Samples]], list[Samples]]:
     """Methods that can be told from the exact solution, those of the same eigenvalues together; and those that cannot, if two."""
     exact = [samples for samples in chart.samples if _distance(samples).max() <= SEEN]
     exact = exact if len(exact) > 1 else []
-    found: list[list[Samples]] = []
+    alike: list[list[Samples]] = []
     for samples in chart.samples:
         if any(samples is each for each in exact):
             continue
-        for same in found:
+        for same in alike:
             pair = [(each.r1_squared, each.ratio if math.isfinite(each.ratio) else 0.0) for each in (same[0], samples)]
             if np.allclose(pair[0], pair[1], rtol=ALIKE, atol=ALIKE):
                 same.append(samples)
                 break
         else:
-            found.append([samples])
-    return found, exact
+            alike.append([samples])
+    return alike, exact
 
 
 def finding(chart: Figures) -> str:
@@ -92,13 +92,13 @@ def finding(chart: Figures) -> str:
     others = [samples for same in apart for samples in same]
     grow = sum("unstable" in samples.kind for samples in others)
     decay = sum("unstable" not in samples.kind and samples.r1_squared < 1.0 - ALIKE for samples in others)
-    told = [
+    kinds = [
         (grow, "gains energy", "gain energy"),
         (decay, "loses it", "lose it") if grow else (decay, "loses energy", "lose energy"),
         (len(others) - grow - decay, "keeps the amplitude but not the time", "keep the amplitude but not the time"),
         (len(exact), "", "look exact"),
     ]
-    parts = [f"{count} {one if count == 1 else several}" for count, one, several in told if count]
+    parts = [f"{count} {one if count == 1 else several}" for count, one, several in kinds if count]
     return f"Of {len(chart.samples)} methods {', '.join(parts)}" if len(chart.samples) > 1 else _said(chart.samples[0], digits=2)
 
 

@@ -70,12 +70,12 @@ def draw(chart: StabilityMap) -> Figure:
 def finding(chart: StabilityMap) -> str:
     """Up to which angle the method is stable: with the least damping, and with D = 1 or what is nearest to it."""
     least, most = float(chart.damping[0]), float(chart.damping[-1])
-    said = []
+    limits = []
     for ratio in sorted({least, min(max(1.0, least), most)}):
         limit = float(stability_limit(Oscillator(damping=ratio), chart.method))
         where = "undamped" if ratio == 0.0 else f"at D = {ratio:g}"
-        said.append(f"stable to Φ = {limit:.3g} {where}" if limit else f"never stable {where}")
-    return f"{chart.method.title}: {', '.join(said)}"
+        limits.append(f"stable to Φ = {limit:.3g} {where}" if limit else f"never stable {where}")
+    return f"{chart.method.title}: {', '.join(limits)}"
 
 
 def _decided(chart: StabilityMap) -> Array:

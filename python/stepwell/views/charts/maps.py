@@ -238,7 +238,7 @@ def stability_map(
         >>> chart.method.name
         'rk4'
     """
-    how = find_method(method)
+    chosen = find_method(method)
     low, high = (0.0, NOWHERE) if phi is None else _ends("phi", phi, "rad")
     if low < 0.0:
         raise ArgumentError(f"phi: expected angles of 0 rad or more, got {low:g}")
@@ -250,23 +250,23 @@ def stability_map(
     least, most = (0.0, 0.0) if damping is None else _ends("damping", damping, "")
     rows = 1 if damping is None else rows
     # One oscillator is refused in fewer words than all.
-    fits_together(Oscillator(damping=None if damping is None else most), how)
+    fits_together(Oscillator(damping=None if damping is None else most), chosen)
     checks.fits("size: the matrices", 48, (rows, columns), "ask for fewer points")
 
     if phi is None:
-        high = _fitted(how, None if damping is None else (least, most))
+        high = _fitted(chosen, None if damping is None else (least, most))
     angles = low + (high - low) * np.arange(1, columns + 1) / columns
     ratios = np.linspace(least, most, rows)
-    found = analyse(Oscillator(angles, None if damping is None else ratios[:, np.newaxis]), how, dt=1.0)
-    P, z = found.P, found.eigenvalues[0]
+    analysis = analyse(Oscillator(angles, None if damping is None else ratios[:, np.newaxis]), chosen, dt=1.0)
+    P, z = analysis.P, analysis.eigenvalues[0]
     squares = np.abs(P[0, 0] - z) ** 2 + np.abs(P[1, 1] - z) ** 2 + P[0, 1] ** 2 + P[1, 0] ** 2
     shape = (rows, columns)
     return StabilityMap(
-        method=how,
+        method=chosen,
         phi=angles,
         damping=ratios,
-        radius=found.radius.reshape(shape),
-        stable=found.stable.reshape(shape),
+        radius=analysis.radius.reshape(shape),
+        stable=analysis.stable.reshape(shape),
         nonnormal=np.sqrt(squares).reshape(shape),
         imaginary=np.abs(z.imag).reshape(shape),
         damped=damping is not None,

@@ -55,16 +55,18 @@ def draw(chart: NormSweep) -> Figure:
 
 def finding(chart: NormSweep) -> str:
     """For which methods control is better than resetting: at every gain, at some, or at none."""
-    told: dict[str, list[str]] = {"at every gain": [], "at some gains": [], "at no gain": []}
+    titles: dict[str, list[str]] = {"at every gain": [], "at some gains": [], "at no gain": []}
     for line in chart.lines:
         with np.errstate(all="ignore"):
             ratio = np.abs(line.angle_error / line.angle_error_reset)
         better = ratio[np.isfinite(ratio)] < 1.0 - ALIKE
         if better.size:
-            told["at every gain" if better.all() else "at some gains" if better.any() else "at no gain"].append(line.method.title)
-    parts = [f"{' and '.join(names)} {when}" for when, names in told.items() if names]
-    said = ", ".join(parts)
-    return f"Norm of a quaternion: control beats resetting for {said}" if parts else "Norm of a quaternion under control"
+            titles["at every gain" if better.all() else "at some gains" if better.any() else "at no gain"].append(
+                line.method.title
+            )
+    parts = [f"{' and '.join(names)} {when}" for when, names in titles.items() if names]
+    text = ", ".join(parts)
+    return f"Norm of a quaternion: control beats resetting for {text}" if parts else "Norm of a quaternion under control"
 
 
 def _ratios(axes: Axes, chart: NormSweep) -> None:

@@ -90,9 +90,9 @@ def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] 
     charts = []
     for i, scene in enumerate(chosen):
 
-        def told(share: float, before: int = i) -> None:
+        def part_done(share: float, before: int = i) -> None:
             if progress is not None:
                 progress((before + share) / len(chosen))
 
-        charts.append(work_precision(scene, progress=told, **options))
+        charts.append(work_precision(scene, progress=part_done, **options))
     return Panel(tuple(charts))

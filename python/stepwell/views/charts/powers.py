@@ -126,9 +126,9 @@ def powers(
         >>> [row["form"] for row in chart.summary()]
         ['direct', 'matrix', 'power']
     """
-    how = find_method(method)
+    chosen = find_method(method)
     system = Oscillator() if system is None else a_system(system)
-    fits_together(system, how)
+    fits_together(system, chosen)
     if not system.linear:
         raise UnsupportedError(f"system: only linear systems have powers, and {system!r} is not linear")
     if system.batch:
@@ -139,13 +139,13 @@ def powers(
     progress = checks.callback("progress", progress)
     if not counts:
         raise ShapeError("steps: expected at least one number of steps, got none")
-    start = integrate(system, how, v=v, y=y, dt=dt, steps=1, every=1)
+    start = integrate(system, chosen, v=v, y=y, dt=dt, steps=1, every=1)
     if start.status.ndim:
         raise ShapeError(f"v, y: expected one member, got a batch of shape {start.status.shape}")
 
     seconds: dict[str, Array] = {form: np.empty(len(counts)) for form in FORMS}
     errors: dict[str, Array] = {form: np.empty(len(counts)) for form in FORMS}
-    exact = _Exact(system, how, dt, start)
+    exact = _Exact(system, chosen, dt, start)
     longest = exact.length(0)
     if not longest > 0.0:
         raise ArgumentError(f"v, y: expected a start of more than 2**-{BITS}, got one that stays at rest")
@@ -155,13 +155,13 @@ def powers(
             times = []
             for _ in range(REPEATS):
                 begin = time.perf_counter()
-                run = integrate(system, how, v=v, y=y, dt=dt, steps=n, form=form, threads=1)
+                run = integrate(system, chosen, v=v, y=y, dt=dt, steps=n, form=form, threads=1)
                 times.append(time.perf_counter() - begin)
             seconds[form][i] = statistics.median(times)
             errors[form][i] = exact.distance(n, run) / longest
         if progress is not None:
             progress((i + 1) / len(counts))
-    return Powers(system, how, dt, np.array(counts), seconds, errors, _core.isa())
+    return Powers(system, chosen, dt, np.array(counts), seconds, errors, _core.isa())
 
 
 class _Exact:

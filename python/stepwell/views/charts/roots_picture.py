@@ -80,14 +80,14 @@ def _notes(analysis: Analysis, z: np.ndarray[Any, Any], reach: float) -> list[st
     """The numbers, and what is not seen."""
     inside = "Eigenvalues z of a step. Inside the grey unit circle a mode decays, outside it grows."
     if np.asarray(analysis.stable).ndim:
-        said = "Exact: e^(λ·dt)." if z.shape[1] <= EXACT_UP_TO else ""
+        text = "Exact: e^(λ·dt)." if z.shape[1] <= EXACT_UP_TO else ""
     else:
-        said = f"Exact: e^(λ·dt). Largest: r₁ = {analysis.radius:.9g}"
-        said += f", angle Ψ = {analysis.angle:.5g}"
+        text = f"Exact: e^(λ·dt). Largest: r₁ = {analysis.radius:.9g}"
+        text += f", angle Ψ = {analysis.angle:.5g}"
         if np.isfinite(analysis.frequency_ratio):
-            said += f", Ψ/Φ = {analysis.frequency_ratio:.7g}"
-        said += "."
+            text += f", Ψ/Φ = {analysis.frequency_ratio:.7g}"
+        text += "."
     beyond = int((~np.isfinite(z) | (np.maximum(np.abs(z.real), np.abs(z.imag)) > reach)).sum())
     if beyond:
-        said += f" Not in the picture: {beyond} of {z.size}."
-    return [inside, said.strip()]
+        text += f" Not in the picture: {beyond} of {z.size}."
+    return [inside, text.strip()]

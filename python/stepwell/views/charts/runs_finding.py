@@ -44,10 +44,10 @@ SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def finding(chart: RunPicture) -> str:
     """The most that can be said of the run in a title: how it ended, or how far it is from the truth, or what it did."""
-    return _said(chart).replace(" -", " −")
+    return _words(chart).replace(" -", " −")
 
 
-def _said(chart: RunPicture) -> str:
+def _words(chart: RunPicture) -> str:
     run = chart.run
     if run.status:
         if run.paces is None:
@@ -56,8 +56,8 @@ def _said(chart: RunPicture) -> str:
     growth, known = growth_of(chart)
     if growth >= (MIN_GROWTH if known else MIN_GROWTH_UNKNOWN):
         return f"grows to {_times(growth)} the {'exact motion' if known else 'start'}"
-    if chart.before is not None and (said := _of_control(chart, chart.before)):
-        return said
+    if chart.before is not None and (change := _of_control(chart, chart.before)):
+        return change
     if chart.state_error is not None and np.isfinite(chart.state_error).any():
         return _of_error(chart.state_error, chart.run.t)
     if chart.energy_error is not None:

@@ -133,13 +133,13 @@ def secant_verlet(acceleration: Any, v: float, y: float, dt: float, steps: int) 
 
     It starts as Verlet does in second order, y_prev = y − h·v + ½h²·a, with the true velocity in a.
     """
-    found = np.empty(steps + 1)
-    found[0] = y
+    places = np.empty(steps + 1)
+    places[0] = y
     previous = y - dt * v + 0.5 * dt * dt * acceleration(y, v)
     for k in range(steps):
         previous, y = y, 2.0 * y - previous + dt * dt * acceleration(y, y - previous)
-        found[k + 1] = y
-    return found
+        places[k + 1] = y
+    return places
 
 
 def _limit(damping: float) -> float:

@@ -198,17 +198,17 @@ def ladder(top: float) -> Array:
 
 
 def _locus(method: Method, phi: Array, limit: StabilityLimit) -> Locus:
-    found = analyse(Oscillator(), method, dt=phi)
+    analysis = analyse(Oscillator(), method, dt=phi)
     expansion = series(method)
     radius_terms, ratio_terms = expansion.radius_terms(), expansion.ratio_terms()
     return Locus(
         method=method,
         phi=phi,
-        eigenvalues=found.eigenvalues,
-        r1_squared=found.radius**2,
-        ratio=found.frequency_ratio,
-        kind=found.kind,
-        stable=found.stable,
+        eigenvalues=analysis.eigenvalues,
+        r1_squared=analysis.radius**2,
+        ratio=analysis.frequency_ratio,
+        kind=analysis.kind,
+        stable=analysis.stable,
         r1_squared_series=_sum(radius_terms, phi),
         ratio_series=_sum(ratio_terms, phi),
         limit=limit,

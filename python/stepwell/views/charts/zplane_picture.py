@@ -246,15 +246,15 @@ def _grid(panels: int) -> tuple[int, int]:
 
 def groups(chart: Stability) -> list[tuple[Locus, ...]]:
     """The methods with the same eigenvalues together, each group where its first one is."""
-    found: list[list[Locus]] = []
+    alike: list[list[Locus]] = []
     for locus in chart.loci:
-        for same in found:
+        for same in alike:
             if np.allclose(same[0].eigenvalues, locus.eigenvalues, rtol=ALIKE, atol=ALIKE):
                 same.append(locus)
                 break
         else:
-            found.append([locus])
-    return [tuple(same) for same in found]
+            alike.append([locus])
+    return [tuple(same) for same in alike]
 
 
 def finding(chart: Stability) -> str:
@@ -262,10 +262,10 @@ def finding(chart: Stability) -> str:
     if len(chart.loci) == 1:
         return f"{chart.loci[0].method.title}: {_limit(chart.loci[0])}"
     never = sum(1 for locus in chart.loci if not locus.limit)
-    said = f"{never} of {len(chart.loci)} methods {'is' if never == 1 else 'are'} never stable"
+    text = f"{never} of {len(chart.loci)} methods {'is' if never == 1 else 'are'} never stable"
     most = max(groups(chart), key=len)
     others = " others" if never and most[0].limit else ""
-    return f"{said}; {len(most)}{others} have the same eigenvalues" if len(most) > 1 else said
+    return f"{text}; {len(most)}{others} have the same eigenvalues" if len(most) > 1 else text
 
 
 def _colour(same: tuple[Locus, ...]) -> str:

@@ -44,17 +44,17 @@ def command(args: argparse.Namespace) -> None:
     options.check_file(args, (".json",))
 
     dtype: Dtypes = "both" if args.float32 else "float64"
-    found = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed, dtype=dtype)
+    advice = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed, dtype=dtype)
     written = show.Written()
     if args.output is not None:
-        written.write(args.output, found.to_json)
-    rejected = found.rejections(REASONS)
+        written.write(args.output, advice.to_json)
+    rejected = advice.rejections(REASONS)
     if args.json:
-        show.print_json(found.data())
-    elif found.ranked:
-        show.table(found.title, COLUMNS, found.table(), [*found.summary(), "", *rejected, *written.notes()])
+        show.print_json(advice.data())
+    elif advice.ranked:
+        show.table(advice.title, COLUMNS, advice.table(), [*advice.summary(), "", *rejected, *written.notes()])
     else:
-        show.paragraphs([found.title, *found.summary(), "", *rejected, *written.notes()])
+        show.paragraphs([advice.title, *advice.summary(), "", *rejected, *written.notes()])
     written.close()
 
 

@@ -48,7 +48,7 @@ def command(args: argparse.Namespace) -> None:
     if not able:
         raise UnsupportedError("; ".join(refused.values()))
     members = members_of(one) if args.members is None else args.members
-    found = rows(one, able, members, args.fused)
+    timed = rows(one, able, members, args.fused)
     show.listing(
         args,
         f"{one.title}: a step of {'a single member' if members == 1 else f'one of {members} members'} on one thread, {isa()}",
@@ -63,9 +63,9 @@ def command(args: argparse.Namespace) -> None:
                 f"{100 * row['share']:.0f} %",
                 f"{row['steps_per_second']:.2g}",
             )
-            for row in found
+            for row in timed
         ],
-        found,
+        timed,
         notes=[
             f"± is by how much the median of {REPEATS} repeats is above their least, which is what is listed.",
             *(f"{name} is refused: {why}" for name, why in refused.items()),

@@ -33,18 +33,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(args: argparse.Namespace) -> None:
     """Run, draw, write, summarise."""
     one = scene(args.scene)
-    given: dict[str, Any] = {"horizon": args.horizon}
+    arguments: dict[str, Any] = {"horizon": args.horizon}
     if args.methods is not None:
-        given["methods"] = [method(name.strip()) for name in args.methods.split(",")]
+        arguments["methods"] = [method(name.strip()) for name in args.methods.split(",")]
     if args.gains is not None:
-        given["relative"] = _numbers("--gains", args.gains, float)
+        arguments["relative"] = _numbers("--gains", args.gains, float)
     if args.evaluations is not None:
-        given["evaluations"] = _numbers("--evaluations", args.evaluations, int)
+        arguments["evaluations"] = _numbers("--evaluations", args.evaluations, int)
     name = f"{one.name}-control"
     options.check_folder(args, [name + ending for ending in (".png", ".csv")])
     args.output.mkdir(parents=True, exist_ok=True)
     with show.progress(one.title, args) as progress:
-        chart = control(one, progress=progress, **given)
+        chart = control(one, progress=progress, **arguments)
     written = show.Written()
     written.write(args.output / f"{name}.png", chart.plot)
     written.write(args.output / f"{name}.csv", chart.to_csv)

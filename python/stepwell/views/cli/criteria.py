@@ -36,24 +36,24 @@ def command(args: argparse.Namespace) -> None:
         raise ArgumentError("--markdown: expected either this or --json, got both")
     options.check_file(args, (".json", ".md"))
 
-    found = criteria(methods, phi=phi)
+    answers = criteria(methods, phi=phi)
     written = show.Written()
     if args.output is not None and args.output.suffix == ".json":
-        written.write(args.output, found.to_json)
+        written.write(args.output, answers.to_json)
     elif args.output is not None:
-        written.write(args.output, lambda path: path.write_text(found.markdown(), encoding="utf-8"))
+        written.write(args.output, lambda path: path.write_text(answers.markdown(), encoding="utf-8"))
     if args.json:
-        show.print_json(found.rows())
+        show.print_json(answers.rows())
     elif args.markdown:
-        print(found.markdown(), end="")
+        print(answers.markdown(), end="")
     else:
-        _tables(found, written.notes())
+        _tables(answers, written.notes())
     written.close()
 
 
-def _tables(found: Criteria, notes: list[str]) -> None:
+def _tables(answers: Criteria, notes: list[str]) -> None:
     """The one table would be too wide for a screen; its columns in three, each with the methods' names."""
-    head, rows = found.table()
+    head, rows = answers.table()
     series, costs = 1 + head.index("Ψ/Φ − 1"), head.index("+>")
     parts: tuple[tuple[str, range, list[str]], ...] = (
         ("Stability of the undamped oscillator, Φ = ω₀·dt, and the series of its errors", range(1, series), []),

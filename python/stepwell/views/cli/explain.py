@@ -76,5 +76,5 @@ def system_and_control(name: str) -> tuple[System, AnyControl | None]:
             f"system: there is no {checks.short(name)}; expected a scene, {', '.join(known)}, or a system, "
             f"{', '.join(each for each in classes if issubclass(getattr(systems, each), System))}"
         )
-    found = scene(name)
-    return found.system.for_state_shapes(found.v, found.y), found.control
+    one = scene(name)
+    return one.system.for_state_shapes(one.v, one.y), one.control

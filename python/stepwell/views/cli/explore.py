@@ -40,7 +40,7 @@ def command(args: argparse.Namespace) -> None:
         written.write(args.output, page.save)
     else:
         written.files.append(str(page.open()))
-    told = [
+    scenes = [
         {
             "name": each["name"],
             "title": each["title"],
@@ -50,11 +50,11 @@ def command(args: argparse.Namespace) -> None:
         for each in page.data["scenes"]
     ]
     if args.json:
-        show.print_json({"written": written.files, "bytes": len(page.html.encode()), "scenes": told})
+        show.print_json({"written": written.files, "bytes": len(page.html.encode()), "scenes": scenes})
     else:
         size = f"{len(page.html.encode()) / 1000:.0f} kB"
-        print(f"a page of {size} for browsers since 2023, with {len(page.methods)} methods; scene{'s' * (len(told) > 1)}:")
-        for each in told:
+        print(f"a page of {size} for browsers since 2023, with {len(page.methods)} methods; scene{'s' * (len(scenes) > 1)}:")
+        for each in scenes:
             sliders = ", ".join(each["sliders"]) or "none"
             print(f"  {each['name']}: {each['title']}; {len(each['methods'])} methods; sliders {sliders}")
         for note in written.notes():

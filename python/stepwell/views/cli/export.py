@@ -37,8 +37,8 @@ def command(args: argparse.Namespace) -> None:
     options.check_file(args, language.endings)
     state: dict[str, Any] = {}
     if args.system in [each.name for each in scenes()]:
-        found = scene(args.system)
-        state = {"v": found.v, "y": found.y, "dt": found.dt}
+        one = scene(args.system)
+        state = {"v": one.v, "y": one.y, "dt": one.dt}
     if args.dt is not None:
         state["dt"] = args.dt
     step = export(

@@ -27,7 +27,7 @@ def command(args: argparse.Namespace) -> None:
     chosen = paper.entries(section)
     options.check_folder(args)
 
-    found = [entry.run() for entry in chosen]
+    runs = [entry.run() for entry in chosen]
     written = show.Written()
     if args.output is not None and any(entry.draw for entry in chosen):
         written.files = [str(path) for path in written.write(args.output, lambda folder: paper.draw(folder, section)) or ()]
@@ -35,7 +35,7 @@ def command(args: argparse.Namespace) -> None:
         rows = [
             {name: getattr(entry, name) for name in ("section", "kind", "name", "says", "here", "corrected", "picture")}
             | run._asdict()
-            for entry, run in zip(chosen, found, strict=True)
+            for entry, run in zip(chosen, runs, strict=True)
         ]
         show.print_json({"statements": rows, "files": written.files})
     else:
@@ -44,12 +44,12 @@ def command(args: argparse.Namespace) -> None:
             ("section", "statement", "right instead", "found here", ""),
             [
                 (entry.section, entry.says, plain(entry.corrected), run.found, "✓" if run.holds else "✗ not reproduced")
-                for entry, run in zip(chosen, found, strict=True)
+                for entry, run in zip(chosen, runs, strict=True)
             ],
             written.notes(),
         )
     written.close()
-    if failed := [entry.name for entry, run in zip(chosen, found, strict=True) if not run.holds]:
+    if failed := [entry.name for entry, run in zip(chosen, runs, strict=True) if not run.holds]:
         raise StepwellError(f"not reproduced: {', '.join(failed)}")
 
 

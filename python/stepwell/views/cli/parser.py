@@ -19,8 +19,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with the message and a hint at the help."""
-        said = message.removeprefix("argument ").replace("the following arguments are required", "still needed")
-        self.exit(WRONG, f"{self.prog}: {said}\n{self.prog} --help says what it takes.\n")
+        text = message.removeprefix("argument ").replace("the following arguments are required", "still needed")
+        self.exit(WRONG, f"{self.prog}: {text}\n{self.prog} --help says what it takes.\n")
 
 
 def number(text: str) -> float:
@@ -44,7 +44,7 @@ def whole(text: str) -> int:
     try:
         return int(text)
     except ValueError:
-        found = number(text) if text.strip().lower().count("e") == 1 else 0.5
-    if not found.is_integer():
+        value = number(text) if text.strip().lower().count("e") == 1 else 0.5
+    if not value.is_integer():
         raise argparse.ArgumentTypeError(f"expected a whole number, got {text!r}")
-    return int(found)
+    return int(value)

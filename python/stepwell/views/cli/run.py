@@ -82,21 +82,21 @@ def command(args: argparse.Namespace) -> None:
     ending = "" if args.output is None else args.output.suffix
     _ready(args.output, args.seconds, args.fps)
     to_draw = ending in (*PICTURES, *ANIMATIONS)
-    given: dict[str, Any] = {"control": chosen.control if args.control is None else _control(args.control)}
-    given |= {"record": list(chosen.system.quantities)[:1]}
+    options: dict[str, Any] = {"control": chosen.control if args.control is None else _control(args.control)}
+    options |= {"record": list(chosen.system.quantities)[:1]}
     if args.fused:
-        given["fused"] = True
+        options["fused"] = True
     if args.float32:
-        given["dtype"] = "float32"
+        options["dtype"] = "float32"
     if args.start is not None:
-        given["start"] = args.start
+        options["start"] = args.start
     if args.form != "direct":
-        given |= {"form": args.form, "record": ()}
-    with warnings.catch_warnings(record=True) as told:
+        options |= {"form": args.form, "record": ()}
+    with warnings.catch_warnings(record=True) as warned:
         for kind in (AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning):
             warnings.simplefilter("always", kind)
-        run = _fixed(args, chosen, to_draw, given) if args.tolerance is None else _adaptive(args, chosen, to_draw, given)
-    for warning in told:
+        run = _fixed(args, chosen, to_draw, options) if args.tolerance is None else _adaptive(args, chosen, to_draw, options)
+    for warning in warned:
         print(f"stepwell: warning: {warning.message}", file=sys.stderr)
 
     picture = run_picture(chosen, run)
@@ -116,29 +116,29 @@ def command(args: argparse.Namespace) -> None:
     else:
         for name, value in report.items():
             if value is not None:
-                print(f"{NAMES.get(name, name.replace('_', ' ')):21} {_said(name, value)}")
+                print(f"{NAMES.get(name, name.replace('_', ' ')):21} {_shown(name, value)}")
     written.close()
 
 
-def _fixed(args: argparse.Namespace, chosen: Scene, to_draw: bool, given: dict[str, Any]) -> Run:
+def _fixed(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: dict[str, Any]) -> Run:
     """The run with steps of one length."""
     dt = chosen.dt if args.dt is None else args.dt
     steps = chosen.steps_for(dt) if args.steps is None else args.steps
     every = max(1, steps // (KEPT_TO_DRAW if to_draw else KEPT)) if args.every is None else args.every
-    return chosen.run(args.method, dt, steps=steps, every=every, **given)
+    return chosen.run(args.method, dt, steps=steps, every=every, **options)
 
 
-def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, given: dict[str, Any]) -> Run:
+def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: dict[str, Any]) -> Run:
     """The run with adaptive steps over the horizon, at equidistant times."""
     for option in ("steps", "every"):
         if getattr(args, option) is not None:
             raise ArgumentError(f"--{option}: goes with fixed steps only; with --tolerance the steps follow the error")
     at = np.linspace(0.0, chosen.horizon, 1 + (ADAPTIVE_TO_DRAW if to_draw else ADAPTIVE))
-    given |= chosen.adaptive_options | ({} if args.dt is None else {"dt": args.dt})
-    return integrate(chosen.system, args.method, v=chosen.v, y=chosen.y, tolerance=args.tolerance, at=at, **given)
+    options |= chosen.adaptive_options | ({} if args.dt is None else {"dt": args.dt})
+    return integrate(chosen.system, args.method, v=chosen.v, y=chosen.y, tolerance=args.tolerance, at=at, **options)
 
 
-def _said(name: str, value: Any) -> str:
+def _shown(name: str, value: Any) -> str:
     """A value in the digits that are looked at; --json and files have all."""
     if isinstance(value, float):
         return f"{value:.{DIGITS_OF_AN_ERROR if name.endswith('error') else DIGITS}g}"
@@ -163,18 +163,18 @@ def _ready(path: Path | None, seconds: float, fps: float) -> None:
         need_for_animation(path, seconds, fps)
 
 
-def _control(given: str) -> AnyControl | None:
+def _control(text: str) -> AnyControl | None:
     """The control that ``GAIN[:FORM]``, the way of a projection or ``off`` says."""
-    if given == "off":
+    if text == "off":
         return None
-    if given in WAYS:
-        return Projection(given)
-    gain, _, form = given.partition(":")
+    if text in WAYS:
+        return Projection(text)
+    gain, _, form = text.partition(":")
     try:
         strength = float(gain)
     except ValueError:
         raise ArgumentError(
-            f"--control: expected a gain and a form, such as 0.3:printed, {', '.join(WAYS)} or off, got {given!r}"
+            f"--control: expected a gain and a form, such as 0.3:printed, {', '.join(WAYS)} or off, got {text!r}"
         ) from None
     return EnergyControl(strength, cast(Any, form)) if form else EnergyControl(strength)
 

@@ -30,11 +30,11 @@ def scene_with(name: str, settings: Sequence[str]) -> Scene:
     pairs = [_pair(text) for text in settings]
     known = () if FILE.fullmatch(name) else _arguments_of(name.partition(":")[0])
     own = [f"{key}={value}" for key, value in pairs if key in known]
-    found = scene(name + ("," if ":" in name else ":") * bool(own) + ",".join(own))
+    changed = scene(name + ("," if ":" in name else ":") * bool(own) + ",".join(own))
     for key, value in pairs:
         if key not in known:
-            found = _changed(found, key, value, known)
-    return found
+            changed = _changed(changed, key, value, known)
+    return changed
 
 
 def _pair(text: str) -> tuple[str, str]:
@@ -44,20 +44,20 @@ def _pair(text: str) -> tuple[str, str]:
     return key, value
 
 
-def _changed(found: Scene, key: str, text: str, known: Sequence[str]) -> Scene:
+def _changed(scene: Scene, key: str, text: str, known: Sequence[str]) -> Scene:
     if key in BLOCKS:
-        shape, value = getattr(found, key).shape, np.array(_value(text))
+        shape, value = getattr(scene, key).shape, np.array(_value(text))
         if value.dtype.kind != "f" or value.size not in (1, int(np.prod(shape))):
             raise ArgumentError(f"--set: expected {key} as one number, or as numbers of shape {shape}, got {text!r}")
         block = np.broadcast_to(value, shape) if value.ndim == 0 else value.reshape(shape)
-        v, y = (block, found.y) if key == "v" else (found.v, block)
-        return replace(found, v=v, y=y, exact=None, until=np.inf, period=None)
-    parameters = _parameters(found.system)
+        v, y = (block, scene.y) if key == "v" else (scene.v, block)
+        return replace(scene, v=v, y=y, exact=None, until=np.inf, period=None)
+    parameters = _parameters(scene.system)
     if key not in parameters:
         names = [*known, *parameters, *BLOCKS]
-        raise ArgumentError(f"--set: {found.name} has no {key!r}; known: {', '.join(dict.fromkeys(names))}")
-    system = type(found.system)(**(parameters | {key: _value(text)}))
-    return replace(found, system=system, exact=None, until=np.inf, period=None)
+        raise ArgumentError(f"--set: {scene.name} has no {key!r}; known: {', '.join(dict.fromkeys(names))}")
+    system = type(scene.system)(**(parameters | {key: _value(text)}))
+    return replace(scene, system=system, exact=None, until=np.inf, period=None)
 
 
 def _parameters(system: System) -> dict[str, Any]:

@@ -84,15 +84,15 @@ class Written:
         self.files: list[str] = []
         self.error: Exception | None = None
 
-    def write(self, path: Path, how: Callable[[Path], Any]) -> Any:
+    def write(self, path: Path, writer: Callable[[Path], Any]) -> Any:
         """Write a file and return what ``how`` returns, or keep the error for ``close``."""
         try:
-            what = how(path)
+            result = writer(path)
         except Exception as error:  # whatever it is, it is raised in the end
             self.error = self.error or error
             return None
         self.files.append(str(path))
-        return what
+        return result
 
     def notes(self) -> list[str]:
         """What a table says below."""

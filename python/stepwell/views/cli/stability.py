@@ -34,8 +34,8 @@ def command(args: argparse.Namespace) -> None:
     """Analyse, draw, write, tell."""
     # All names and requirements are checked before any work.
     methods = options.chosen(args)
-    asked = USUAL if args.charts is None else tuple(name.strip() for name in args.charts.split(","))
-    kinds = [checks.known("--charts", name, CHARTS) for name in dict.fromkeys(asked)]
+    names = USUAL if args.charts is None else tuple(name.strip() for name in args.charts.split(","))
+    kinds = [checks.known("--charts", name, CHARTS) for name in dict.fromkeys(names)]
     if args.charts is not None and args.output is None:
         raise ArgumentError("-o: expected a folder for what --charts asks for")
     top = None if args.phi is None else within("--phi", checks.number("--phi", args.phi, positive=True, unit="rad"))

@@ -40,8 +40,8 @@ MAX_SOURCE = 400_000
 
 def of_method(method: Method) -> dict[str, Any]:
     """What the page tells of a method, and its colour in all pictures."""
-    told = {name: getattr(method, name) for name in ("name", "title", "order", "evaluations", "limit", "carry", "section")}
-    return told | {"colour": look(method)["color"]}
+    record = {name: getattr(method, name) for name in ("name", "title", "order", "evaluations", "limit", "carry", "section")}
+    return record | {"colour": look(method)["color"]}
 
 
 def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
         "limit": offer.limit if known else None,
         "truth": truth,
         **sizes(scene),
-        "sliders": [told for each in own if (told := _slider(each, values)) is not None],
+        "sliders": [record for each in own if (record := _slider(each, values)) is not None],
         "steps": names,
         "truth_by": truth_by,
         "refused": refused,
@@ -97,10 +97,10 @@ def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[s
     sources: list[str] = []
     places: dict[str, int] = {}
     refused: dict[str, str] = {}
-    given: dict[str, Any] = {"dt": scene.dt, "v": scene.v, "y": scene.y, "name": CLASS}
+    state: dict[str, Any] = {"dt": scene.dt, "v": scene.v, "y": scene.y, "name": CLASS}
     for method in methods:
         try:
-            source = export(scene.system, method, "javascript", control=scene.control, **given).source
+            source = export(scene.system, method, "javascript", control=scene.control, **state).source
         except StepwellError as error:
             refused[method.name] = str(error)
             continue
@@ -118,7 +118,7 @@ def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[s
             truth_by, places["truth"] = name, places[name]
             break
         try:
-            source = export(scene.system, name, "javascript", **given).source
+            source = export(scene.system, name, "javascript", **state).source
         except StepwellError:
             continue
         if len(source) <= MAX_SOURCE:
@@ -155,10 +155,10 @@ def sizes(scene: Scene) -> dict[str, Any]:
         blocks = scene.exact(np.linspace(0.0, scene.horizon, SAMPLES))
     else:
         steps = min(scene.steps_for(scene.dt), MAX_SIZE_STEPS)
-        given: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": scene.dt, "steps": steps, "control": scene.control}
+        state: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": scene.dt, "steps": steps, "control": scene.control}
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a size need not be exact
-            run = integrate(scene.system, "rk4", **given, every=max(1, steps // SAMPLES))
+            run = integrate(scene.system, "rk4", **state, every=max(1, steps // SAMPLES))
         blocks = run.v, run.y
         rows = (block.reshape(len(block), -1) for block in blocks)
         lengths = [float(_finite(np.sqrt((row * row).sum(axis=1))).max(initial=0.0)) for row in rows]
@@ -185,18 +185,18 @@ def _slider(slider: sliders.Slider, values: dict[str, Any]) -> dict[str, Any] | 
     if value is None or not math.isfinite(value):
         return None
     low, high = min(slider.low, value), max(slider.high, value)
-    told = {"name": slider.name, "label": slider.label, "about": slider.about, "low": low, "high": high, "value": value}
-    return told | {"relative": slider.relative, "targets": dict(slider.targets)}
+    record = {"name": slider.name, "label": slider.label, "about": slider.about, "low": low, "high": high, "value": value}
+    return record | {"relative": slider.relative, "targets": dict(slider.targets)}
 
 
 def _at(values: dict[str, Any], path: str) -> float | None:
     """The number at a path, or None."""
     name, _, index = path.removesuffix("]").partition("[")
-    found: Any = values
+    value: Any = values
     for part in name.split("."):
-        if not isinstance(found, dict) or part not in found:
+        if not isinstance(value, dict) or part not in value:
             return None
-        found = found[part]
-    if isinstance(found, list):
-        found = found[0 if index == "*" else int(index)]
-    return float(found)
+        value = value[part]
+    if isinstance(value, list):
+        value = value[0 if index == "*" else int(index)]
+    return float(value)

@@ -73,18 +73,18 @@ def offered() -> list[Scene]:
     return [known[name] for name in sliders.OFFERS]
 
 
-def _scenes(given: Any) -> list[Scene]:
-    if given is None:
+def _scenes(scenes: Any) -> list[Scene]:
+    if scenes is None:
         return offered()
-    several = [given] if isinstance(given, (str, Scene)) else checks.several("scenes", given, "scenes or their names")
+    several = [scenes] if isinstance(scenes, (str, Scene)) else checks.several("scenes", scenes, "scenes or their names")
     if not several:
         raise ArgumentError("scenes: expected at least one, got none")
-    found = [sliders.rope() if isinstance(each, str) and each == "rope" else find_scene(each) for each in several]
-    names = [each.name for each in found]
+    chosen = [sliders.rope() if isinstance(each, str) and each == "rope" else find_scene(each) for each in several]
+    names = [each.name for each in chosen]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ArgumentError(f"scenes: expected scenes of different names, got {twice!r} twice; give one another name=")
-    return found
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)

@@ -207,7 +207,7 @@ def generic(system: Any, parameters: Mapping[str, Any], controlled: bool) -> tup
     are.
     """
     links = _links(system)
-    found: list[Slider] = []
+    sliders: list[Slider] = []
     for name, value in parameters.items():
         if name in ("dt", "t0", "control_target") or (controlled and name != "control_gain"):
             continue
@@ -218,14 +218,14 @@ def generic(system: Any, parameters: Mapping[str, Any], controlled: bool) -> tup
             return {f"m.{name}{index}": 1.0} | others
 
         if not isinstance(value, list):
-            found.append(_around(name, label, value, targets("", scalar=True)))
+            sliders.append(_around(name, label, value, targets("", scalar=True)))
         elif any(isinstance(each, list) for each in value):
             continue
         elif len(value) <= MAX_ELEMENTS:
-            found += [_around(f"{name}_{i}", f"{label} {i + 1}", x, targets(f"[{i}]")) for i, x in enumerate(value)]
+            sliders += [_around(f"{name}_{i}", f"{label} {i + 1}", x, targets(f"[{i}]")) for i, x in enumerate(value)]
         else:
-            found.append(Slider(name, f"{label}, ×", 0.0, 2.0, targets("[*]"), relative=True))
-    return tuple(found[:MAX_SLIDERS])
+            sliders.append(Slider(name, f"{label}, ×", 0.0, 2.0, targets("[*]"), relative=True))
+    return tuple(sliders[:MAX_SLIDERS])
 
 
 def _links(system: Any) -> dict[str, tuple[tuple[str, float], ...]]:

@@ -40,18 +40,18 @@ def motion(system: System) -> dict[str, Any]:
 
 def _around(system: Any) -> dict[str, Any]:
     """Rods, springs and floors of points; an anchor i has the number −1 − i."""
-    found: dict[str, Any] = {}
+    parts: dict[str, Any] = {}
     if system.kernel == "springs":
-        found["links"] = np.asarray(system.pairs).tolist()
+        parts["links"] = np.asarray(system.pairs).tolist()
     if system.kernel == "rods":
         anchors = [list(map(float, each)) for each in system.anchors]
         number = {tuple(each): -1 - i for i, each in enumerate(anchors)}
-        found["anchors"] = anchors
-        found["links"] = [[end if isinstance(end, int) else number[tuple(map(float, end))] for end in rod] for rod in system.rods]
+        parts["anchors"] = anchors
+        parts["links"] = [[end if isinstance(end, int) else number[tuple(map(float, end))] for end in rod] for rod in system.rods]
     floors = [each for each in getattr(system, "contacts", ()) or () if isinstance(each, Floor)]
     if len(floors) == 1 and floors[0].normal is None:
-        found["floor"] = float(floors[0].offset)
-    return found
+        parts["floor"] = float(floors[0].offset)
+    return parts
 
 
 def energy(system: Any) -> dict[str, Any] | None:
@@ -68,8 +68,8 @@ def energy(system: Any) -> dict[str, Any] | None:
             own = {"law": system.force, "softening": float(system.softening), "dim": system.y_shape[1]}
             return {"kind": "bodies", "masses": numbers(system.masses), "Gm": numbers(system.G * system.masses), **own}
         case "particles":
-            given = system.given(())
-            return {"kind": "falling", "masses": numbers(given["masses"]), "gravity": numbers(given["gravity"])}
+            parameters = system.given(())
+            return {"kind": "falling", "masses": numbers(parameters["masses"]), "gravity": numbers(parameters["gravity"])}
         case "restricted_three_body":
             return {"kind": "restricted", "mu": float(system.mu)}
         case "pendulum_3d":

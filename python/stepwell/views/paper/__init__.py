@@ -117,12 +117,12 @@ def entries(section: str | None = None) -> tuple[Entry, ...]:
     """
     for module in MODULES:
         importlib.import_module(f"{__name__}.{module}")
-    made = sorted(_ENTRIES, key=lambda entry: _order(entry.section))  # sorting keeps the order within a section
+    ordered = sorted(_ENTRIES, key=lambda entry: _order(entry.section))  # sorting keeps the order within a section
     if section is None:
-        return tuple(made)
-    known = list(dict.fromkeys(entry.section for entry in made))
+        return tuple(ordered)
+    known = list(dict.fromkeys(entry.section for entry in ordered))
     section = checks.known("section", section, known)
-    return tuple(entry for entry in made if entry.section == section)
+    return tuple(entry for entry in ordered if entry.section == section)
 
 
 def _order(section: str) -> tuple[int, str]:

@@ -48,14 +48,14 @@ def clover_stays() -> Finding:
 
 
 def _largest(**options: Any) -> float:
-    given = energy_control(pair="printed", form="printed")
-    run = given.run("standard_euler", steps=100_000, every=100, **options)
+    scene = energy_control(pair="printed", form="printed")
+    run = scene.run("standard_euler", steps=100_000, every=100, **options)
     return float(np.abs(run.y).max())
 
 
 def _draw_control(path: Path) -> object:
-    given = energy_control(pair="printed", form="printed")
-    free, held = (given.run("standard_euler", steps=100_000, every=10, **options).y for options in ({"control": None}, {}))
+    scene = energy_control(pair="printed", form="printed")
+    free, held = (scene.run("standard_euler", steps=100_000, every=10, **options).y for options in ({"control": None}, {}))
     return paths(
         path,
         "Energy control keeps three bodies together",
@@ -98,11 +98,11 @@ def symmetric_start() -> Finding:
 )
 def control_term() -> Finding:
     """One step by Standard Euler with and without the control, against the formula."""
-    given = energy_control(pair="printed", form="printed")
+    scene = energy_control(pair="printed", form="printed")
     control = EnergyControl(0.3, "printed", target=-2.0)
-    free = given.run("standard_euler", steps=1, control=None)
-    held = given.run("standard_euler", steps=1, control=control)
-    energy = float(given.system.energy(given.v, given.y))
-    wanted = free.v[-1] - given.dt * 0.3 * (energy + 2.0) * given.v
+    free = scene.run("standard_euler", steps=1, control=None)
+    held = scene.run("standard_euler", steps=1, control=control)
+    energy = float(scene.system.energy(scene.v, scene.y))
+    wanted = free.v[-1] - scene.dt * 0.3 * (energy + 2.0) * scene.v
     off = float(np.abs(held.v[-1] - wanted).max())
     return Finding(off < 1e-15, "one step by the formula and by the control: the same, to rounding")

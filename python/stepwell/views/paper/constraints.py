@@ -151,7 +151,7 @@ def quaternion_norm() -> Finding:
     phi = 0.1
     # All orders: atan(Φ)/Φ − 1 with resetting, asin(Φ)/Φ − 1 under control.
     wanted = math.atan(phi) / phi - 1.0, math.asin(phi) / phi - 1.0
-    holds = all(abs(found - exact) < 1e-9 for found, exact in zip(wrong, wanted, strict=True))
+    holds = all(abs(error - exact) < 1e-9 for error, exact in zip(wrong, wanted, strict=True))
     return Finding(holds, f"Φ = 0.1: {wrong[0]:+.2e} a step with resetting (−Φ²/3), {wrong[1]:+.2e} under control (+Φ²/6)")
 
 

@@ -27,11 +27,11 @@ section_1, section_2, section_3 = Section("§1"), Section("§2"), Section("§3")
 )
 def four_criteria() -> Finding:
     """Every method has the four answers."""
-    found = criteria()
-    whole = all(c.operations.additions + c.operations.multiplications > 0 and len(c.at) > 0 and c.limit >= 0 for c in found)
-    best = max(found, key=lambda c: float(c.limit) / c.method.evaluations)
+    answers = criteria()
+    whole = all(c.operations.additions + c.operations.multiplications > 0 and len(c.at) > 0 and c.limit >= 0 for c in answers)
+    best = max(answers, key=lambda c: float(c.limit) / c.method.evaluations)
     return Finding(
-        whole, f"{len(found)} methods; the longest step per function evaluation has {best.method.title}: Φ < {best.limit:.4g}"
+        whole, f"{len(answers)} methods; the longest step per function evaluation has {best.method.title}: Φ < {best.limit:.4g}"
     )
 
 
@@ -71,9 +71,9 @@ def elastic_reflection() -> Finding:
 )
 def angles() -> Finding:
     """Both angles of False Euler at Φ = 1."""
-    found = analyse(Oscillator(omega=2.0), "false_euler", dt=0.5)
-    holds = math.isclose(found.true_angle, 1.0) and math.isclose(found.angle, found.omega * 0.5)
-    return Finding(holds, f"ω₀ = 2, T = 0.5: Φ = {found.true_angle:.4f}, Ψ = {found.angle:.4f}, Ω₀ = {found.omega:.4f}")
+    step = analyse(Oscillator(omega=2.0), "false_euler", dt=0.5)
+    holds = math.isclose(step.true_angle, 1.0) and math.isclose(step.angle, step.omega * 0.5)
+    return Finding(holds, f"ω₀ = 2, T = 0.5: Φ = {step.true_angle:.4f}, Ψ = {step.angle:.4f}, Ω₀ = {step.omega:.4f}")
 
 
 @section_3(

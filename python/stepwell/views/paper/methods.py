@@ -29,24 +29,26 @@ def at(name: str, phi: Any = ANGLES) -> Analysis:
     return analyse(Oscillator(), name, dt=phi)
 
 
-def characteristic(name: str, p: Callable[[Any], Any], q: Callable[[Any], Any], said: str) -> Finding:
+def characteristic(name: str, p: Callable[[Any], Any], q: Callable[[Any], Any], formulas: str) -> Finding:
     """Whether z² − 2pz + q is the characteristic equation of a method, for Φ from 0.05 to 1.95."""
-    found = at(name)
-    off = max(float(np.abs(found.p - p(ANGLES)).max()), float(np.abs(found.q - q(ANGLES)).max()))
-    return Finding(off < ROUNDING, f"{said}, to rounding")
+    analysis = at(name)
+    off = max(float(np.abs(analysis.p - p(ANGLES)).max()), float(np.abs(analysis.q - q(ANGLES)).max()))
+    return Finding(off < ROUNDING, f"{formulas}, to rounding")
 
 
-def picture(name: str) -> Callable[[Path], object]:
-    """Draws the figure of a method."""
-    return lambda path: figures([name]).plot(path, method=name)
+def figure(section: Section, name: str, says: str, kind: str) -> None:
+    """Make an entry of the figure of a method, whose samples are of that kind."""
 
+    def check() -> Finding:
+        samples = figures([name]).samples[0]
+        holds = bool(np.isfinite(samples.y).all()) and kind in samples.kind
+        return Finding(holds, f"Φ = 0.5, 4 periods: {samples.kind}, largest |y| = {np.abs(samples.y).max():.4g}")
 
-def figure(name: str) -> Finding:
-    """What the samples of a method's figure do."""
-    samples = figures([name]).samples[0]
-    return Finding(
-        bool(np.isfinite(samples.y).all()), f"Φ = 0.5, 4 periods: {samples.kind}, largest |y| = {np.abs(samples.y).max():.4g}"
-    )
+    def draw(path: Path) -> object:
+        return figures([name]).plot(path, method=name)
+
+    check.__name__ = f"{name}_figure"
+    section("figure", says, "`sw.charts.figures`; `stepwell figures`", draw=draw)(check)
 
 
 section_5, section_6, section_7, section_8 = (Section(f"§{n}") for n in (5, 6, 7, 8))
@@ -66,15 +68,11 @@ def standard_euler() -> Finding:
 @section_5("formula", "z² − 2z + (1 + Φ²) = 0; r₁² = 1 + Φ²: always an unstable oscillation.", "`analyse(…).q`")
 def standard_euler_equation() -> Finding:
     """The equation."""
-    found = characteristic("standard_euler", np.ones_like, lambda phi: 1 + phi**2, "p = 1, q = 1 + Φ²")
-    return Finding(found.holds and stability_limit(Oscillator(), "standard_euler") == 0, found.found)
+    result = characteristic("standard_euler", np.ones_like, lambda phi: 1 + phi**2, "p = 1, q = 1 + Φ²")
+    return Finding(result.holds and stability_limit(Oscillator(), "standard_euler") == 0, result.found)
 
 
-@section_5("figure", "The samples grow.", "`sw.charts.figures`; `stepwell figures`", draw=picture("standard_euler"))
-def standard_euler_figure() -> Finding:
-    """The figure."""
-    found = figure("standard_euler")
-    return Finding(found.holds and "unstable" in found.found, found.found)
+figure(section_5, "standard_euler", "The samples grow.", "unstable")
 
 
 # ---- §6 Damped Euler
@@ -89,9 +87,9 @@ def standard_euler_figure() -> Finding:
 def damped_euler() -> Finding:
     """Its samples against those of Standard Euler with that damping."""
     phi = 0.3
-    given: dict[str, Any] = {"v": 0.3, "y": 0.7, "dt": 0.3, "steps": 200}
-    own = integrate(Oscillator(), "damped_euler", **given)
-    damped = integrate(Oscillator(damping=0.5 * phi), "standard_euler", **given)
+    options: dict[str, Any] = {"v": 0.3, "y": 0.7, "dt": 0.3, "steps": 200}
+    own = integrate(Oscillator(), "damped_euler", **options)
+    damped = integrate(Oscillator(damping=0.5 * phi), "standard_euler", **options)
     apart = abs(float(own.y[-1] - damped.y[-1]))
     return Finding(apart < 1e-12, "the same samples over 200 steps, to rounding")
 
@@ -103,8 +101,8 @@ def damped_euler() -> Finding:
 )
 def damped_euler_equation() -> Finding:
     """Both for D = 0.1, and q for D = Φ/2."""
-    found = analyse(Oscillator(damping=0.1), "standard_euler", dt=ANGLES)
-    off = max(np.abs(found.p - (1 - 0.1 * ANGLES)).max(), np.abs(found.q - (1 - 0.2 * ANGLES + ANGLES**2)).max())
+    step = analyse(Oscillator(damping=0.1), "standard_euler", dt=ANGLES)
+    off = max(np.abs(step.p - (1 - 0.1 * ANGLES)).max(), np.abs(step.q - (1 - 0.2 * ANGLES + ANGLES**2)).max())
     harmonic = np.abs(at("damped_euler").q - 1).max()
     return Finding(max(off, harmonic) < ROUNDING, "p = 1 − DΦ, q = 1 − 2DΦ + Φ², to rounding")
 
@@ -119,15 +117,11 @@ def damped_euler_frequency() -> Finding:
     """The table."""
     psi = [float(at("damped_euler", phi).angle) for phi in (1.0, 1.414)]
     series = [phi * (1 + phi**2 / 24) for phi in (1.0, 1.414)]
-    close = [abs(found - said) < 1e-3 for found, said in zip(psi + series, (1.047, 1.570, 1.042, 1.532), strict=True)]
+    close = [abs(computed - printed) < 1e-3 for computed, printed in zip(psi + series, (1.047, 1.570, 1.042, 1.532), strict=True)]
     return Finding(all(close), f"Ψ = {psi[0]:.4f}, {psi[1]:.4f}; series {series[0]:.4f}, {series[1]:.4f}")
 
 
-@section_6("figure", "Harmonic samples.", "`sw.charts.figures`; `stepwell figures`", draw=picture("damped_euler"))
-def damped_euler_figure() -> Finding:
-    """The figure."""
-    found = figure("damped_euler")
-    return Finding(found.holds and "harmonic" in found.found, found.found)
+figure(section_6, "damped_euler", "Harmonic samples.", "harmonic")
 
 
 # ---- §7 False Euler
@@ -172,13 +166,7 @@ def false_euler_limit() -> Finding:
     )
 
 
-@section_7(
-    "figure", "Harmonic samples, a little too fast.", "`sw.charts.figures`; `stepwell figures`", draw=picture("false_euler")
-)
-def false_euler_figure() -> Finding:
-    """The figure."""
-    found = figure("false_euler")
-    return Finding(found.holds and "harmonic" in found.found, found.found)
+figure(section_7, "false_euler", "Harmonic samples, a little too fast.", "harmonic")
 
 
 # ---- §8 Verlet
@@ -191,9 +179,9 @@ def false_euler_figure() -> Finding:
 )
 def verlet() -> Finding:
     """The samples of both from the same start."""
-    given: dict[str, Any] = {"v": 0.4, "y": 1.0, "dt": 0.3, "steps": 200, "every": 1}
-    one = integrate(Oscillator(), "verlet", start="first_order", **given).y
-    other = integrate(Oscillator(), "false_euler", **given).y
+    options: dict[str, Any] = {"v": 0.4, "y": 1.0, "dt": 0.3, "steps": 200, "every": 1}
+    one = integrate(Oscillator(), "verlet", start="first_order", **options).y
+    other = integrate(Oscillator(), "false_euler", **options).y
     apart = float(np.abs(one - other).max())
     same = float(np.abs(at("verlet").p - at("false_euler").p).max())
     return Finding(apart < 1e-12 and same < ROUNDING, "the same samples over 200 steps and the same p, to rounding")
@@ -224,10 +212,10 @@ def verlet_start() -> Finding:
 )
 def verlet_cost() -> Finding:
     """Operations of a step on the undamped oscillator."""
-    found = {c.method.name: c.operations for c in criteria(["verlet", "false_euler"])}
-    said = "; ".join(f"{method(name).title}: {o.multiplications} products, {o.additions} sums" for name, o in found.items())
-    fits = [o.multiplications for o in found.values()] == [3, 2] and all(o.additions == 2 for o in found.values())
-    return Finding(fits, said)
+    counts = {c.method.name: c.operations for c in criteria(["verlet", "false_euler"])}
+    text = "; ".join(f"{method(name).title}: {o.multiplications} products, {o.additions} sums" for name, o in counts.items())
+    fits = [o.multiplications for o in counts.values()] == [3, 2] and all(o.additions == 2 for o in counts.values())
+    return Finding(fits, text)
 
 
 def _draw_friction(path: Path) -> object:
@@ -259,11 +247,7 @@ def verlet_and_friction() -> Finding:
     )
 
 
-@section_8("figure", "Harmonic samples.", "`sw.charts.figures`; `stepwell figures`", draw=picture("verlet"))
-def verlet_figure() -> Finding:
-    """The figure."""
-    found = figure("verlet")
-    return Finding(found.holds and "harmonic" in found.found, found.found)
+figure(section_8, "verlet", "Harmonic samples.", "harmonic")
 
 
 # ---- §9 Standard Heun
@@ -305,11 +289,7 @@ def standard_heun_frequency() -> Finding:
     return Finding(holds, f"Ψ/Φ − 1 = {small:.3e} at Φ = 0.1, {low:+.1e} at 2.08, {high:+.1e} at 2.083")
 
 
-@section_9("figure", "The samples grow slowly.", "`sw.charts.figures`; `stepwell figures`", draw=picture("standard_heun"))
-def standard_heun_figure() -> Finding:
-    """The figure."""
-    found = figure("standard_heun")
-    return Finding(found.holds and "unstable" in found.found, found.found)
+figure(section_9, "standard_heun", "The samples grow slowly.", "unstable")
 
 
 # ---- §10 False Heun
@@ -346,17 +326,13 @@ def false_heun_equation() -> Finding:
 )
 def false_heun_kinds() -> Finding:
     """What they do in the three ranges."""
-    found = [str(at("false_heun", phi).kind) for phi in (1.2, 1.35, 1.45)]
+    kinds = [str(at("false_heun", phi).kind) for phi in (1.2, 1.35, 1.45)]
     limit = float(stability_limit(Oscillator(), "false_heun"))
-    holds = found == ["damped oscillation", "monotonic stable", "monotonic unstable"] and abs(limit - math.sqrt(2)) < 1e-9
-    return Finding(holds, f"Φ = 1.2, 1.35, 1.45: {', '.join(found)}; stable for Φ < {limit:.6g}")
+    holds = kinds == ["damped oscillation", "monotonic stable", "monotonic unstable"] and abs(limit - math.sqrt(2)) < 1e-9
+    return Finding(holds, f"Φ = 1.2, 1.35, 1.45: {', '.join(kinds)}; stable for Φ < {limit:.6g}")
 
 
-@section_10("figure", "The samples are damped.", "`sw.charts.figures`; `stepwell figures`", draw=picture("false_heun"))
-def false_heun_figure() -> Finding:
-    """The figure."""
-    found = figure("false_heun")
-    return Finding(found.holds and "damped" in found.found, found.found)
+figure(section_10, "false_heun", "The samples are damped.", "damped")
 
 
 # ---- §11 Semi-False Heun
@@ -379,19 +355,13 @@ def semi_false_heun() -> Finding:
 )
 def semi_false_heun_equation() -> Finding:
     """The equation, and the limit."""
-    found = characteristic(
+    result = characteristic(
         "semi_false_heun", lambda phi: 1 - phi**2 / 2, lambda phi: 1 - phi**4 / 4, "p = 1 − Φ²/2, q = 1 − Φ⁴/4"
     )
     limit = float(stability_limit(Oscillator(), "semi_false_heun"))
     return Finding(
-        found.holds and abs(limit - math.sqrt(2 * math.sqrt(5) - 2)) < 1e-9, f"{found.found}; stable for Φ < {limit:.6g}"
+        result.holds and abs(limit - math.sqrt(2 * math.sqrt(5) - 2)) < 1e-9, f"{result.found}; stable for Φ < {limit:.6g}"
     )
 
 
-@section_11(
-    "figure", "The samples are damped a little.", "`sw.charts.figures`; `stepwell figures`", draw=picture("semi_false_heun")
-)
-def semi_false_heun_figure() -> Finding:
-    """The figure."""
-    found = figure("semi_false_heun")
-    return Finding(found.holds and "damped" in found.found, found.found)
+figure(section_11, "semi_false_heun", "The samples are damped a little.", "damped")

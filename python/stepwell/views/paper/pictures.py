@@ -36,12 +36,12 @@ def paths(path: Path, title: str, about: str, panels: Sequence[tuple[str, Array]
         with rc_context(FONT):
             places = {"left": 0.06, "right": 0.985, "bottom": 0.95 / height, "top": 1.0 - 1.7 / height, "wspace": 0.12}
             row = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False, gridspec_kw=places)[0]
-            for axes, (said, y) in zip(row, panels, strict=True):
+            for axes, (title, y) in zip(row, panels, strict=True):
                 for body, colour in zip(range(y.shape[1]), BODIES, strict=False):
                     axes.plot(*y[:, body].T, color=colour, linewidth=0.5)
                     axes.plot(*y[0, body], "o", color=colour, markersize=9, markeredgecolor="white", zorder=5)
                 axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel="x", aspect="equal")
-                axes.set_title(said, loc="left", size=15, weight="bold")
+                axes.set_title(title, loc="left", size=15, weight="bold")
             row[0].set_ylabel("y")
             figure.text(0.015, 1.0 - 0.5 / height, title, size=20, weight="bold")
             figure.text(0.015, 1.0 - 0.9 / height, about, size=13, color=GREY)

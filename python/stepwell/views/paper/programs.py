@@ -23,10 +23,12 @@ METHODS = ("standard_euler", "damped_euler", "false_euler", "verlet", "standard_
 )
 def both_forms() -> Finding:
     """Both forms of each method with ω₀ = 2, T = 0.1, over 200 steps from v = 0, y = 1."""
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 200, "every": 1}
+    options: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 200, "every": 1}
     apart = [
         float(
-            np.abs(integrate(Oscillator(2.0), name, **given).y - integrate(Oscillator(2.0), name, form="matrix", **given).y).max()
+            np.abs(
+                integrate(Oscillator(2.0), name, **options).y - integrate(Oscillator(2.0), name, form="matrix", **options).y
+            ).max()
         )
         for name in METHODS
     ]

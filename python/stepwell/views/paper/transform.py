@@ -45,8 +45,8 @@ def transition_matrix() -> Finding:
 def p_and_q() -> Finding:
     """Both for six methods at Φ = 0.5, where all have a pair."""
     names = ("standard_euler", "damped_euler", "false_euler", "standard_heun", "false_heun", "semi_false_heun")
-    found = [analyse(Oscillator(), name, dt=0.5) for name in names]
-    worst = max(abs(a.q - a.radius**2) for a in found)
+    steps = [analyse(Oscillator(), name, dt=0.5) for name in names]
+    worst = max(abs(a.q - a.radius**2) for a in steps)
     return Finding(worst < 1e-14, "r₁² = q for six methods at Φ = 0.5, to rounding")
 
 
@@ -58,9 +58,9 @@ def p_and_q() -> Finding:
 )
 def kinds() -> Finding:
     """One growing, one constant and one decaying mode by Standard Euler."""
-    found = [analyse(LinearSystem([[rate]]), "standard_euler", dt=0.1).kind for rate in (-1.0, 0.0, 1.0)]
+    kinds = [analyse(LinearSystem([[rate]]), "standard_euler", dt=0.1).kind for rate in (-1.0, 0.0, 1.0)]
     wanted = ["monotonic stable", "constant", "monotonic unstable"]
-    return Finding(found == wanted and set(wanted) <= set(KINDS), ", ".join(found))
+    return Finding(kinds == wanted and set(wanted) <= set(KINDS), ", ".join(kinds))
 
 
 @section(
@@ -71,10 +71,10 @@ def kinds() -> Finding:
 )
 def angle() -> Finding:
     """False Euler at the Φ at which Ψ is 150°."""
-    found = analyse(Oscillator(), "false_euler", dt=phi_of(math.radians(150.0)))
-    z = found.eigenvalues[0]
+    step = analyse(Oscillator(), "false_euler", dt=phi_of(math.radians(150.0)))
+    z = step.eigenvalues[0]
     wrong = math.degrees(math.atan(abs(z.imag) / z.real))
-    return Finding(abs(math.degrees(found.angle) - 150.0) < 1e-9, f"atan2 {math.degrees(found.angle):.1f}°, arctan {wrong:.1f}°")
+    return Finding(abs(math.degrees(step.angle) - 150.0) < 1e-9, f"atan2 {math.degrees(step.angle):.1f}°, arctan {wrong:.1f}°")
 
 
 def _draw_harmonic(path: Path) -> object:
@@ -89,10 +89,10 @@ def _draw_harmonic(path: Path) -> object:
 )
 def harmonic_cases() -> Finding:
     """False Euler, whose samples are harmonic for every Φ below 2."""
-    found = [analyse(Oscillator(), "false_euler", dt=phi_of(math.radians(psi))) for psi in HARMONIC]
-    samples = [f.samples_per_period for f in found]
+    steps = [analyse(Oscillator(), "false_euler", dt=phi_of(math.radians(psi))) for psi in HARMONIC]
+    samples = [f.samples_per_period for f in steps]
     holds = all(abs(s - 360.0 / psi) < 1e-9 for s, psi in zip(samples, HARMONIC, strict=True))
-    return Finding(holds and all(f.kind == "harmonic" for f in found), ", ".join(f"{s:.1f}" for s in samples))
+    return Finding(holds and all(f.kind == "harmonic" for f in steps), ", ".join(f"{s:.1f}" for s in samples))
 
 
 @section(
