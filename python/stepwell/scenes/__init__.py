@@ -72,7 +72,7 @@ def _arguments_of(name: str) -> tuple[str, ...]:
 
 
 def _arguments(name: str, make: Callable[..., Scene], written: str) -> dict[str, Any]:
-    """What ``pair=printed,eps=0`` says: numbers where they are, else words."""
+    """The keyword arguments that ``pair=printed,eps=0`` stands for: numbers where possible, else words."""
     arguments: dict[str, Any] = {}
     for each in written.split(","):
         key, equals, value = (part.strip() for part in each.partition("="))
@@ -135,7 +135,7 @@ def _makers() -> dict[str, Callable[..., Scene]]:
 
 
 def _remembering(make: Callable[..., Scene]) -> Callable[..., Scene]:
-    """The same function, whose scenes have an ``exact`` that can be pickled: it remembers with what the function was called."""
+    """Wrap ``make`` so that the ``exact`` of its scenes can be pickled: it keeps the call that made it."""
 
     @wraps(make)
     def remembering(*args: Any, **kwargs: Any) -> Scene:
@@ -146,7 +146,7 @@ def _remembering(make: Callable[..., Scene]) -> Callable[..., Scene]:
 
 
 class Exact:
-    """The exact solution of a scene here, by the scene's name and what it was made with."""
+    """The exact solution of a scene of the package; it is pickled as the call that made the scene."""
 
     def __init__(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any], solution: table.Exact) -> None:
         self.made, self.solution = (name, args, kwargs), solution
@@ -156,7 +156,7 @@ class Exact:
         return self.solution(t)
 
     def __getattr__(self, name: str) -> Any:
-        """What else the solution has to say."""
+        """Other attributes are those of the solution."""
         return getattr(self.solution, name)
 
     def __reduce__(self) -> tuple[Any, ...]:

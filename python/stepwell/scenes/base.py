@@ -159,7 +159,7 @@ class Scene(ValueEquality):
 
     @property
     def adaptive_options(self) -> dict[str, Any]:
-        """Its arguments of ``integrate`` that go with a tolerance."""
+        """The arguments of ``integrate`` that the scene adds to adaptive steps."""
         options = {"jumps": self.jumps, "max_step": self.max_step, "positive": self.positive}
         return {name: value for name, value in options.items() if value is not None}
 
@@ -233,7 +233,7 @@ class Scene(ValueEquality):
         return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
 
     def amplitude(self, run: Run) -> Array:
-        """The larger of both blocks' lengths in each saved state, shape (saved,), in the exact solution's ``scales``."""
+        """The larger relative length of both blocks in each saved state, shape (saved,), in units of ``scales``."""
         self._check(run)
         with np.errstate(all="ignore"):
             lengths = [
@@ -293,7 +293,7 @@ class Scene(ValueEquality):
         return self.system.v_shape, self.system.y_shape
 
     def _solution(self, t: Array) -> tuple[tuple[Array, Array], np.ndarray[Any, np.dtype[np.bool_]]]:
-        """The exact blocks, and at which times they are known; at the others they are those of the last known time."""
+        """The exact blocks, and the times at which they are known. Later ones repeat the last known state."""
         if self.exact is None:
             raise ArgumentError(f"scene: {self.name} has no exact solution, so there is no error to measure")
         blocks = self.exact(np.minimum(t, self.until))
@@ -315,7 +315,7 @@ class Scene(ValueEquality):
         return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
 
     def _repr_html_(self) -> str:
-        """The same as a table, for notebooks."""
+        """A table for notebooks."""
         return facts(
             f"{self.title} ({self.name})",
             [
@@ -334,7 +334,7 @@ class Scene(ValueEquality):
 
 
 def _relative(length: Array, scale: float) -> Array:
-    """Lengths in a scale; in that of a block that is always zero, or empty, zero is zero and all else infinite."""
+    """Lengths divided by a scale. Where that is zero, as of an empty block, zero stays zero and others are infinite."""
     return length / scale if scale else np.where(length == 0.0, 0.0, np.inf)
 
 

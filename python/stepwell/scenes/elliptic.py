@@ -30,7 +30,7 @@ def elliptic(u: Array, modulus: float, complement: float) -> tuple[Array, Array,
 
 
 def _means(complement: float) -> tuple[list[float], list[float]]:
-    """The arithmetic means of 1 and k', and half the differences of what they are the means of."""
+    """The successive arithmetic means that start from 1 and k', and half the difference of each pair."""
     a, b, means, halves = 1.0, complement, [1.0], [0.0]
     for _ in range(MAX_ITERATIONS):
         a, b, half = 0.5 * (a + b), math.sqrt(a * b), 0.5 * (a - b)

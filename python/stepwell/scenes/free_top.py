@@ -83,7 +83,7 @@ class FreeTop(ValueEquality):
         return (self.axes.T @ w).T, q.T
 
     def _velocity(self, t: Array) -> Array:
-        """ω along the axes of which the third is the one that ℓ goes about, shape (3, n)."""
+        """ω along axes whose third is the one about which ℓ precesses, shape (3, n)."""
         return self._of_phase(self.rate * np.asarray(t, dtype=np.float64) + self.first)
 
     def _of_phase(self, u: Array) -> Array:

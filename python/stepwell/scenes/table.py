@@ -82,7 +82,7 @@ class Table(ValueEquality):
 
 
 def _shares(u: Array) -> Array:
-    """What each node counts for in the polynomial through all at places u within an interval, shape (nodes, places)."""
+    """The weight of each node in the interpolating polynomial at places u of an interval, shape (nodes, places)."""
     away = u - NODES[:, np.newaxis]
     shares, product = np.empty_like(away), np.ones(len(u))
     for j in range(len(NODES)):  # times the distances to the nodes before it

@@ -78,11 +78,11 @@ class Orbit:
 
     @property
     def steps(self) -> int:
-        """How many steps were made so far."""
+        """The number of steps so far."""
         return len(self._terms)
 
     def _reach(self, t: float) -> None:
-        """Make steps until t is within one."""
+        """Step until t lies within the last step."""
         with localcontext(Context(prec=DIGITS)):
             while self._times[-1] < t or not self._terms:
                 self._step()
@@ -193,7 +193,7 @@ def _square(a: Series, k: int) -> Decimal:
 
 
 def _radius(v: list[Series], y: list[Series], k: int, tolerance: float) -> float:
-    """The step at which term k of each block is as small as is wanted, relative to the block."""
+    """The step at which term k of each block is small enough, relative to the block."""
     steps = []
     for block in (v, y):
         scale = max(float(abs(series[0])) for series in block) or 1.0

@@ -52,7 +52,7 @@ class Tight:
         self.scene, self.tolerance, self.part = replace(scene, control=None), tolerance, part
         longest = part * 2.0 ** math.floor(math.log2(LONGEST_STEP * scene.horizon))
         self._options = scene.adaptive_options | {"max_step": min(longest, scene.max_step or math.inf)}
-        #: Places from which it goes on: the time, the state, and arguments to continue the run.
+        #: Places from which a run can continue: the time, the state, and the arguments of the continuation.
         self._places: list[tuple[float, tuple[Array, Array], dict[str, Any]]] = []
         self._place(0.0, (scene.v, scene.y), None)
 
@@ -65,7 +65,7 @@ class Tight:
         return v[place.reshape(-1)], y[place.reshape(-1)]
 
     def followed(self, times: Array) -> tuple[Array, Array]:
-        """The states at these times, ascending; NaN from where it stopped. At some of them the run can be continued later."""
+        """The states at ascending times; NaN after the run stopped. Later calls continue from some of these."""
         runs = []
         for part in np.array_split(times, RESTARTS):
             run, tight = self._part(part, -1)
@@ -79,17 +79,17 @@ class Tight:
         return v, y
 
     def _place(self, time: float, state: tuple[Array, Array], on: dict[str, Any] | None) -> None:
-        """Another place from which it goes on: as the run does, or with its tolerance from the state alone."""
+        """Add a place from which to continue: by the run's own continuation, or from the state alone."""
         if on is None:
             on = self._run(np.array([time]), self._fresh(time, state, self.tolerance)).resume
         self._places.append((time, state, on))
 
     def _fresh(self, time: float, state: tuple[Array, Array], tolerance: float) -> dict[str, Any]:
-        """Arguments of a run that begins with this state."""
+        """Arguments of a run that starts from this state."""
         return {"v": state[0], "y": state[1], "t0": time, "tolerance": tolerance} | self._options
 
     def _part(self, at: Array, i: int) -> tuple[Run, bool]:
-        """The run from a place on, to these times, and whether it has the tolerance that was asked for."""
+        """The run from a place to these times, and whether it met the tolerance."""
         time, state, on = self._places[i]
         run = self._run(at, on)
         if not run.status:
@@ -152,7 +152,7 @@ def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
 
 
 def _agreeing(run: tuple[Array, Array], check: tuple[Array, Array], agrees: float) -> Mask:
-    """At which times the states of two runs differ by no more than this share of the blocks' largest lengths up to then."""
+    """The times at which two runs differ by at most this share of the blocks' largest lengths so far."""
     known = np.ones(len(run[1]), dtype=bool)
     for a, b in zip(run, check, strict=True):
         axes = tuple(range(1, a.ndim))

@@ -78,7 +78,7 @@ def draw(advice: Advice) -> Figure:
 
 
 def cost(advice: Advice, row: Row) -> float:
-    """What a row costs, by what the advice is ordered by, in a frame or a unit of time."""
+    """The cost of a row by which the advice is ranked, in a frame or a unit of time."""
     if advice.cost == "time":
         return 1e9 * (row.seconds_per_time if row.seconds_per_frame is None else row.seconds_per_frame)
     return row.evaluations_per_time if row.evaluations_per_frame is None else row.evaluations_per_frame
@@ -97,7 +97,7 @@ def name(row: Row) -> str:
 
 
 def on_front(costs: np.ndarray[Any, Any], errors: np.ndarray[Any, Any]) -> set[int]:
-    """Those than which none is both cheaper and more accurate."""
+    """The rows that no other beats in both cost and accuracy."""
     return {
         i
         for i in range(len(costs))
@@ -106,7 +106,7 @@ def on_front(costs: np.ndarray[Any, Any], errors: np.ndarray[Any, Any]) -> set[i
 
 
 def finding(advice: Advice) -> str:
-    """What is advised."""
+    """The advice as a title."""
     number = len(advice.ranked)
     among = "the only one that is good enough" if number == 1 else f"the best of {number} that are good enough"
     return f"{advice.scene.title}: {name(advice.ranked[0])} is {among}"

@@ -9,7 +9,7 @@ from .runs import RunPicture
 
 
 def animate(picture: RunPicture, path: str | Path, seconds: float, fps: float) -> None:
-    """Write it; the ending of the path says as what."""
+    """Write a page or frames, by the ending of the path."""
     seconds, fps = runs_animation.need(path, seconds, fps)
     write = page_animation.write if Path(path).suffix.lower() == ".html" else runs_animation.write
     write(picture, path, seconds, fps)

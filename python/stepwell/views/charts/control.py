@@ -64,7 +64,7 @@ class ControlSweep(Drawn, Table, ValueEquality):
 
     @property
     def keeps_lengths(self) -> bool:
-        """Whether it is a chart of rods, and not of an energy."""
+        """Whether the control keeps the lengths of rods, and not an energy."""
         return self.system.constraint == "length"
 
     def line(self, method: Method | str, kind: str, evaluations: int | None = None) -> Held:
@@ -255,7 +255,7 @@ def control(
 
 
 def _kinds(system: System, forms: Any, ways: Any) -> list[str]:
-    """What is run: nothing that keeps anything, each form of the control, each way of projection."""
+    """The kinds of runs: without control, with each form of it, and with each way of projection."""
     known = ((LENGTH_KINDS[0],), (LENGTH_KINDS[1],)) if system.constraint == "length" else (controls.FORMS, WAYS)
     kinds = ["none"]
     for argument, wanted, names in zip(("forms", "ways"), (forms, ways), known, strict=True):

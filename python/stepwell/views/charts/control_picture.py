@@ -68,7 +68,7 @@ def draw(chart: ControlSweep) -> Figure:
 
 
 def finding(chart: ControlSweep) -> str:
-    """Before and after: for how many methods control at the median gain has a smaller energy error than none, and by how much."""
+    """In how many runs control at the median gain lowers the energy error, and by which factor."""
     factors = []
     for line in chart.lines:
         if line.kind != "limited":

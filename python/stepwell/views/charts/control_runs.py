@@ -70,7 +70,7 @@ class Held(ValueEquality):
 
 
 class Runs:
-    """What is run, from where, and what is exact."""
+    """The runs of a chart: the system, its start, the horizon and the exact solution."""
 
     def __init__(self, system: System, v: Array, y: Array, horizon: float, exact: Exact | tuple[Any, Any] | None) -> None:
         self.system = system
@@ -92,7 +92,7 @@ class Runs:
         return self.system.energy(v, y) - self.system.energy(np.zeros_like(v), y)
 
     def _known(self, exact: Exact | tuple[Any, Any]) -> tuple[Array, Array]:
-        """Some of the exact states, and of them the last."""
+        """Samples of the exact solution; ``end`` is the last."""
         shape = self.v.shape
         if callable(exact):
             blocks = exact(np.linspace(0.0, self.horizon, SCALE_SAMPLES))

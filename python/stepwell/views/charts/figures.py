@@ -111,7 +111,7 @@ class HarmonicCase(ValueEquality):
 
     @property
     def name(self) -> str:
-        """What its rows are called, in place of a method."""
+        """Its name in the rows, in place of a method's."""
         return f"harmonic, {self.degrees}°"
 
 

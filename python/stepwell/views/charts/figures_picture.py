@@ -69,7 +69,7 @@ def overview(chart: Figures) -> Figure:
 
 
 def groups(chart: Figures) -> tuple[list[list[Samples]], list[Samples]]:
-    """Methods that can be told from the exact solution, those of the same eigenvalues together; and those that cannot, if two."""
+    """Methods that visibly differ from the exact solution, grouped by eigenvalues; and those that do not, if two."""
     exact = [samples for samples in chart.samples if _distance(samples).max() <= SEEN]
     exact = exact if len(exact) > 1 else []
     alike: list[list[Samples]] = []
@@ -124,7 +124,7 @@ def _together(axes: Axes, chart: Figures, same: list[Samples]) -> None:
 
 
 def _errors(axes: Axes, exact: list[Samples]) -> None:
-    """How far from the exact solution those are that look like it."""
+    """The errors of methods that look exact."""
     end = float(exact[0].t[-1]) / (2.0 * math.pi)
     ends = []
     for samples in exact:
@@ -205,7 +205,7 @@ def _samples(axes: Axes, chart: Figures, samples: Samples, colour: str = "black"
 
 
 def _largest(axes: Axes, y: Array) -> None:
-    """How far samples go that leave the picture."""
+    """The largest coordinate of samples that leave the picture."""
     if not np.abs(y).max() <= Y_LIMIT:
         box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none"}
         largest = f"|y| up to {np.nanmax(np.abs(y)):.3g}"

@@ -274,7 +274,7 @@ def stability_map(
 
 
 def _fitted(method: Method, damping: tuple[float, float] | None) -> float:
-    """Where a map of that method ends: a little past the largest angle up to which a row is stable from its beginning."""
+    """The end of the map's axis: a little past the largest angle up to which a row is stable from its start."""
     columns, rows = COARSE
     angles = np.arange(1, columns + 1) * (FARTHEST / columns)
     ratios = None if damping is None else np.linspace(*damping, rows)[:, np.newaxis]
@@ -285,7 +285,7 @@ def _fitted(method: Method, damping: tuple[float, float] | None) -> float:
 
 
 def _ends(argument: str, value: Any, unit: str) -> tuple[float, float]:
-    """Where an axis begins and ends."""
+    """The two ends of an axis."""
     ends = checks.numbers(argument, value, unit=unit)
     if ends.shape != (2,):
         raise ShapeError(f"{argument}: expected two numbers, from where to where, got an array of shape {ends.shape}")

@@ -70,7 +70,7 @@ def finding(chart: NormSweep) -> str:
 
 
 def _ratios(axes: Axes, chart: NormSweep) -> None:
-    """The error of the angle under control, in that of resetting."""
+    """The error of the angle under control, relative to that with resetting."""
     axes.axhspan(LEAST_RATIO, 1.0, color=BETTER, zorder=0)
     axes.axhspan(1.0, LARGEST_RATIO, color=WORSE, zorder=0)
     axes.axhline(1.0, color="#555555", linewidth=1.2)

@@ -84,14 +84,14 @@ def _angles(places: Array) -> Array:
 
 
 def _turns(places: Array, exact: Array) -> Array:
-    """The angles of points in turns, counted the way in which the exact motion goes, the first between 0 and 1."""
+    """The angles of points in turns, in the direction of the exact motion, starting between 0 and 1."""
     way = np.sign(_angles(exact)[-1] - _angles(exact)[0])
     turned = way * _angles(places) / (2.0 * np.pi)
     return np.asarray(turned - np.floor(way * _angles(exact[:1])[0] / (2.0 * np.pi)))
 
 
 def turning(chart: RunPicture) -> bool:
-    """Whether bodies in a plane go round their centre one way, so that their distance from it is a function of the angle."""
+    """Whether bodies circle the centre in one direction, which makes their distance from it a function of the angle."""
     exact = chart.exact_places
     if exact is None or not isinstance(chart.run.system, NBody) or exact.shape[2] != 2:
         return False
@@ -124,7 +124,7 @@ def radii(axes: Axes, chart: RunPicture) -> None:
 
 
 def one_curve(chart: RunPicture) -> bool:
-    """Whether several bodies run after each other on one curve, where the last one drawn would hide the others."""
+    """Whether several bodies follow each other on one curve, where the last one drawn would hide the others."""
     exact = chart.exact_places
     if exact is None or chart.scene.period is None or not 1 < exact.shape[1] <= len(BODIES):
         return False
@@ -136,7 +136,7 @@ def one_curve(chart: RunPicture) -> bool:
 
 
 def crowded(chart: RunPicture, size: float) -> bool:
-    """Whether the paths are so long, beside the side of the picture, that they must be thin."""
+    """Whether the paths are so long, relative to the side of the picture, that they are drawn thin."""
     y = np.clip(chart.places[chart.finite], -LARGEST, LARGEST)
     with np.errstate(all="ignore"):
         way = float(np.linalg.norm(np.diff(y, axis=0), axis=2).sum(axis=0).max())

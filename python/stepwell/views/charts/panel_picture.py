@@ -73,7 +73,7 @@ def draw(panel: Panel, error: str) -> Figure:
 
 
 def leader(panel: Panel, error: str = "state_error") -> str:
-    """What is the cheapest most often, of all scenes and all numbers of digits of that error that any method reaches."""
+    """The method that is the cheapest most often, over all scenes and numbers of digits of that error that any method reaches."""
     best = []
     for chart in panel.charts:
         front = chart.front(error)

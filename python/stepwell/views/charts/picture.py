@@ -147,7 +147,7 @@ def draw_errors(axes: Axes, chart: WorkPrecision, error: str, cost: str) -> None
 
 
 def muted(chart: WorkPrecision, curve: Curve, front: list[dict[str, Any]]) -> dict[str, Any]:
-    """Keywords for a line: in its colour if it is somewhere the cheapest for its error, else pale and thin."""
+    """Keywords for a line: in its colour if it is the cheapest for any error, else pale and thin."""
     style = look_of(chart, curve)
     if curve.name in {row["method"] for row in front}:
         return style | {"linewidth": 2.2, "zorder": 3.0}
@@ -170,7 +170,7 @@ def name_curves(axes: Axes, chart: WorkPrecision, error: str, cost: str, size: f
 
 
 def finding(chart: WorkPrecision, error: str = "state_error") -> str:
-    """What the front of that error says: what is the cheapest for most digits, and for which."""
+    """The method that is the cheapest for most digits of that error, and for which."""
     front = chart.front(error)
     cheapest: list[str] = []
     while front and front[-1]["error"] <= (wanted := 10.0 ** -(len(cheapest) + 1)):
@@ -188,12 +188,12 @@ def finding(chart: WorkPrecision, error: str = "state_error") -> str:
 
 
 def family_of(name: str) -> str:
-    """The method of a curve, without how its steps were made."""
+    """The name of a curve's method, without how its steps were chosen."""
     return name.split(",")[0]
 
 
 def with_way(cheapest: Sequence[str], ways: Sequence[str]) -> str:
-    """The title of a method and how its steps were made, if the chart has other ways and all that is meant was made in one."""
+    """The title of a method; with how its steps were chosen if the chart has several ways and these curves share one."""
     first = cheapest[0]
     title = title_of(family_of(first))
     if len(set(ways)) < 2 or set(cheapest) != {first}:
@@ -288,5 +288,5 @@ def _text(figure: Figure, chart: WorkPrecision, error: str, time: str, unnamed: 
 
 
 def known_to(chart: WorkPrecision) -> str:
-    """That a chart ends where the true motion is no longer known."""
+    """The words that a chart ends where the true motion is no longer known, if it does."""
     return ", as far as the true motion is known" if chart.cut else ""

@@ -165,7 +165,7 @@ def powers(
 
 
 class _Exact:
-    """The method's own states after n steps in integers, times 2 to the power of ``BITS``."""
+    """The method's exact states after n steps, as integers in units of 2^−``BITS``."""
 
     def __init__(self, system: System, method: Method, dt: float, start: Run) -> None:
         self.n_v, _ = maps.size(system)
@@ -197,7 +197,7 @@ class _Exact:
         return _length(self.state(n))
 
     def distance(self, n: int, run: Run) -> float:
-        """How far a run's end is from them."""
+        """The distance of a run's end from the exact state."""
         slot = run.v[-1] if run.carry is None else run.carry
         ends = [*np.ravel(slot).tolist(), *np.ravel(run.y[-1]).tolist()]
         return _length([_fixed(Fraction(a)) - b for a, b in zip(ends, self.state(n), strict=True)])

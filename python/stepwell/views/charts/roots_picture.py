@@ -68,7 +68,7 @@ def draw(analysis: Analysis) -> Figure:
 
 
 def finding(analysis: Analysis) -> str:
-    """What the eigenvalues say."""
+    """The behaviour of the samples, as a title."""
     title = analysis.method.title
     stable = np.asarray(analysis.stable)
     if stable.ndim:
@@ -77,7 +77,7 @@ def finding(analysis: Analysis) -> str:
 
 
 def _notes(analysis: Analysis, z: np.ndarray[Any, Any], reach: float) -> list[str]:
-    """The numbers, and what is not seen."""
+    """The largest eigenvalue in numbers, and how many are outside the picture."""
     inside = "Eigenvalues z of a step. Inside the grey unit circle a mode decays, outside it grows."
     if np.asarray(analysis.stable).ndim:
         text = "Exact: e^(λ·dt)." if z.shape[1] <= EXACT_UP_TO else ""

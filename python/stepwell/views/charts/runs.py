@@ -93,7 +93,7 @@ class RunPicture(Drawn, Table, ValueEquality):
 
     @property
     def elapsed(self) -> Array:
-        """How long after the first saved state each was, which ascends for a run back in time too."""
+        """The time since the first saved state; it ascends in runs back in time, too."""
         return np.asarray(np.abs(self.run.t - self.run.t[0]))
 
     @property
@@ -290,7 +290,7 @@ def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
 
 
 def _of_points(y: Array) -> Array:
-    """States as those of points; a block of one point has no axis of its own for it."""
+    """States with an axis for the points, which a block of a single point lacks."""
     return y if y.ndim == 3 else y[:, np.newaxis]
 
 

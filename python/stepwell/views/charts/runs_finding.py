@@ -43,7 +43,7 @@ SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def finding(chart: RunPicture) -> str:
-    """The most that can be said of the run in a title: how it ended, or how far it is from the truth, or what it did."""
+    """The run's title in a few words: how it ended, else its error, else what it did."""
     return _words(chart).replace(" -", " −")
 
 
@@ -124,7 +124,7 @@ def _change(after: Array, plain: Array) -> str | None:
 
 
 def _of_motion(chart: RunPicture) -> str:
-    """What the run did, where neither error is known."""
+    """The range of the motion, where neither error is known."""
     if chart.kind == "attitude":
         return _of_attitude(chart)
     y = chart.run.y
@@ -157,7 +157,7 @@ def steps_of(run: Run) -> str:
 
 
 def broke_off(run: Run) -> str:
-    """When a run diverged or stopped, as a sentence without its end; nothing if it did not."""
+    """When a run diverged or stopped, as a sentence without its full stop; empty if it did not."""
     if not run.status:
         return ""
     if run.paces is not None:
@@ -193,7 +193,7 @@ def tenfold(number: float) -> str:
 
 
 def growth_of(picture: RunPicture) -> tuple[float, bool]:
-    """How many times as large as the true motion the state became, and whether that is known; otherwise as the first state."""
+    """The growth of the state relative to the true motion, and True; without one relative to the first state, and False."""
     scales = picture.scene.scales if picture.scene.exact is not None else _lengths(picture.run)[:, 0]
     ratios = [
         float(length[np.isfinite(length)].max(initial=0.0)) / scale

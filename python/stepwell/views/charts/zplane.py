@@ -180,7 +180,7 @@ def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None)
 
 
 def within(argument: str, phi: float) -> float:
-    """Return an angle per step if a picture of it says anything."""
+    """Return an angle per step that is small enough to be drawn."""
     if phi > MAX_PHI:
         raise ArgumentError(f"{argument}: expected {MAX_PHI:g} rad a step or less, which is far past every limit, got {phi:g}")
     return phi

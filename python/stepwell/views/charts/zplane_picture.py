@@ -143,7 +143,7 @@ def _angles(axes: Axes, phi: Array, z: Complex, path: Complex, taken: list[tuple
 
 
 def _room(place: complex, lines: Array, taken: list[tuple[float, float]]) -> float:
-    """How far a number there would be from what is drawn; what is far enough is all the same."""
+    """The distance of a number there from what is drawn; all that are far enough count alike."""
     to_line = float(np.hypot(lines[:, 0] - place.real, lines[:, 1] - place.imag).min())
     # A number is wider than high, and so is its neighbour.
     to_names = min((math.hypot(0.6 * (x - place.real), y - place.imag) for x, y in taken), default=math.inf)

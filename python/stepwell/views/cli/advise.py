@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     options.scene(parser)
     parser.add_argument(
         "--frame",
@@ -38,7 +37,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Find, write, tell."""
     chosen, frame = scene(args.scene), _frame(args.frame)
     methods = options.chosen(args)
     options.check_file(args, (".json",))

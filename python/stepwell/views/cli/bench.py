@@ -21,7 +21,6 @@ COLUMNS = ("method", "ns a step>", "±>", "ns an evaluation>", "times the least>
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     parser.add_argument(
         "scene",
         nargs="?",
@@ -39,7 +38,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Time, list."""
     one = scene(args.scene)
     chosen = options.chosen(args) or list(methods())
     options.check_file(args, show.TABLE_FILES)

@@ -18,7 +18,6 @@ from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     parser.add_argument(
         "scenes",
         nargs="+",
@@ -35,7 +34,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Measure, draw, write, summarise."""
     # All names and requirements are checked before any work.
     chosen = [scene(name) for name in args.scenes]
     methods = options.chosen(args)

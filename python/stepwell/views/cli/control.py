@@ -20,7 +20,6 @@ LEAST = ("least_state_error", "state_at_relative", "least_energy_error", "diverg
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     parser.add_argument("scene", metavar="SCENE", help="a scene of bodies or rods, or a Python file that makes one")
     options.folder(parser, here=True)
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: four)")
@@ -31,7 +30,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Run, draw, write, summarise."""
     one = scene(args.scene)
     arguments: dict[str, Any] = {"horizon": args.horizon}
     if args.methods is not None:

@@ -14,7 +14,6 @@ from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     options.method_words(parser)
     default = ",".join(f"{phi:g}" for phi in PHI)
     parser.add_argument(
@@ -26,7 +25,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Find, write, tell."""
     methods = options.chosen(args)
     try:
         phi = [float(text) for text in args.phi.split(",")]

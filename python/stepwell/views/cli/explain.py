@@ -18,7 +18,6 @@ from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     options.system(parser)
     parser.add_argument("method", metavar="METHOD", help="a method; see stepwell methods")
     parser.add_argument("--members", type=int, metavar="N", help="how many trajectories go together (default: 1)")
@@ -32,7 +31,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Look up, explain, write, tell."""
     system, control = system_and_control(args.system)
     options.check_file(args, (".json", ".html", ".txt"))
     explained = explain(

@@ -15,7 +15,6 @@ from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     parser.add_argument(
         "--scene", metavar="SCENE", help="the scene that is shown first, or a Python file that makes one (default: clover)"
     )
@@ -25,7 +24,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Make the page, then write or open it, and report where it is."""
     options.check_file(args, (".html", ".htm"))
     chosen = offered()
     if args.scene is not None:

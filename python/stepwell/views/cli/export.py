@@ -16,7 +16,6 @@ from .explain import system_and_control
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """The arguments of the command."""
     options.system(parser)
     parser.add_argument("--method", required=True, metavar="METHOD", help="a method; see stepwell methods")
     parser.add_argument("--language", required=True, metavar="LANGUAGE", help=f"{', '.join(LANGUAGES)}")
@@ -31,7 +30,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Export the step, write it, and report that."""
     system, control = system_and_control(args.system)
     language = LANGUAGES[checks.known("language", args.language, tuple(LANGUAGES))]
     options.check_file(args, language.endings)

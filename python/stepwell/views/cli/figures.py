@@ -13,7 +13,6 @@ from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     options.method_words(parser)
     options.folder(parser, here=True)
     parser.add_argument("--phi", type=float, default=0.5, metavar="RAD", help="Φ = ω₀·dt (default: 0.5)")
@@ -22,7 +21,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Run, draw, write, list."""
     methods = options.chosen(args)
     options.check_folder(args)
 

@@ -11,14 +11,12 @@ from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     parser.add_argument("name", nargs="?", help="a method by any of its names, such as false_euler or RK4")
     options.file(parser, show.TABLE_TEXT)
     options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
-    """List the methods, or describe one."""
     if args.name is not None:
         one = method(args.name)
         if args.output is not None:

@@ -13,14 +13,12 @@ from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     parser.add_argument("section", nargs="?", metavar="SECTION", help='one section, such as 7 or "App. C" (default: all)')
     options.folder(parser, "a folder: draw the figures into it, too")
     options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
-    """Run, list, draw."""
     section = args.section
     if section is not None:
         section = f"§{section}" if section.isdigit() else f"App. {section}" if len(section) == 1 else section

@@ -43,7 +43,6 @@ NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     options.scene(parser)
     parser.add_argument("--method", required=True, metavar="NAME", help="a method; see stepwell methods")
     parser.add_argument("--dt", type=float, metavar="TIME", help="the step (default: the scene's)")
@@ -77,7 +76,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Run, report, write."""
     chosen = scene_with(args.scene, args.set)
     ending = "" if args.output is None else args.output.suffix
     _ready(args.output, args.seconds, args.fps)
@@ -139,7 +137,7 @@ def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: d
 
 
 def _shown(name: str, value: Any) -> str:
-    """A value in the digits that are looked at; --json and files have all."""
+    """A value in a few digits; --json and files have all."""
     if isinstance(value, float):
         return f"{value:.{DIGITS_OF_AN_ERROR if name.endswith('error') else DIGITS}g}"
     if isinstance(value, list):
@@ -153,7 +151,7 @@ def _shown(name: str, value: Any) -> str:
 
 
 def _ready(path: Path | None, seconds: float, fps: float) -> None:
-    """Raise if the file cannot be written, for want of a format, a program or a place, before any work is done."""
+    """Raise before any work if the file cannot be written, for want of a format, a program or a place."""
     if path is None:
         return
     checks.file("-o", path, (*NUMBERS, *PICTURES, *ANIMATIONS))

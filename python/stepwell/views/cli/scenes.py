@@ -12,13 +12,11 @@ from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     options.file(parser, show.TABLE_TEXT)
     options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
-    """List the scenes."""
     fields = ("name", "title", "section", "description", "error", "dt", "horizon")
     listed = scenes()
     show.listing(

@@ -61,7 +61,7 @@ def _changed(scene: Scene, key: str, text: str, known: Sequence[str]) -> Scene:
 
 
 def _parameters(system: System) -> dict[str, Any]:
-    """The arguments with which the same system is made, by name; none if it cannot be made again by them."""
+    """The arguments that make an equal system, by name; none if there are no such arguments."""
     names = inspect.signature(type(system)).parameters
     if not all(hasattr(system, name) for name in names):
         return {}

@@ -78,14 +78,14 @@ def _cell(value: Any) -> Any:
 
 
 class Written:
-    """Files that a command writes. What cannot be written is said when all else has been, so that no result is lost with it."""
+    """Files that a command writes. An error in writing is raised after all other output, so that no result is lost."""
 
     def __init__(self) -> None:
         self.files: list[str] = []
         self.error: Exception | None = None
 
     def write(self, path: Path, writer: Callable[[Path], Any]) -> Any:
-        """Write a file and return what ``how`` returns, or keep the error for ``close``."""
+        """Return the result of ``writer``, or keep its error for ``close``."""
         try:
             result = writer(path)
         except Exception as error:  # whatever it is, it is raised in the end
@@ -95,11 +95,11 @@ class Written:
         return result
 
     def notes(self) -> list[str]:
-        """What a table says below."""
+        """The notes below a table."""
         return [f"written: {', '.join(self.files)}"] if self.files else []
 
     def close(self) -> None:
-        """Raise what was kept."""
+        """Raise the error that was kept."""
         if self.error is not None:
             raise self.error
 

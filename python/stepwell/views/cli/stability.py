@@ -22,7 +22,6 @@ CHARTS = (*USUAL, "powers")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
     options.method_words(parser)
     options.folder(parser, "a folder for pictures and numbers")
     parser.add_argument("--charts", metavar="A,B,…", help=f"which of {', '.join(CHARTS)} to draw (default: all but powers)")
@@ -31,7 +30,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Analyse, draw, write, tell."""
     # All names and requirements are checked before any work.
     methods = options.chosen(args)
     names = USUAL if args.charts is None else tuple(name.strip() for name in args.charts.split(","))

@@ -73,7 +73,7 @@ def lines_of(
 
 
 def length(text: str) -> int:
-    """How many places of a terminal a text takes."""
+    """The width of a text on a terminal."""
     return sum(0 if combining(c) else 2 if east_asian_width(c) in "WF" else 1 for c in text)
 
 

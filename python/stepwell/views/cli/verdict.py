@@ -16,7 +16,7 @@ STOPPED = {
 
 
 def verdict(picture: RunPicture) -> str:
-    """Whether the run stayed with its motion: a word or two, and the number that says so."""
+    """A word or two on whether the run followed the motion, and the number that shows it."""
     run = picture.run
     if run.status:
         step = int(run.first_bad_step)

@@ -39,7 +39,7 @@ MAX_SOURCE = 400_000
 
 
 def of_method(method: Method) -> dict[str, Any]:
-    """What the page tells of a method, and its colour in all pictures."""
+    """The record of a method for the page, with its colour in all pictures."""
     record = {name: getattr(method, name) for name in ("name", "title", "order", "evaluations", "limit", "carry", "section")}
     return record | {"colour": look(method)["color"]}
 
@@ -86,14 +86,14 @@ def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
 
 
 def built_in(scene: Scene) -> bool:
-    """Whether it is a built-in scene as made without arguments, for which the sliders are meant."""
+    """Whether it is a built-in scene made without arguments, for which the sliders are meant."""
     if scene.name not in sliders.OFFERS:
         return False
     return scene == (sliders.rope() if scene.name == "rope" else find_scene(scene.name))
 
 
 def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[str, int], dict[str, str], str | None]:
-    """The steps as JavaScript; the place of that of each method, and of the "truth"; why others are missing; what makes truth."""
+    """The steps as JavaScript, the index of each method and of the "truth", why others are missing, what makes the truth."""
     sources: list[str] = []
     places: dict[str, int] = {}
     refused: dict[str, str] = {}

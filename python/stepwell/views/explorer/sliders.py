@@ -229,7 +229,7 @@ def generic(system: Any, parameters: Mapping[str, Any], controlled: bool) -> tup
 
 
 def _links(system: Any) -> dict[str, tuple[tuple[str, float], ...]]:
-    """Those of a system; G·m is not a mass where G is not 1, and in canonical form ω₀ is not in the energy."""
+    """The numbers of the energy that belong to a system's parameters. Not G·m where G is not 1; not ω₀ in canonical form."""
     own = LINKS.get(system.kernel, {})
     if system.kernel == "nbody":
         return own | {"Gm": (("e.Gm{}", 1.0), ("e.masses{}", 1.0 / float(system.G) if system.G else 0.0))}

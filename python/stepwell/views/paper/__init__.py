@@ -61,7 +61,7 @@ class Entry(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Of the function that runs it."""
+        """The name of the function that runs it."""
         return self.check.__name__
 
     def run(self) -> Finding:
