@@ -175,7 +175,7 @@ def test_in_pieces(name: str, backend: str) -> None:
     whole = sw.integrate(system, method, at=times, backend=backend, **ask)
     for cut in (1, 3, 5):
         first = sw.integrate(system, method, at=times[:cut], **ask)
-        rest = sw.integrate(system, method, at=times[cut:], backend=backend, **first.resume)
+        rest = sw.integrate(system, method, at=times[cut:], backend=backend, resume=first)
         assert np.array_equal(np.concatenate([first.y, rest.y]), whole.y)
         assert np.array_equal(np.concatenate([first.v, rest.v]), whole.v)
         for ours, theirs in zip(rest.paces, whole.paces, strict=True):  # type: ignore[arg-type]
@@ -189,7 +189,7 @@ def test_what_stopped_goes_on_with_more_steps() -> None:
     with pytest.warns(sw.ToleranceWarning, match="out of max_steps"):
         first = sw.integrate(system, "merson", at=[1.0], max_steps=40, **ask)
     assert first.status.tolist() == [Status.OK, Status.BUDGET]
-    rest = sw.integrate(system, "merson", at=[6.0], **first.resume)
+    rest = sw.integrate(system, "merson", at=[6.0], resume=first)
     assert np.array_equal(rest.y[-1], whole.y[-1])
     assert np.array_equal(rest.paces.accepted, whole.paces.accepted)  # type: ignore[union-attr]
 
@@ -197,21 +197,22 @@ def test_what_stopped_goes_on_with_more_steps() -> None:
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"tolerance": 1e-3}, "tolerance: given twice"),
+        ({"tolerance": 1e-3}, "tolerance: the run that goes on has its own"),
         ({"dt": 0.1}, "dt: the run that goes on has its next step already"),
         ({"at": [0.5]}, "at: expected times that ascend from the last time of the run that goes on, 1, on"),
-        ({"method": "dop853"}, "carry: expected that of a run by merson"),
-        ({"v": np.zeros(2)}, "carry: expected that of a run of batch"),
-        ({"carry": 3.0}, "carry: with a tolerance expected that of run.resume, 24 or 28 numbers for each member"),
-        ({"carried_by": None}, "carried_by: expected the method by which the run goes on"),
-        ({"at": None, "dt": 0.1, "steps": 3}, "carry: it is that of a run with a tolerance"),
+        (
+            {"method": "dop853"},
+            "method: expected 'merson', by which the run goes on and which carries more than",
+        ),
+        ({"v": np.zeros(2)}, "resume: expected a run of batch"),
+        ({"resume": 3}, "resume: expected a Run or a World that goes on, got 3"),
+        ({"t0": 1.0}, "t0: the run that goes on has its own, got 1.0"),
+        ({"at": None, "dt": 0.1, "steps": 3}, "steps: goes with fixed steps only, and the run that goes on has adaptive steps"),
     ],
 )
 def test_what_does_not_go_on(more: dict[str, Any], message: str) -> None:
     run = sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0])
-    given: dict[str, Any] = {"method": "merson", "at": [2.0]} | run.resume | more
-    if "method" in more:
-        given["method"], message = "dop853", "carry: expected that of a run by dop853, got one by merson"
+    given: dict[str, Any] = {"method": "merson", "at": [2.0], "resume": run} | more
     with pytest.raises(ArgumentError, match=message):
         sw.integrate(sw.Oscillator(1.0), **given)
 

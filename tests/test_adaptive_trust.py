@@ -123,7 +123,7 @@ def test_in_one_piece_or_in_several() -> None:
     asked: dict[str, Any] = {"tolerance": 1e-6, "jumps": [5.0, 6.0], "max_step": 0.3, "positive": True}
     whole = sw.integrate(gated(), "merson", y=0.0, at=[4.9, 5.5, 8.0], **asked)
     first = sw.integrate(gated(), "merson", y=0.0, at=[4.9, 5.5], **asked)
-    rest = sw.integrate(gated(), "merson", at=[8.0], **first.resume)
+    rest = sw.integrate(gated(), "merson", at=[8.0], resume=first)
     assert np.array_equal(whole.y[2:], rest.y)
 
 
@@ -286,7 +286,7 @@ def test_backward(method: str) -> None:
     asked: dict[str, Any] = {"y": there.y[-1], "t0": 5.0, "tolerance": 1e-11}
     assert np.array_equal(back.y, sw.integrate(driven(), method, at=[2.5, 0.0, -1.0], backend="numpy", **asked).y)
     piece = sw.integrate(driven(), method, y=there.y[-1], t0=5.0, tolerance=1e-11, at=[2.5])
-    assert np.array_equal(sw.integrate(driven(), method, at=[0.0, -1.0], **piece.resume).y, back.y[1:])
+    assert np.array_equal(sw.integrate(driven(), method, at=[0.0, -1.0], resume=piece).y, back.y[1:])
 
 
 def test_backward_for_built_in_and_large_systems() -> None:

@@ -437,7 +437,7 @@ def test_core_and_reference_are_one_graph_under_control(control: Any, method: st
     whole = sw.integrate(system, method, **start, steps=20, control=control)
     assert_same(whole, sw.integrate(system, method, **start, steps=20, control=control, backend="numpy"))
     half = sw.integrate(system, method, **start, steps=10, control=control)
-    np.testing.assert_array_equal(sw.integrate(system, method, **half.resume, steps=10).y[-1], whole.y[-1])
+    np.testing.assert_array_equal(sw.integrate(system, method, resume=half, steps=10).y[-1], whole.y[-1])
     assert half.system.uncontrolled == system
     v, y = (each.copy() for each in batch.values())
     world = sw.World(system, method, v=v, y=y, dt=0.05, control=control)

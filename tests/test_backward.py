@@ -75,7 +75,7 @@ def test_pieces_and_worlds_are_the_run(method: str, options: dict[str, Any]) -> 
     whole = sw.integrate(system, method, steps=40, **start)
     np.testing.assert_array_equal(sw.integrate(system, method, steps=40, backend="numpy", **start).y, whole.y)
     half = sw.integrate(system, method, steps=15, **start)
-    rest = sw.integrate(system, method, steps=25, **half.resume)
+    rest = sw.integrate(system, method, steps=25, resume=half)
     np.testing.assert_array_equal((rest.v, rest.y), (whole.v, whole.y))
     assert rest.t.tolist() == [-2.0]
     world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=-0.125, t0=3.0, **options)

@@ -238,13 +238,13 @@ def test_a_run_goes_on_after_somebody_diverged(method: str, form: str, backend: 
     first = quiet(system, method, v=0.0, y=1.0, steps=400, **options)
     late = np.count_nonzero(whole.first_bad_step > 400)
     with pytest.warns(sw.DivergenceWarning, match=rf"^{late} of 70 member"):
-        second = sw.integrate(system, method, steps=500, **options, **first.resume)
+        second = sw.integrate(system, method, steps=500, **options, resume=first)
     np.testing.assert_array_equal(second.first_bad_step, whole.first_bad_step)
     np.testing.assert_array_equal(second.y, whole.y[8:])
     np.testing.assert_array_equal(second.v, whole.v[8:])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        sw.integrate(system, method, steps=5, **options, **second.resume)
+        sw.integrate(system, method, steps=5, **options, resume=second)
 
 
 def test_collisions_say_who_met_whom_and_when() -> None:

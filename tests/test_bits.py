@@ -72,7 +72,7 @@ def test_whole_equals_pieces(case: Case, backend: str) -> None:
     run = sw.integrate(system, **(arguments | same), t0=0.3, steps=17)
     for steps in (1, 30, 12):
         before = run.start_step + run.steps
-        run = sw.integrate(system, **same, **run.resume, steps=steps)
+        run = sw.integrate(system, **same, resume=run, steps=steps)
         np.testing.assert_array_equal(run.t, whole.t[before : before + steps + 1])
         np.testing.assert_array_equal(run.y, whole.y[before : before + steps + 1])
         np.testing.assert_array_equal(run.v, whole.v[before : before + steps + 1])

@@ -193,7 +193,7 @@ def test_a_large_system_a_world_and_a_run_in_pieces(method: str, n: int) -> None
         > 0.1
     ).any()
     half = sw.integrate(bodies, method, **start, steps=20)
-    rest = sw.integrate(bodies, method, **half.resume, steps=20)
+    rest = sw.integrate(bodies, method, resume=half, steps=20)
     assert np.array_equal(rest.y[-1], whole.y[-1])
     assert np.array_equal(rest.v[-1], whole.v[-1])
     world = sw.World(bodies, method, v=v.copy(), y=y.copy(), dt=0.02)

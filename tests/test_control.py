@@ -235,7 +235,7 @@ def test_a_run_in_pieces_goes_on_to_the_bit(members: int | None, form: str, meth
     control = sw.EnergyControl(relative=0.3 if members is None else np.linspace(0.1, 0.9, members), form=form)
     whole = sw.integrate(sw.NBody(), method, **start, dt=0.01, steps=100, every=10, control=control)
     first = sw.integrate(sw.NBody(), method, **start, dt=0.01, steps=40, every=10, control=control)
-    rest = sw.integrate(sw.NBody(), method, **first.resume, dt=0.01, steps=60, every=10)
+    rest = sw.integrate(sw.NBody(), method, resume=first, dt=0.01, steps=60, every=10)
     np.testing.assert_array_equal(whole.v[4:], rest.v)
     np.testing.assert_array_equal(whole.y[4:], rest.y)
     np.testing.assert_array_equal(whole.t[4:], rest.t)
@@ -289,7 +289,7 @@ def test_projections_keep_the_promises(bodies: int, way: str, method: str) -> No
     alone = sw.integrate(system, method, **one, **options, steps=20, control=sw.Projection(way))
     np.testing.assert_array_equal(alone.y, batch.y[..., 3])
     first = sw.integrate(system, method, **one, **options, steps=10, control=sw.Projection(way))
-    rest = sw.integrate(system, method, **first.resume, **options, steps=10)
+    rest = sw.integrate(system, method, resume=first, **options, steps=10)
     np.testing.assert_array_equal(alone.y[2:], rest.y)
 
 

@@ -47,7 +47,7 @@ def test_adaptive_steps_keep_the_promises(method: str, n: int, control: str) -> 
     alone = sw.integrate(system, method, **{name: block[..., 1] for name, block in start.items()}, at=[0.3, 0.7], **ask)
     np.testing.assert_array_equal(alone.y, whole.y[..., 1])
     first = sw.integrate(system, method, **start, at=[0.3], **ask)
-    rest = sw.integrate(system, method, at=[0.7], **first.resume)
+    rest = sw.integrate(system, method, at=[0.7], resume=first)
     np.testing.assert_array_equal(rest.y[-1], whole.y[-1])
     assert first.work is not None
     assert rest.work is not None
@@ -190,7 +190,7 @@ def test_a_control_is_that_of_the_method_that_goes_on() -> None:
     """By PEFRL between steps, by Runge-Kutta 4 in its stages, also where one goes on from the other."""
     system, start = bodies(3)
     first = sw.integrate(system, "pefrl", **start, dt=0.01, steps=5, control=sw.EnergyControl(0.5))
-    rest = sw.integrate(system, "rk4", steps=5, **first.resume)
+    rest = sw.integrate(system, "rk4", steps=5, resume=first)
     control = sw.EnergyControl(0.5, target=first.system.keeper.target)  # type: ignore[union-attr]
     anew = sw.integrate(system, "rk4", v=first.v[-1], y=first.y[-1], dt=0.01, t0=0.0, start_step=5, steps=5, control=control)
     np.testing.assert_array_equal(rest.y, anew.y)

@@ -85,7 +85,7 @@ def test_every_run_can_be_resumed(method: str, form: str) -> None:
         half = quiet(system, method, **start, **options, steps=steps)
         finite = np.isfinite(half.v[-1]) & np.isfinite(half.y[-1])
         np.testing.assert_array_equal(half.status == 0, finite)
-        rest = quiet(system, method, **options, steps=420 - steps, **half.resume)
+        rest = quiet(system, method, **options, steps=420 - steps, resume=half)
         if form != "power":
             np.testing.assert_array_equal(rest.first_bad_step, whole.first_bad_step)
             np.testing.assert_array_equal(rest.y, whole.y)

@@ -77,7 +77,7 @@ def test_a_first_order_system_has_no_velocities() -> None:
     made = run(own.lorenz(rho=np.linspace(1.0, 30.0, 7)), y=np.ones(3))
     assert made.y.shape == (5, 3, 7)
     assert made.v.shape == (5, 0, 7)
-    again = sw.integrate(own.lorenz(rho=np.linspace(1.0, 30.0, 7)), "rk4", **made.resume, dt=0.05, steps=1)
+    again = sw.integrate(own.lorenz(rho=np.linspace(1.0, 30.0, 7)), "rk4", resume=made, dt=0.05, steps=1)
     assert again.start_step == 10
     with pytest.raises(ArgumentError, match=r"v: expected the velocities"):
         sw.integrate(own.duffing(), "rk4", y=1.0, dt=0.1, steps=1)

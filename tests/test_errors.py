@@ -62,12 +62,12 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         "tolerance: expected too with at=: the error that a step may have, such as tolerance=1e-6",
     ),
     (
-        lambda: run(y=[1.0, 2.0], steps=50, events=sw.Event(_height, terminal=True)).resume,
+        lambda: run(resume=run(y=[1.0, 2.0], steps=50, events=sw.Event(_height, terminal=True))),
         E.UnsupportedError,
         "for each member i: v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])",
     ),
     (
-        lambda: run(steps=50, events=sw.Event(_height, terminal=True)).resume,
+        lambda: run(resume=run(steps=50, events=sw.Event(_height, terminal=True))),
         E.UnsupportedError,
         "begin a new run from there: v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)",
     ),
@@ -126,7 +126,8 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         "form: many steps are one power only if the inputs go on by a rule, as constants and sinusoids do, but a changes from "
         "sample to sample; use form='matrix' or 'direct'",
     ),
-    (lambda: run(carry=1.0), E.ArgumentError, "carry: false_euler carries nothing but v between steps"),
+    (lambda: run(resume=1.0), E.DTypeError, "resume: expected a Run or a World that goes on, got 1.0"),
+    (lambda: run(resume=run(), t0=1.0), E.ArgumentError, "t0: the run that goes on has its own, got 1.0; to begin elsewhere,"),
     (lambda: sw.NBody(masses=1.0), E.ShapeError, "masses: expected one for each body along the first axis, got shape ()"),
     (lambda: sw.NBody(masses=[1, -2]), E.ArgumentError, "masses: expected numbers of zero or more, got -2"),
     (lambda: sw.NBody(force="newtons"), E.UnknownNameError, "force: there is no 'newtons'; did you mean 'newton'?"),
@@ -381,14 +382,9 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         " are available (memory of this machine); keep less with every= or split the batch",
     ),
     (
-        lambda: run(y=[1.0, np.nan], first_bad_step=[-1, -1]),
+        lambda: run(y=[1.0, np.nan], resume=run()),
         E.NotFiniteError,
         "y: expected finite numbers, got nan at index (1,)",
-    ),
-    (
-        lambda: run(first_bad_step=[3]),
-        E.ShapeError,
-        "first_bad_step: expected whole numbers of shape (), got int64 of shape (1,)",
     ),
     # what is no number, and what is one
     (lambda: run(record=3), E.DTypeError, "record: expected a list of quantities, got 3 (int)"),

@@ -209,7 +209,7 @@ def test_pieces_find_what_the_whole_finds(method: str) -> None:
     arguments: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1}
     whole = sw.integrate(sw.Oscillator(), method, **arguments, steps=200, events=crossing)
     head = sw.integrate(sw.Oscillator(), method, **arguments, steps=77, events=crossing)
-    tail = sw.integrate(sw.Oscillator(), method, **head.resume, steps=123, events=crossing)
+    tail = sw.integrate(sw.Oscillator(), method, resume=head, steps=123, events=crossing)
     np.testing.assert_array_equal(tail.y[-1], whole.y[-1])
     for name in ("t", "v", "y", "step"):
         pieces = [getattr(each.events["crossing"], name) for each in (head, tail)]
@@ -231,7 +231,7 @@ def test_a_member_that_stopped_stays_where_it_was_and_cannot_go_on() -> None:
         for other in ("crossing", "speed"):
             assert (run.events[other].of(i).t <= end.t[0]).all()
     with pytest.raises(sw.errors.UnsupportedError, match="stopped at an event"):
-        _ = run.resume
+        sw.integrate(run.system, run.method, resume=run, steps=1)
     assert "stopped at an event" in repr(run)
 
 

@@ -150,7 +150,7 @@ def test_a_run_that_was_out_of_attempts_goes_on() -> None:
     assert whole.paces is not None
     with pytest.warns(sw.ToleranceWarning):
         head = sweep(slice(0, 5), events=crossing, at=[12.0], max_steps=int(whole.paces.accepted.max()) // 2)
-    tail = sw.integrate(head.system, "merson", **head.resume, at=[12.0], events=crossing)
+    tail = sw.integrate(head.system, "merson", resume=head, at=[12.0], events=crossing)
     np.testing.assert_array_equal(tail.y[-1], whole.y[-1])
     counts = [each.events["crossing"].count for each in (head, tail, whole)]
     assert counts[0].any()

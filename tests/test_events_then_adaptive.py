@@ -78,7 +78,7 @@ def test_a_run_in_pieces_is_the_run_in_one() -> None:
     y = np.linspace(0.5, 3.0, 12)
     whole = sw.integrate(ball(), "merson", v=0.0, y=y, tolerance=1e-9, at=[1.0, 1.7, 2.5], events=ground(0.8))
     first = sw.integrate(ball(), "merson", v=0.0, y=y, tolerance=1e-9, at=[1.0, 1.7], events=ground(0.8))
-    second = sw.integrate(ball(), "merson", **first.resume, at=[2.5], events=ground(0.8))
+    second = sw.integrate(ball(), "merson", resume=first, at=[2.5], events=ground(0.8))
     np.testing.assert_array_equal(whole.y, np.concatenate([first.y, second.y]))
     counts = [run.events["ground"].count for run in (first, second, whole)]
     np.testing.assert_array_equal(counts[0] + counts[1], counts[2])

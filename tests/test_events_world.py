@@ -89,7 +89,7 @@ def test_a_force_that_changes(method: str) -> None:
     total = 0
     for k in range(4):
         force[:] = 0.5 * (-1) ** k
-        run = sw.integrate(sw.Pendulum(), method, dt=0.1, **world.resume, steps=10, events=crossing)
+        run = sw.integrate(sw.Pendulum(), method, dt=0.1, resume=world, steps=10, events=crossing)
         world.step(10)
         np.testing.assert_array_equal(world.y, run.y[-1])
         assert world.events["crossing"] == run.events["crossing"]

@@ -95,8 +95,7 @@ def test_it_does_not_depend_on_threads_company_or_pieces() -> None:
     assert_same(case.run(700, dtype="float32", threads=7, every=1), together)
     system, arguments = case.make(700)
     run = sw.integrate(system, **arguments, dtype="float32", steps=9)
-    assert run.resume["dtype"] == "float32"
-    run = sw.integrate(system, case.method, **run.resume, steps=14, every=1)
+    run = sw.integrate(system, case.method, resume=run, steps=14, every=1)
     np.testing.assert_array_equal(run.y[-1], together.y[-1])
     np.testing.assert_array_equal(run.v[-1], together.v[-1])
 
@@ -150,11 +149,11 @@ def test_a_world_steps_arrays_of_float32_in_place(method: str, members: int) -> 
         world.step(100)
         np.testing.assert_array_equal(y, run.y[i])
         np.testing.assert_array_equal(v, run.v[i])
-    later = sw.World(system, method, dt=0.1, **world.resume)
+    later = sw.World(system, method, dt=0.1, resume=world)
     assert later.y.dtype == F
     later.step(100)
     np.testing.assert_array_equal(later.y, run.y[3])
-    on = sw.integrate(system, method, dt=0.1, steps=100, **world.resume)
+    on = sw.integrate(system, method, dt=0.1, steps=100, resume=world)
     np.testing.assert_array_equal(on.y[-1], run.y[3])
     # Pushed from outside, by numbers of float32.
     force = np.zeros(members, dtype=F)

@@ -105,7 +105,7 @@ def test_a_world_equals_pieces_of_a_run(method: str, backend: str) -> None:
                 run = sw.integrate(system, method, dt=0.1, steps=steps, backend=backend, **state | {"force": force})
                 np.testing.assert_array_equal(world.y, run.y[-1])
                 np.testing.assert_array_equal(world.v, run.v[-1])
-                state = run.resume
+                state = {"resume": run}
                 force[...] = rng.normal(size=force.shape)
 
 
@@ -142,7 +142,7 @@ def test_large_systems(system: sw.System, members: int, method: str) -> None:
         run = sw.integrate(system, method, dt=0.01, steps=steps, backend="numpy", **state | {"force": force})
         np.testing.assert_array_equal(world.y, run.y[-1])
         np.testing.assert_array_equal(world.v, run.v[-1])
-        state = run.resume
+        state = {"resume": run}
         force[...] = rng.normal(size=force.shape)
 
 
@@ -184,7 +184,7 @@ def test_a_rate_that_was_kept_is_not_used_with_another_force(bodies: int, method
         run = sw.integrate(system, method, dt=0.01, steps=1, backend="numpy", **state | {"force": force})
         np.testing.assert_array_equal(world.y, run.y[-1])
         np.testing.assert_array_equal(world.v, run.v[-1])
-        state = run.resume
+        state = {"resume": run}
         force[...] = rng.normal(size=force.shape)
 
 
@@ -283,7 +283,7 @@ COPIES = {
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
     "pickle": lambda w: pickle.loads(pickle.dumps(w)),
-    "resume": lambda w: sw.World(w.system, w.method, dt=w.dt, **w.resume),
+    "resume": lambda w: sw.World(w.system, w.method, dt=w.dt, resume=w),
 }
 
 
@@ -307,11 +307,11 @@ def test_a_run_goes_on_with_its_force() -> None:
     system, v, y, force = forced("pendulum")
     whole = sw.integrate(system, "leapfrog", v=v, y=y, dt=0.1, steps=9, force=force)
     half = sw.integrate(system, "leapfrog", v=v, y=y, dt=0.1, steps=5, force=force)
-    rest = sw.integrate(system, "leapfrog", steps=4, **half.resume)
+    rest = sw.integrate(system, "leapfrog", steps=4, resume=half)
     np.testing.assert_array_equal(rest.y, whole.y)
     world = sw.World(system, "leapfrog", v=v, y=y, dt=0.1, force=force)
     world.step(5)
-    rest = sw.integrate(system, "leapfrog", dt=0.1, steps=4, **world.resume)
+    rest = sw.integrate(system, "leapfrog", dt=0.1, steps=4, resume=world)
     np.testing.assert_array_equal(rest.y, whole.y)
 
 
@@ -425,7 +425,7 @@ def test_adaptive_steps_equal_the_reference(method: str, fused: bool) -> None:
             )
             equal(one, other)
             first = sw.integrate(system, method, v=v, y=y, at=at[:1], force=force, **ask)
-            rest = sw.integrate(system, method, at=at[1:], max_steps=200, **first.resume)
+            rest = sw.integrate(system, method, at=at[1:], max_steps=200, resume=first)
             np.testing.assert_array_equal(rest.y, one.y[1:])
             alone = (
                 sw.integrate(system, method, v=v[..., 4], y=y[..., 4], at=at, force=force[..., 4], **ask)
@@ -500,11 +500,11 @@ def test_another_force_begins_anew() -> None:
     """The step that is held was made under the force of before, so a run with another one begins at the saved state."""
     ask: dict[str, Any] = {"tolerance": 1e-6, "max_steps": 100}
     first = sw.integrate(sw.Pendulum(), "dop853", v=0.0, y=1.0, at=[1.0], force=0.5, **ask)
-    assert first.resume["force"] == 0.5
-    on = sw.integrate(sw.Pendulum(), "dop853", at=[2.0], **first.resume | {"force": -0.5})
+    assert first.force == 0.5
+    on = sw.integrate(sw.Pendulum(), "dop853", at=[2.0], resume=first, force=-0.5)
     anew = sw.integrate(sw.Pendulum(), "dop853", v=first.v[-1], y=first.y[-1], t0=1.0, at=[2.0], force=-0.5, **ask)
     assert abs(on.y[-1] - anew.y[-1]) < 1e-6
-    assert abs(on.y[-1] - sw.integrate(sw.Pendulum(), "dop853", at=[2.0], **first.resume).y[-1]) > 0.1
+    assert abs(on.y[-1] - sw.integrate(sw.Pendulum(), "dop853", at=[2.0], resume=first).y[-1]) > 0.1
 
 
 @pytest.mark.parametrize("method", ABLE)

@@ -216,7 +216,7 @@ def test_with_a_tolerance() -> None:
         plain = sw.integrate(system, method, v=v, y=y, tolerance=1e-6, at=[0.25])
         assert np.abs(plain.y[-1] - one.y[-1]).max() < 1e-4
         first = sw.integrate(system, method, v=v, y=y, tolerance=1e-6, at=[0.05], fused=True)
-        on = sw.integrate(system, method, at=[0.25], **first.resume)
+        on = sw.integrate(system, method, at=[0.25], resume=first)
         assert np.array_equal(on.y[-1], one.y[-1])
 
 
@@ -237,7 +237,7 @@ def test_a_world_and_going_on() -> None:
     for method in ("leapfrog", "verlet", "rk4"):
         whole = sw.integrate(system, method, v=v, y=y, dt=1e-3, steps=20, fused=True)
         half = sw.integrate(system, method, v=v, y=y, dt=1e-3, steps=8, fused=True)
-        assert np.array_equal(sw.integrate(system, method, steps=12, **half.resume).y, whole.y)
+        assert np.array_equal(sw.integrate(system, method, steps=12, resume=half).y, whole.y)
         world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=1e-3, fused=True)
         world.step(8)
         again = pickle.loads(pickle.dumps(world))

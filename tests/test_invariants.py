@@ -112,13 +112,13 @@ def test_runs_worlds_and_pickles_under_control() -> None:
     whole = sw.integrate(system, "rk4", **START, control=control)
     half = sw.integrate(system, "rk4", **START | {"steps": 20}, control=control)
     for each in (system, half.system):  # what resumes a run has its control, too
-        again = sw.integrate(each, "rk4", **half.resume, steps=20)
+        again = sw.integrate(each, "rk4", resume=half, steps=20)
         np.testing.assert_array_equal(again.y[-1], whole.y[-1])
         assert again.system.uncontrolled == half.system.uncontrolled
     v, y = START["v"].copy(), START["y"].copy()
     world = sw.World(system, "rk4", v=v, y=y, dt=0.05, control=control)
     world.step(20)
-    resumed = sw.World(system, "rk4", dt=0.05, **world.resume)
+    resumed = sw.World(system, "rk4", dt=0.05, resume=world)
     for each in (world, resumed):
         each.step(20)
         np.testing.assert_array_equal(each.y, whole.y[-1])
@@ -126,7 +126,7 @@ def test_runs_worlds_and_pickles_under_control() -> None:
         assert each == whole.system
     projected = sw.integrate(system, "rk4", **START, control=sw.Projection("energy"))
     assert projected.work is not None
-    sw.integrate(projected.system, "rk4", **projected.resume, steps=5)
+    sw.integrate(projected.system, "rk4", resume=projected, steps=5)
 
 
 def test_batches_of_gains_and_targets() -> None:

@@ -181,7 +181,7 @@ def test_short_and_long_runs_have_the_same_bits_at_the_border(monkeypatch: pytes
         state: dict[str, Any] = {"v": np.full((1, members), 0.1), "y": np.linspace(0.5, 2.0, members)[None, :]}
         for steps in pieces:
             run = sw.integrate(system, "rk4", **state, dt=0.01, steps=steps, threads=1)
-            state = run.resume
+            state = {"resume": run}
         return run.v[-1].tobytes() + run.y[-1].tobytes()
 
     for members, around in ((1, range(355, 373, 2)), (8, range(212, 232, 2)), (100, range(10, 130, 8))):

@@ -76,12 +76,12 @@ def test_a_stop_at_an_event_cannot_be_resumed_and_says_how_many() -> None:
     with pytest.raises(
         sw.StepwellError, match=r"^resume: the run stopped at an event, at a time of its own; begin a new run from there: v="
     ):
-        _ = one.resume
+        sw.integrate(one.system, "rk4", resume=one, steps=1)
     two = sw.integrate(sw.Oscillator([1.0, 2.0]), "rk4", y=1.0, **given)
     with pytest.raises(
         sw.StepwellError, match=r"^resume: 2 of 2 members stopped at an event, at times of their own; begin a new"
     ):
-        _ = two.resume
+        sw.integrate(two.system, "rk4", resume=two, steps=1)
 
 
 def test_no_plural_in_brackets_anywhere() -> None:

@@ -71,9 +71,9 @@ def test_runs_and_what_goes_on_from_them() -> None:
     run = sw.integrate(duffing(gamma=gamma), "rk4", v=0.0, y=1.0, dt=0.1, steps=20, every=3)
     there = received(run)
     assert there == run
-    rest, same_rest = (sw.integrate(duffing(gamma=gamma), "rk4", steps=5, **received(each.resume)) for each in (run, there))
+    rest, same_rest = (sw.integrate(duffing(gamma=gamma), "rk4", steps=5, resume=received(each)) for each in (run, there))
     np.testing.assert_array_equal(rest.y, same_rest.y)
     with pytest.warns(sw.DivergenceWarning):
         run = sw.integrate(sw.Oscillator([1.0, 30.0]), "leapfrog", v=0.0, y=1.0, dt=0.1, steps=1000)
-    rest = sw.integrate(sw.Oscillator([1.0, 30.0]), "leapfrog", steps=10, **received(run.resume))
+    rest = sw.integrate(sw.Oscillator([1.0, 30.0]), "leapfrog", steps=10, resume=received(run))
     np.testing.assert_array_equal(rest.first_bad_step, run.first_bad_step)

@@ -104,7 +104,7 @@ def test_pieces_are_the_run(method: str) -> None:
     start = {"v": 0.3, "y": 1.0, "t0": begins, "dt": 0.1}
     whole = sw.integrate(swept(), method, steps=30, every=10, **start)
     half = sw.integrate(swept(), method, steps=20, **start)
-    rest = sw.integrate(swept(), method, steps=10, **half.resume)
+    rest = sw.integrate(swept(), method, steps=10, resume=half)
     np.testing.assert_array_equal((rest.v[-1], rest.y[-1], rest.t[-1]), (whole.v[-1], whole.y[-1], whole.t[-1]))
 
 
@@ -329,7 +329,7 @@ OF_OWN_TIMES: dict[str, Callable[[], sw.Run]] = {
 
 def _goes_on(run: sw.Run) -> sw.Run:
     how: dict[str, Any] = {"steps": 5} if run.paces is None else {"at": run.t[-1:] + 3.0}
-    return quietly(run.system, run.method.name, **how, **run.resume)
+    return quietly(run.system, run.method.name, **how, resume=run)
 
 
 def _saved(run: sw.Run, folder: Path, ending: str) -> None:
@@ -395,7 +395,7 @@ USES: dict[str, tuple[Callable[[sw.Run, Path], Any], str]] = {
 
 
 def _told(run: sw.Run) -> dict[str, Any]:
-    return {name: getattr(run, name) for name in ("t", "v", "y", "t0", "resume")}
+    return {name: getattr(run, name) for name in ("t", "v", "y", "t0")}
 
 
 @pytest.mark.parametrize("use", USES)
@@ -444,7 +444,7 @@ def test_what_is_wrong_with_times_is_said_of_their_member(options: dict[str, Any
 def test_a_run_that_goes_on_says_which_member_was_further() -> None:
     half = sw.integrate(swept(), "dop853", at=AT, **ADAPTIVE)
     with pytest.raises(ArgumentError, match=r"from the last time of the run that goes on, 9, on, got \[8.5\] of member 1$"):
-        sw.integrate(swept(), "dop853", at=[[9.0, 8.5]], **half.resume)
+        sw.integrate(swept(), "dop853", at=[[9.0, 8.5]], resume=half)
 
 
 def test_times_over_some_axes_are_those_of_each_member() -> None:

@@ -132,7 +132,7 @@ def test_going_on_where_states_are_kept(method: str, backend: str) -> None:
     options: dict[str, Any] = {"dt": 0.1, "form": "power", "backend": backend, "every": 1000}
     whole = sw.integrate(system, method, v=0.0, y=1.0, steps=5000, **options)
     run = sw.integrate(system, method, v=0.0, y=1.0, steps=2000, **options)
-    run = sw.integrate(system, method, steps=3000, **options, **run.resume)
+    run = sw.integrate(system, method, steps=3000, **options, resume=run)
     np.testing.assert_array_equal(run.v, whole.v[2:])
     np.testing.assert_array_equal(run.y, whole.y[2:])
     np.testing.assert_array_equal(run.t, whole.t[2:])
@@ -182,7 +182,7 @@ def test_a_run_goes_on_after_somebody_diverged() -> None:
         first = sw.integrate(system, "false_euler", v=0.0, y=1.0, steps=500, **options)
     assert np.count_nonzero(first.status) == 1
     with pytest.warns(sw.DivergenceWarning, match="^1 of 3 member"):
-        second = sw.integrate(system, "false_euler", steps=2500, **options, **first.resume)
+        second = sw.integrate(system, "false_euler", steps=2500, **options, resume=first)
     np.testing.assert_array_equal(second.first_bad_step, whole.first_bad_step)
     np.testing.assert_array_equal(second.y, whole.y[10:])
 

@@ -140,7 +140,7 @@ def test_a_run_says_when_it_began() -> None:
     assert "t = 0 to 10, 1 saved" in repr(run_of())
     assert "t = 3 to 13, 11 saved" in repr(run_of(t0=3.0, every=10))
     half = run_of(steps=40)
-    rest = sw.integrate(sw.Oscillator(), "rk4", steps=60, **half.resume)
+    rest = sw.integrate(sw.Oscillator(), "rk4", steps=60, resume=half)
     assert "60 steps of 0.1, t = 4 to 10" in repr(rest)
     assert repr(run_of(steps=1)).count("1 step of 0.1") == 1
 

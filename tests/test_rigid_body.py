@@ -221,7 +221,7 @@ def test_the_bits_under_control(keeper: Any, fused: bool) -> None:
         assert_same(whole, sw.integrate(body, method, **arguments, steps=40, every=10, threads=2))
         first = sw.integrate(body, method, **arguments, steps=15)
         assert repr(first.system) == repr(whole.system)
-        again = sw.integrate(body, method, steps=25, **first.resume)
+        again = sw.integrate(body, method, steps=25, resume=first)
         np.testing.assert_array_equal(again.y[-1], whole.y[-1])
         world = sw.World(body, method, **{k: np.array(x) if k in "vy" else x for k, x in arguments.items()})
         world.step(40)

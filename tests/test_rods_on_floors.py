@@ -138,7 +138,7 @@ def test_large_and_small_a_world_and_a_run_in_pieces(method: str, n: int, dim: i
     many = sw.integrate(rods, method, y=np.repeat(y[..., np.newaxis], 5, axis=-1), steps=60, every=10, **given, threads=2)
     assert np.array_equal(many.y[..., 3], whole.y)
     half = sw.integrate(rods, method, y=y, steps=20, **given)
-    rest = sw.integrate(rods, method, **half.resume, steps=40)
+    rest = sw.integrate(rods, method, resume=half, steps=40)
     assert np.array_equal(rest.y[-1], whole.y[-1])
     world = sw.World(rods, method, v=np.zeros(y.shape), y=y.copy(), dt=1 / 60, control=RESETTING)
     for _ in range(6):

@@ -59,7 +59,7 @@ def test_a_run_goes_on_from_a_file_to_the_bit(case: Any, tmp_path: Path) -> None
     whole, half = case.run(3, steps=24, every=12), case.run(3, steps=12, every=12)
     back = through(half, tmp_path, system=system if "function of the time" in case.system else None)
     assert_equal_bits(back, half)
-    rest = sw.integrate(back.system, back.method, steps=12, form=case.form, **back.resume)
+    rest = sw.integrate(back.system, back.method, steps=12, form=case.form, resume=back)
     assert rest.y[-1].tobytes() == whole.y[-1].tobytes()
     assert rest.v[-1].tobytes() == whole.v[-1].tobytes()
 
@@ -75,7 +75,7 @@ def test_adaptive_steps_go_on_from_a_file(method: str, fused: bool, tmp_path: Pa
     start: dict[str, Any] = {"v": np.array([0.1, 0.2, 0.3]), "y": 1.0, "tolerance": (1e-5, 1e-9), "fused": fused}
     whole = sw.integrate(sw.Pendulum(), method, at=[1.0, 2.0, 3.0], **start)
     first = through(sw.integrate(sw.Pendulum(), method, at=[1.0, 2.0], **start), tmp_path)
-    rest = sw.integrate(first.system, first.method, at=[3.0], **first.resume)
+    rest = sw.integrate(first.system, first.method, at=[3.0], resume=first)
     assert rest.paces is not None
     assert whole.paces is not None
     assert rest.y[-1].tobytes() == whole.y[-1].tobytes()
@@ -113,7 +113,7 @@ def test_a_control_goes_on_from_a_file(which: str, tmp_path: Path) -> None:
     back = through(half, tmp_path)
     assert_equal_bits(back, half)
     assert back.system.keeper == half.system.keeper
-    rest = sw.integrate(back.system, back.method, steps=20, **back.resume)
+    rest = sw.integrate(back.system, back.method, steps=20, resume=back)
     assert rest.y[-1].tobytes() == whole.y[-1].tobytes()
 
 
@@ -196,7 +196,7 @@ def test_a_function_that_is_found_nowhere_must_be_given(tmp_path: Path) -> None:
     for given in (hidden, hidden(k=3.0)):
         back = sw.load(tmp_path / "run.npz", system=given)
         assert_equal_bits(back, run)  # with the parameter of the file
-    again = sw.integrate(back.system, back.method, steps=10, **back.resume)
+    again = sw.integrate(back.system, back.method, steps=10, resume=back)
     assert again.y[-1] == sw.integrate(hidden(k=2.0), "rk4", v=0.0, y=1.0, dt=0.1, steps=20).y[-1]
 
 

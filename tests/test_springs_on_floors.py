@@ -195,7 +195,7 @@ def test_small_and_large_nets_have_the_bits_of_the_reference(n: int, method: str
     whole = sw.integrate(net, method, **start, steps=120, every=30)
     assert_same(whole, sw.integrate(net, method, **start, steps=120, every=30, backend="numpy"))
     half = sw.integrate(net, method, **start, steps=60)
-    assert np.array_equal(sw.integrate(net, method, **half.resume, steps=60).y[-1], whole.y[-1])
+    assert np.array_equal(sw.integrate(net, method, resume=half, steps=60).y[-1], whole.y[-1])
     world = sw.World(net, method, v=start["v"].copy(), y=y.copy(), dt=0.004)
     for _ in range(4):
         world.step(30)

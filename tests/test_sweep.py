@@ -159,7 +159,7 @@ def whole(**options: Any) -> tuple[Any, sw.Run]:
     given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.05}
     found = sw.sweep(duffing, {"gamma": ("gamma", gamma)}, "rk4", steps=400, transient=30, chunk=7, **given, **options)
     start = sw.integrate(duffing(gamma=gamma), "rk4", steps=30, **given)
-    return found, sw.integrate(duffing(gamma=gamma), "rk4", steps=400, every=1, **start.resume)
+    return found, sw.integrate(duffing(gamma=gamma), "rk4", steps=400, every=1, resume=start)
 
 
 def test_extremes() -> None:

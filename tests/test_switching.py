@@ -197,7 +197,7 @@ def test_one_number_for_all_ways(method: str) -> None:
         assert np.array_equal(sw.integrate(alone, method, y=1.0, tolerance=1e-7, at=at).y, run.y[:, i, j])
         for cut in (1, 2, 3):
             first = sw.integrate(alone, method, y=1.0, tolerance=1e-7, at=at[:cut])
-            assert np.array_equal(sw.integrate(alone, method, at=at[cut:], **first.resume).y, run.y[cut:, i, j])
+            assert np.array_equal(sw.integrate(alone, method, at=at[cut:], resume=first).y, run.y[cut:, i, j])
     again = pickle.loads(pickle.dumps(pulsed(a=a, w=w)))
     assert np.array_equal(sw.integrate(again, method, y=1.0, tolerance=1e-7, at=at).y, run.y)
 
@@ -217,7 +217,7 @@ def test_periodic_pulses_in_pieces(method: str) -> None:
     assert whole.y == pytest.approx(right, rel=1e-5)
     for cut in (1, 7, 19):
         first = sw.integrate(ticking(), method, y=1.0, tolerance=1e-7, at=at[:cut])
-        assert np.array_equal(sw.integrate(ticking(), method, at=at[cut:], **first.resume).y, whole.y[cut:])
+        assert np.array_equal(sw.integrate(ticking(), method, at=at[cut:], resume=first).y, whole.y[cut:])
 
 
 def test_backward() -> None:

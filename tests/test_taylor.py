@@ -439,7 +439,7 @@ def test_tolerances_of_components(absolute: Any) -> None:
     assert (np.abs(run.y - exact) <= 4.0 * (run.paces.accepted + 1) * relative).all()
 
     first = sw.integrate(decays, "taylor", y=np.ones(2), tolerance=tolerance, at=[0.5])
-    assert np.array_equal(sw.integrate(decays, "taylor", at=[1.0], **first.resume).y[-1], run.y[-1])
+    assert np.array_equal(sw.integrate(decays, "taylor", at=[1.0], resume=first).y[-1], run.y[-1])
     members = np.array([[1e-4, 1e-3], [1e-9, 1e-9]])
     assert sw.integrate(decays, "taylor", y=np.ones(2), tolerance=members, at=[1.0]).y.shape == (1, 2, 2)
     with pytest.raises(UnsupportedError, match=r"one order for all members.* got 1e-09 \(order 14\) to 1e-06 \(order 10\)"):
@@ -720,7 +720,7 @@ def test_a_run_that_goes_on_finds_the_coefficients_of_its_held_step_again() -> N
     for until in (1, 2, 3, 11, 30, 60):
         run = sw.integrate(bodies, "taylor", at=at[done:until], **state)
         assert np.array_equal(run.y, whole.y[done:until])
-        done, state = until, run.resume
+        done, state = until, {"resume": run}
     assert run.paces is not None
     assert whole.paces is not None
     assert all(np.array_equal(a, b) for a, b in zip(run.paces, whole.paces, strict=True))

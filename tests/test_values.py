@@ -380,8 +380,7 @@ def test_a_peer_of_scipy_goes_through_a_pickle() -> None:
 
 def test_a_pickled_state_goes_on() -> None:
     first = sw.integrate(BODIES, "rk4", **STATE | {"v": 0.1}, steps=5, control=sw.EnergyControl(relative=0.1))
-    state = pickle.loads(pickle.dumps(first.resume))
-    a, b = (sw.integrate(BODIES, "rk4", steps=5, **each) for each in (state, first.resume))
+    a, b = (sw.integrate(BODIES, "rk4", steps=5, resume=each) for each in (pickle.loads(pickle.dumps(first)), first))
     assert a == b
 
 

@@ -108,7 +108,9 @@ def test_any_shape_of_batch(shape: tuple[int, ...]) -> None:
 @pytest.mark.parametrize("name", ["dt", "t", "method", "system", "v", "y", "step", "step_number", "anything"])
 def test_nothing_is_assigned(name: str) -> None:
     w = sw.World(sw.Oscillator(1.0), "verlet", v=np.zeros(3), y=np.ones(3), dt=0.1)
-    with pytest.raises(FixedError, match=rf"^{name}: a world's {name} cannot be assigned; .* World\(system, method, dt=dt, "):
+    with pytest.raises(
+        FixedError, match=rf"^{name}: a world's {name} cannot be assigned; .* World\(system, method, resume=world\), "
+    ):
         setattr(w, name, 0.2)
     assert (w.dt, w.t, w.method.name) == (0.1, 0.0, "verlet")
 
@@ -117,7 +119,7 @@ COPIES = {
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
     "pickle": lambda w: pickle.loads(pickle.dumps(w)),
-    "resume": lambda w: sw.World(w.system, w.method, dt=w.dt, **w.resume),
+    "resume": lambda w: sw.World(w.system, w.method, resume=w),
 }
 
 
@@ -147,9 +149,9 @@ def test_a_world_goes_on_from_a_run_and_a_run_from_a_world(method: str) -> None:
     system, options = sw.Oscillator(np.array([1.0, 1.3])), {"dt": 0.1}
     whole = sw.integrate(system, method, v=0.2, y=1.0, steps=60, **options)
     half = sw.integrate(system, method, v=0.2, y=1.0, steps=25, **options)
-    w = sw.World(system, method, **options, **half.resume)
+    w = sw.World(system, method, **options, resume=half)
     w.step(15)
-    rest = sw.integrate(system, method, steps=20, **options, **w.resume)
+    rest = sw.integrate(system, method, steps=20, **options, resume=w)
     np.testing.assert_array_equal((rest.v, rest.y), (whole.v, whole.y))
 
 
@@ -157,7 +159,6 @@ def test_a_copy_after_a_kick_starts_from_it() -> None:
     w = sw.World(sw.Oscillator(1.0), "verlet", v=np.zeros(1), y=np.ones(1), dt=0.1)
     w.step(3)
     w.v[0] += 0.5
-    assert "carry" not in w.resume
     again = copy.copy(w)
     again.step(5)
     w.step(5)

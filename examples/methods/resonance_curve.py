@@ -14,7 +14,7 @@ damping = np.array([0.05, 0.1, 0.2, 0.5])[:, None]
 force = sw.Sinusoid(amplitude=1.0, omega=drive)
 swing = sw.Oscillator(1.0, damping=damping, a=force, form="physical")
 settled = sw.integrate(swing, "rk4", v=0.0, y=0.0, dt=0.05, steps=4000)
-run = sw.integrate(swing, "rk4", dt=0.05, steps=440, every=1, **{k: settled.resume[k] for k in ("v", "y", "t0", "start_step")})
+run = sw.integrate(swing, "rk4", resume=settled, steps=440, every=1)
 amplitude = np.abs(run.y).max(axis=0)
 true = 1.0 / np.hypot(1.0 - drive**2, 2.0 * damping * drive)
 assert np.abs(amplitude / true - 1.0).max() < 0.01

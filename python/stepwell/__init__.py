@@ -77,6 +77,7 @@ registry.register(
     draw_verlet_friction="stepwell.views.charts.verlet_friction_picture:draw",
     draw_work_precision="stepwell.views.charts.picture:draw",
     explore="stepwell.views.explorer.page:explore",
+    growth_of="stepwell.analysis.growth:finding_of",
     held_by_stability="stepwell.analysis.stiffness:held_by_stability",
     own_system="stepwell.model.systems.own:OwnSystem",
     picture_of_run="stepwell.views.charts.runs:own_picture",
@@ -84,7 +85,6 @@ registry.register(
     run_to_xarray="stepwell.interop.tables:to_xarray",
     safe_step="stepwell.analysis.stability.nets:safe_step",
     save_run="stepwell.interop.saving:save",
-    warn_of_growth="stepwell.analysis.growth:warn_of",
     watched_for_growth="stepwell.analysis.growth:watched",
 )
 

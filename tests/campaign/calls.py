@@ -67,7 +67,7 @@ def in_pieces(system: Any, method: Any, first: Any = 3, second: Any = 4, **optio
     """A run in two pieces, which is the run in one."""
     half = sw.integrate(system, method, steps=first, **options)
     going_on = {name: options[name] for name in ("form", "backend", "threads") if name in options}
-    rest = sw.integrate(half.system.uncontrolled, half.method, steps=second, **half.resume, **going_on)
+    rest = sw.integrate(half.system.uncontrolled, half.method, steps=second, resume=half, **going_on)
     entire = sw.integrate(system, method, steps=whole(first) + whole(second), **options)
     if rest.start_step + rest.steps == entire.start_step + entire.steps:
         same("v in pieces and at once", rest.v[-1], entire.v[-1])
@@ -169,7 +169,7 @@ MORE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "World of bodies stepped": (
         world_stepped,
-        BODIES | {"steps": 3, "again": 2, "start": "first_order", "carry": None, "carried_by": None},
+        BODIES | {"steps": 3, "again": 2, "start": "first_order", "resume": None},
     ),
     "in pieces": (
         in_pieces,
@@ -250,8 +250,6 @@ WORK = frozenset(
         "most",
         "spin",
         "start_step",
-        "dt_before",
-        "changed_by",
         "backend",
     }
 )

@@ -68,8 +68,7 @@ def check_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter(method:
     run = sweep(**ask, at=times[:1])
     pieces = [run]
     for end in times[1:]:
-        system, again = run.system, dict(run.resume)
-        run = sw.integrate(system, method, **again, at=[end], events=ask["events"])
+        run = sw.integrate(run.system, method, resume=run, at=[end], events=ask["events"])
         pieces.append(run)
     np.testing.assert_array_equal(run.y[-1], whole.y[-1])
     for name, theirs in whole.events.items():
@@ -101,7 +100,7 @@ def check_a_member_that_stopped_stays_where_it_was_and_cannot_go_on() -> None:
             kept = free.events[other].of(i).t
             np.testing.assert_array_equal(run.events[other].of(i).t, kept[kept <= end.t[0]])
     with pytest.raises(sw.errors.UnsupportedError, match="stopped at an event"):
-        _ = run.resume
+        sw.integrate(run.system, run.method, resume=run, at=[99.0])
     assert "stopped at an event" in repr(run)
 
 

@@ -381,7 +381,7 @@ def _in_pieces(
     same = {k: arguments[k] for k in ("method", "dt", "form", "record", "every", "backend") if k in arguments}
     run = None
     for i, n in enumerate(steps):
-        run = sw.integrate(system, **(arguments | first if run is None else same | run.resume), steps=n)
+        run = sw.integrate(system, **(arguments | first if run is None else same | {"resume": run}), steps=n)
         kept |= {f"{i} {name}": array for name, array in arrays(run).items()}
     return kept
 

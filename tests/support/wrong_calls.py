@@ -280,12 +280,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "form": "direct",
             "progress": False,
             "start": None,
-            "carry": None,
-            "carried_by": None,
-            "carried_for": None,
-            "first_bad_step": None,
-            "dt_before": None,
-            "changed_by": None,
+            "resume": None,
         }
         | {"control": None, "tolerance": None, "at": None, "max_steps": None},
     ),
@@ -296,7 +291,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "integrate bodies": (
         sw.integrate,
-        BODIES | {"dt": 0.1, "steps": 10, "record": ["momentum"], "control": sw.EnergyControl(0.1), "first_bad_step": -1},
+        BODIES | {"dt": 0.1, "steps": 10, "record": ["momentum"], "control": sw.EnergyControl(0.1)},
     ),
     "integrate rods": (
         sw.integrate,
@@ -311,9 +306,6 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "dt": 0.1,
             "steps": 10,
             "start": "first_order",
-            "carry": 1.0,
-            "carried_by": "verlet",
-            "carried_for": "0" * 64,
             "backend": "numpy",
         },
     ),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -11,11 +10,12 @@ import numpy as np
 
 from ..base.arrays import Array, Shape, Whole
 from ..base.checks import once_of
+from ..base.immutable import by_value
 from ..base.reprs import first_of, share
 from ..errors import AccuracyWarning, UnsupportedError
 from ..model.methods import Method
 from ..model.systems import NBody, System
-from ..runs.diagnostics import is_heard
+from ..runs.findings import Finding, warn_of
 
 #: A state that is so many times as long as at the start is looked at; from rest, so many units long.
 GROWN = 1e6
@@ -55,25 +55,33 @@ def lengths(system: System, v: Array, y: Array) -> Array:
         return np.asarray(unit * np.sqrt(sum(squares)))
 
 
+@by_value
 class Growth(NamedTuple):
     """Members that grew by their steps alone.
 
     Attributes:
-        number: how many they are.
+        members: their places in the flattened batch.
         first: the place of the first of them in the batch.
         size: by what it grew, as words.
         why: what made it grow, and what to do.
     """
 
-    number: int
+    members: Whole
     first: tuple[int, ...]
     size: str
     why: str
 
-    def in_words(self, shape: Shape) -> str:
-        """It in words, of members of a batch of this shape."""
-        size = math.prod(shape)
-        return f"{share(self.number, shape, size)} {self.size}{first_of(self.number, self.first, size)}: {self.why}"
+    @property
+    def number(self) -> int:
+        """How many they are."""
+        return len(self.members)
+
+    def finding(self, shape: Shape) -> Finding:
+        """It of members of a batch of this shape."""
+        size, members = math.prod(shape), np.zeros(shape, dtype=bool)
+        members.reshape(-1)[self.members] = True
+        text = f"{share(self.number, shape, size)} {self.size}{first_of(self.number, self.first, size)}: {self.why}"
+        return Finding(AccuracyWarning, text, members)
 
 
 def growth(
@@ -121,7 +129,7 @@ def growth(
         f"does not grow; {factors.limit(suspects[k])}"
     )
     first = tuple(int(i) for i in np.unravel_index(suspects[k], many.shape))
-    return Growth(len(by_steps), first, f"grew {_power_of_ten(float(grown[k]))}-fold in {steps} steps", why)
+    return Growth(suspects[by_steps], first, f"grew {_power_of_ten(float(grown[k]))}-fold in {steps} steps", why)
 
 
 def _power_of_ten(logarithm: float) -> str:
@@ -183,12 +191,11 @@ def _square(block: Array) -> float:
     return float(np.einsum("i,i->", numbers, numbers))  # not by BLAS, whose threads wait where cores are busy
 
 
-def warn_of(run: Any, start: tuple[Array, Array] | None) -> None:
-    """Warn of members of a run with fixed steps that grew by its steps alone; ``start`` is None if it went on."""
-    if start is None or not is_heard(AccuracyWarning) or _is_tame(run, start):
-        return
-    if (grown := _of_run(run, start, run.steps)) is not None:
-        warnings.warn(grown.in_words(run.status.shape), AccuracyWarning, stacklevel=3)
+def finding_of(run: Any, start: tuple[Array, Array]) -> Finding | None:
+    """The members of a run with fixed steps that grew by its steps alone, from this start."""
+    if _is_tame(run, start) or (grown := _of_run(run, start, run.steps)) is None:
+        return None
+    return grown.finding(run.status.shape)
 
 
 def of_last_piece(run: Any, start: tuple[Array, Array], steps: int) -> Growth | None:
@@ -242,7 +249,7 @@ def watched(
         nonlocal every
         grown = growth(system, method, dt, loop.step_number - first, t0, start, (v, y))
         if grown is not None:
-            warnings.warn(grown.in_words(v.shape[len(system.v_shape) :]), AccuracyWarning, stacklevel=3)
+            warn_of([grown.finding(v.shape[len(system.v_shape) :])], 3)
             return ENDLESS
         every *= 2
         return every if every <= LAST_CHECK else ENDLESS

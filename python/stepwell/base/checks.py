@@ -360,23 +360,13 @@ def batch_shape(shapes: dict[str, Shape]) -> Shape:
     return shape
 
 
-def diverged_before(first_bad_step: Any, v: Array, y: Array, batch: Shape, start: int) -> Whole | None:
-    """Return the first bad step of each member, −1 for none; only members that have one may hold what is not finite."""
-    if first_bad_step is None:
-        return None
-    shape = numbers("first_bad_step", first_bad_step, finite=False).shape
-    steps = np.asarray(first_bad_step)
-    if steps.dtype.kind not in "iu" or shape != batch:
-        raise ShapeError(f"first_bad_step: expected whole numbers of shape {batch}, got {steps.dtype} of shape {shape}")
-    if (wrong := (steps < -1) | (steps > start)).any():
-        raise ArgumentError(
-            f"first_bad_step: expected steps before the run, up to start_step = {start}, or −1, "
-            f"got {steps[wrong][0]}{_where(wrong)}"
-        )
+def diverged_before(steps: Whole, v: Array, y: Array, batch: Shape) -> Whole:
+    """The step at which each member diverged, −1 for none; only members that did may hold what is not finite."""
+    steps = np.array(np.broadcast_to(steps, batch), dtype=np.int64)
     for argument, array in (("v", v), ("y", y)):
         if (wrong := ~np.isfinite(array) & (steps < 0)).any():
             raise NotFiniteError(f"{argument}: expected finite numbers, got {array[wrong][0]}{_where(wrong)}")
-    return np.array(steps, dtype=np.int64)
+    return steps
 
 
 def member(array: Array, index: Shape) -> Array:

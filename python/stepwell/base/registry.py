@@ -9,6 +9,7 @@ import importlib
 from typing import Any
 
 _PLACES: dict[str, str] = {}
+_FOUND: dict[str, Any] = {}
 
 
 def register(**places: str) -> None:
@@ -18,5 +19,7 @@ def register(**places: str) -> None:
 
 def task(name: str) -> Any:
     """The function that does a task."""
-    module, function = _PLACES[name].split(":")
-    return getattr(importlib.import_module(module), function)
+    if name not in _FOUND:
+        module, function = _PLACES[name].split(":")
+        _FOUND[name] = getattr(importlib.import_module(module), function)
+    return _FOUND[name]

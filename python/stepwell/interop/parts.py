@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import errors
 from ..base import checks
 from ..base.immutable import FixedDict, Immutable
 from ..errors import ArgumentError
@@ -72,6 +73,8 @@ class Writer:
                 return self._array(value, name)
             case np.generic():
                 return {KIND: "scalar", "array": self._array(value, name)}
+            case type() if issubclass(value, Warning):
+                return {KIND: "warning", "name": value.__name__}
             case np.dtype():
                 return {KIND: "dtype", "name": value.str}
             case Method():
@@ -162,6 +165,8 @@ class Reader:
                 return np.broadcast_to(array, part["over"]) if "over" in part else array
             case "scalar":
                 return self._whole(part["array"])[()]
+            case "warning":
+                return getattr(errors, part["name"])
             case "dtype":
                 return np.dtype(part["name"])
             case "method":

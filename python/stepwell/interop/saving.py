@@ -92,7 +92,7 @@ def load(path: str | Path, *, system: Any = None) -> Run:
         >>> half = sw.integrate(chain, "verlet", v=1.0, y=0.0, dt=0.1, steps=40)
         >>> half.save("half.npz")
         >>> half = sw.load("half.npz")
-        >>> rest = sw.integrate(half.system, half.method, steps=60, **half.resume)
+        >>> rest = sw.integrate(half.system, half.method, resume=half, steps=60)
         >>> whole = sw.integrate(chain, "verlet", v=1.0, y=0.0, dt=0.1, steps=100)
         >>> np.array_equal(rest.y, whole.y)
         True

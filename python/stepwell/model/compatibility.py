@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base import checks
-from ..errors import ArgumentError, DTypeError, UnsupportedError
+from ..errors import ArgumentError, UnsupportedError
 from .controls import Control, EnergyControl, NormControl
 from .methods import Method
-from .methods import methods as every_method
 from .systems import Sampled, System
 
 
@@ -64,32 +62,6 @@ def velocities(system: System, v: Any) -> Any:
             f"v: expected the velocities at the start, got None; {system!r} has velocities, unlike a system of first order"
         )
     return v
-
-
-def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) -> None:
-    """Raise if what ``resume`` says of the run so far is of another method, whose carry means something else, or another step."""
-    anew = "to go on with another, start anew from its last state: v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
-    if dt_before is not None and dt != (so_far := checks.number("dt_before", dt_before, unit="units of time")):
-        raise ArgumentError(f"dt: expected the step of the run that goes on, dt_before = {so_far!r}, got {dt!r}; {anew}")
-    if carried_by is not None and checks.known("carried_by", carried_by, [each.name for each in every_method()]) != method.name:
-        raise ArgumentError(
-            f"method: expected {str(carried_by)!r}, by which the run goes on and whose carry was given, got {method.name!r}; "
-            f"{anew}"
-        )
-
-
-def changes_on(events: Any, changed_by: Any) -> None:
-    """Raise if a run goes on without the events that changed the state so far: another motion would follow, without a word."""
-    if changed_by is None:
-        return
-    names = checks.several("changed_by", changed_by, "names of events")
-    if wrong := [each for each in names if not isinstance(each, str)]:
-        raise DTypeError(f"changed_by: expected names of events, as run.resume has them, got {checks.short(wrong[0])}")
-    if events is None and names:
-        raise ArgumentError(
-            f"events: expected the events of the run that goes on, of which {', '.join(names)} changed the state so far, got "
-            f"None; give them again, or events=[] to go on without"
-        )
 
 
 def fits_own_times(system: System, single: bool) -> None:

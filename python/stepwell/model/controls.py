@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from ..base import checks
 from ..base.arrays import Array, Shape
 from ..base.immutable import Immutable, ValueEquality, changed
-from ..errors import ArgumentError, ControlWarning, DTypeError
+from ..errors import ArgumentError, DTypeError
 from ..reference import control as reference
 from .around import Part
 
@@ -82,26 +82,26 @@ class EnergyControl(OfEnergy):
         return f"EnergyControl({strength}, form={self.form!r})"
 
     def aimed(self, kinetic: Array, energy: Array, dt: float) -> EnergyControl:
-        """The same control with numbers for its gain and its target, from the energies at the start.
-
-        Warns:
-            ControlWarning: if h·C·K is 1 or more at the start in the printed form, which then overshoots.
-        """
+        """The same control with numbers for its gain and its target, from the energies at the start."""
         gain = self.gain
         if gain is None:
             if not (kinetic > 0).all():
                 raise ArgumentError("relative: a start at rest has no kinetic energy to relate the gain to; give gain")
             gain = np.asarray(np.asarray(self.relative) / (dt * kinetic))
-        aimed = changed(self, gain=gain, target=np.asarray(energy) if self.target is None else self.target)
-        strength = np.max(dt * gain * kinetic)
-        if self.form == "printed" and strength >= 1.0:
-            warnings.warn(
-                f"gain: h·C·K = {strength:.3g} at the start, expected below 1: the printed form overshoots and may overflow; "
-                f'use a smaller gain or step, or form="limited"',
-                ControlWarning,
-                stacklevel=4,
-            )
-        return aimed
+        return changed(self, gain=gain, target=np.asarray(energy) if self.target is None else self.target)
+
+    def overshoots(self, dt: float, kinetic: Callable[[], Array]) -> tuple[str, Any] | None:
+        """What to say if h·C·K is 1 or more at the start in the printed form, and of which members; or None."""
+        if self.form != "printed" or self.gain is None:
+            return None
+        strength = dt * self.gain * kinetic()
+        if not (largest := np.max(strength)) >= 1.0:
+            return None
+        text = (
+            f"gain: h·C·K = {largest:.3g} at the start, expected below 1: the printed form overshoots and may overflow; "
+            f'use a smaller gain or step, or form="limited"'
+        )
+        return text, strength >= 1.0
 
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
         """Its form, when it acts, its gain and its target."""
@@ -162,16 +162,18 @@ class Control(Immutable, ValueEquality):
 
     def aimed(self, kinetic: Array, value: Array, dt: float) -> Control:
         """The same control with its target in numbers."""
-        aimed = self if self.target is not None else changed(self, target=np.asarray(value))
-        strength = float(np.max(dt * self.gain))
-        if self.form == "printed" and strength >= 1.0:
-            warnings.warn(
-                f"gain: h·gain = {strength:.3g}, expected below 1: the printed form overshoots and may overflow; use a smaller "
-                f'gain or step, or form="limited"',
-                ControlWarning,
-                stacklevel=5,
-            )
-        return aimed
+        return self if self.target is not None else changed(self, target=np.asarray(value))
+
+    def overshoots(self, dt: float, kinetic: Callable[[], Array]) -> tuple[str, Any] | None:
+        """What to say if h·gain is 1 or more in the printed form, and of which members; or None."""
+        strength = dt * self.gain
+        if self.form != "printed" or not (largest := np.max(strength)) >= 1.0:
+            return None
+        text = (
+            f"gain: h·gain = {largest:.3g}, expected below 1: the printed form overshoots and may overflow; use a smaller "
+            f'gain or step, or form="limited"'
+        )
+        return text, strength >= 1.0
 
     def own_parameters(self) -> dict[str, Any]:
         """Its parameters, which stand among those of the equations: it is a part of the rates."""

@@ -1,4 +1,4 @@
-"""What a run carries to the next piece, and for which system and state it holds.
+"""How a run or a world goes on: what it is known by, what its method carries, and for which system and state that holds.
 
 A carry is of one system and one state: the step that it holds was made by them. Of another system, or from another state, a run
 begins anew at the saved state.
@@ -6,44 +6,120 @@ begins anew at the saved state.
 
 from __future__ import annotations
 
-from math import prod
-from string import hexdigits
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from itertools import zip_longest
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..base import checks
-from ..base.arrays import Array, Shape
-from ..errors import ArgumentError
+from ..base.arrays import Array, Shape, Whole
+from ..base.reprs import share
+from ..errors import ArgumentError, DTypeError, UnsupportedError
+from ..model.methods import Method
 from ..model.systems import System
 from . import engine
+from .result import AdaptiveState, Run, Status
 
-if TYPE_CHECKING:
-    from .result import Run
-
-
-#: How many letters a digest has.
-LENGTH = 64
+ANEW = "to go on with another, start anew from its last state: v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
 
 
-def identity(system: System, batch: Shape, v: Array, y: Array, force: Array | None = None) -> str:
-    """By what a system, with its control, and a state of a batch are known: equal only if all of their bits are.
+class Continuation(NamedTuple):
+    """Where a run or a world stands.
 
-    With adaptive steps the ``force`` counts, too: the step that is held was made under it.
+    Attributes:
+        system: what was stepped, with its control.
+        method: by which.
+        v: velocities of all members, shape (*block, *batch).
+        y: coordinates, likewise.
+        options: further arguments of ``integrate`` by which it goes on, for those that are not given again.
+        carry: what the method carries in place of v; of adaptive steps the state of the step-size controller; or None.
+        first_bad_step: the step at which each member diverged, −1 for none; None if no member did.
+        changed_by: names of the events that changed the state.
+        adaptive: whether its steps are.
     """
-    import hashlib  # only runs that go on need it
 
-    found = hashlib.sha256(f"{system.kernel} {batch}".encode())
+    system: System
+    method: Method
+    v: Array
+    y: Array
+    options: dict[str, Any]
+    carry: Array | AdaptiveState | None = None
+    first_bad_step: Whole | None = None
+    changed_by: tuple[str, ...] = ()
+    adaptive: bool = False
+
+    @property
+    def batch(self) -> Shape:
+        """The shape of its batch."""
+        return self.y.shape[len(self.system.y_shape) :]
+
+    def holds(self, system: System, batch: Shape, v: Array, y: Array, force: Array | None = None) -> bool:
+        """Whether what is carried holds for a system and a state: if all of their bits are those of this.
+
+        With adaptive steps the ``force`` counts, too: the step that is held was made under it.
+        """
+        before = self.options["force"] if self.adaptive else None
+        one, other = _bits_of(self.system, self.batch, self.v, self.y, before), _bits_of(system, batch, v, y, force)
+        return all(a == b for a, b in zip_longest(one, other))
+
+
+def of(resume: Any) -> Continuation:
+    """Where a run or a world stands, from which another goes on.
+
+    Raises:
+        DTypeError: if it is none.
+        UnsupportedError: if a terminal event stopped a member, which has a time of its own.
+    """
+    if isinstance(resume, Run):
+        return _of_run(resume)
+    if isinstance(resume, Continuation):
+        return resume
+    if (standing := getattr(resume, "_standing", None)) is None:
+        raise DTypeError(f"resume: expected a Run or a World that goes on, got {checks.short(resume)}")
+    here: Continuation = standing()
+    return here
+
+
+def _of_run(run: Run) -> Continuation:
+    if (stopped := int(np.count_nonzero(run.status >= Status.EVENT))) > 0:
+        raise UnsupportedError(
+            f"resume: {share(stopped, run.status.shape, run.status.size)} stopped at an event, "
+            f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run "
+            + (
+                "for each member i: v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])"
+                if run.status.shape
+                else "from there: v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)"
+            )
+        )
+    # Arrays of a message from another process may begin at an odd place in memory.
+    v, y = (np.require(each, requirements="A") for each in (run.v[-1], run.y[-1]))
+    carry = None if run.carry is None else np.require(run.carry, requirements="A")
+    options = {"fused": run.fused, "dtype": run.dtype, "control": run.system.keeper, "force": run.force, "t0": run.t0}
+    if (state := run.controller_state) is not None:
+        # Members that stopped have no state at the last time but where they stopped.
+        there = is_there(state.pace)
+        state = state._replace(**{name: np.require(getattr(state, name), requirements="A") for name in ("v", "y", "pace")})
+        v, y = (np.where(there, saved, last) for saved, last in ((v, state.v), (y, state.y)))
+        return Continuation(run.system, run.method, v, y, options | state.options, state, None, run.changed_by, adaptive=True)
+    options |= {"start_step": run.start_step + run.steps, "dt": run.dt, "start": run.start}
+    bad = run.first_bad_step if run.status.any() else None
+    return Continuation(run.system, run.method, v, y, options, carry, bad, run.changed_by)
+
+
+def _bits_of(system: System, batch: Shape, v: Array, y: Array, force: Array | None) -> Iterator[Any]:
+    """By what a system, with its control, and a state of a batch are known."""
+    yield system.kernel
+    yield batch
     for name, value in system.parameters(batch):
-        found.update(f" {name} ".encode())
+        yield name
         for part in value if isinstance(value, tuple) else (value,):
-            found.update(_bits(part) if isinstance(part, np.ndarray) else _word(system, part))
+            yield _bits(part) if isinstance(part, np.ndarray) else _word(system, part)
     for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))):
         whole = np.broadcast_to(block, (*np.shape(block)[:axes], *batch))
-        found.update(np.ascontiguousarray(whole, dtype=np.float64).data)
+        yield np.asarray(whole, dtype=np.float64).tobytes()
     if force is not None:
-        found.update(np.ascontiguousarray(force, dtype=np.float64).data)
-    return found.hexdigest()
+        yield np.asarray(force, dtype=np.float64).tobytes()
 
 
 def _bits(rows: Array) -> bytes:
@@ -61,50 +137,38 @@ def _word(system: System, value: Any) -> bytes:
     return digest.encode()
 
 
-def a_digest(carried_for: Any) -> str:
-    """What a carry holds for, as ``resume`` has it, or a file of arrays."""
-    text = str(carried_for) if isinstance(carried_for, (str, np.ndarray)) else ""
-    if len(text) != LENGTH or not set(text) <= set(hexdigits):
-        raise ArgumentError(f"carried_for: expected the digest in run.resume, got {checks.short(carried_for)}")
-    return text
+def goes_on_alike(before: Continuation, method: Method, dt: float | None = None) -> None:
+    """Raise if a run goes on by another method, whose carry means something else, or by another step."""
+    if dt is not None and dt != before.options["dt"]:
+        raise ArgumentError(f"dt: expected the step of the run that goes on, {before.options['dt']!r}, got {dt!r}; {ANEW}")
+    if before.carry is not None and before.method is not method:
+        raise ArgumentError(
+            f"method: expected {before.method.name!r}, by which the run goes on and which carries more than its state, got "
+            f"{method.name!r}; {ANEW}"
+        )
 
 
-def holds(carried_for: Any, system: System, batch: Shape, v: Array, y: Array) -> bool:
-    """Whether a carry of fixed steps holds for a system and a state; one of which it is not said is taken as it is."""
-    return carried_for is None or a_digest(carried_for) == identity(system, batch, v, y)
-
-
-def with_tolerance(run: Run) -> dict[str, Any]:
-    """Arguments with which a run with a tolerance goes on: the state at the last time, and the pace and the state of the carry.
-
-    Members that stopped have no state at the last time but where they stopped.
-    """
-    assert run.controller_state is not None
-    at, pace, batch = run.controller_state, run.controller_state.pace, run.status.shape
-    there = is_there(pace)
-    v, y = (np.where(there, saved[-1], last) for saved, last in ((run.v, at.v), (run.y, at.y)))
-    carry = np.concatenate([pace, *(block.reshape(-1, *batch) for block in (at.v, at.y))])
-    state: dict[str, Any] = {"v": v, "y": y, "t0": run.t0}
-    if run.system.keeper is not None:
-        state["control"] = run.system.keeper
-    if run.force is not None:
-        state["force"] = run.force
-    carried_for = identity(run.system, batch, v, y, run.force)
-    return state | at.options | {"carry": carry, "carried_by": at.method, "carried_for": carried_for}
+def changes_on(before: Continuation, events: Any) -> None:
+    """Raise if a run goes on without the events that changed the state so far: another motion would follow, without a word."""
+    if events is None and before.changed_by:
+        raise ArgumentError(
+            f"events: expected the events of the run that goes on, of which {', '.join(before.changed_by)} changed the state so "
+            f"far, got None; give them again, or events=[] to go on without"
+        )
 
 
 def taken_up(
-    plan: engine.Plan, pacing: engine.Pacing, carry: Array, carried_for: str, v: Array, y: Array
+    plan: engine.Plan, pacing: engine.Pacing, before: Continuation, v: Array, y: Array
 ) -> tuple[Array, Array, Array, bool]:
     """Where members go on, their states there, and whether they begin anew: of another system, or from another state."""
-    numbers, n_v = engine.pace_numbers(plan), prod(plan.system.v_shape)
-    pace, state = carry[:numbers].copy(), carry[numbers:]
+    assert isinstance(before.carry, AdaptiveState)
+    pace, state = before.carry.pace.copy(), before.carry
     pace[engine.WORK] = 0.0  # no control has done anything yet in this run
     # A run that saved its start alone did not know of a time of the run, of which the first step from rest may be a part.
     begins = not pace[engine.COUNTS].any() and not pace[engine.HELD].any() and bool((pace[engine.STEP] == engine.BLIND).any())
-    if begins or carried_for != identity(plan.system, plan.batch, v, y, plan.force):
+    if begins or not before.holds(plan.system, plan.batch, v, y, plan.force):
         return _begun_anew(plan, pacing, pace), v, y, True
-    return pace, state[:n_v].reshape(v.shape), state[n_v:].reshape(y.shape), False
+    return pace, state.v, state.y, False
 
 
 def is_there(pace: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:

@@ -1,24 +1,28 @@
-"""Warnings of runs that stayed finite and yet mean nothing."""
+"""What there is to notice of a run: members that diverged or stopped, and numbers that are finite and yet mean nothing."""
 
 from __future__ import annotations
 
 import math
-import warnings
+from functools import partial
 from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, Shape
-from ..base.reprs import in_words, of_member, share
-from ..errors import AccuracyWarning, ControlWarning
+from ..base import registry
+from ..base.arrays import Array, Shape, Whole
+from ..base.reprs import first_of, in_words, of_member, share
+from ..errors import AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning
 from ..model.controls import EnergyControl
 from ..model.methods import method
 from ..model.parameters import aligned
-from ..model.systems import NBody
+from ..model.systems import NBody, System
 from . import encounters, engine, known_energy
-from .request import time_of
+from .findings import Finding
+from .request import Request
 from .result import Run
+from .stops import of_stops, of_the_start
+from .tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance
 
 #: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
 DOUBTFUL_CHANGE = 0.5
@@ -38,6 +42,8 @@ MIN_BODIES_BY_CORE = 24
 STATES = 32
 
 State = tuple[Array, Array]
+#: What is to be said, and of which members.
+About = tuple[str, Any]
 
 
 class Ends(NamedTuple):
@@ -48,34 +54,125 @@ class Ends(NamedTuple):
     moved: Array
 
 
-def warn_of_nonsense(run: Run, start: State | None, visited: known_energy.Visited | None = None) -> None:
-    """Warn of what is finite and yet means nothing, as far as it is seen at little cost.
+def findings_of(run: Run, request: Request) -> tuple[Finding, ...]:
+    """What is noticed of a run: how it ended, and what means nothing, as far as that is seen at little cost."""
+    noticed = list(run.findings)
+    if run.paces is None:
+        if run.system.keeper is not None:
+            noticed += of_a_strong_control(run.system, request.v, request.y, run.dt)
+        if np.count_nonzero(run.status) and (diverged := _of_divergence(run, request)) is not None:
+            noticed.append(diverged)
+    else:
+        noticed += of_stops(run)
+        if (lost := _of_a_lost_motion(run, request)) is not None:
+            noticed.append(lost)
+    # What an event makes of a state tells nothing of the steps, and what a method carries not where it began.
+    began = not request.carried and request.before is None and not any(event.then for event in request.events or ())
+    start = (request.v, request.y) if began else None
+    noticed += _of_nonsense(run, start, request)
+    if run.paces is None and start is not None and (growth := registry.task("growth_of")(run, start)) is not None:
+        noticed.append(growth)
+    return tuple(noticed)
 
-    Args:
-        run: which.
-        start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
-        visited: of adaptive steps, between which y some members have been, by their places.
-    """
+
+def _of_nonsense(run: Run, start: State | None, request: Request) -> list[Finding]:
+    """What is finite and yet means nothing; ``start`` is None if it went on from what a method carries."""
     system = run.system
-    if (text := system.doubt(run.y)) is not None:
-        warnings.warn(text, AccuracyWarning, stacklevel=3)
     if not isinstance(system, NBody):
-        if text is None and is_heard(AccuracyWarning) and (text := known_energy.told(run, start, visited)) is not None:
-            warnings.warn(text, AccuracyWarning, stacklevel=3)
-        return
+        about = system.doubt(run.y)
+        if about is None:
+            about = known_energy.told(run, start, None if request.adaptive is None else partial(_visited, request))
+        return [] if about is None else [Finding(AccuracyWarning, *about)]
+    noticed = []
     if run.force is None:
         ends = _ends(run, system, start) if system.keeps_energy else None
         energy = None if ends is None else _of_energy(run.method.name, ends)
         if energy is None and system.keeps_energy and start is not None:
             energy = _of_massless(run, system, start)
-        met = None if run.encounter is None else _of_encounters(run, system, start, None if energy is None else energy[1])
-        if text := "; ".join(text for text in (None if energy is None else energy[0], met) if text is not None):
-            warnings.warn(text, AccuracyWarning, stacklevel=3)
-    if (text := _of_a_control(run, system, start)) is not None:
-        warnings.warn(text, ControlWarning, stacklevel=3)
+        met = None if run.encounter is None else _of_encounters(run, system, start, None if energy is None else energy[2])
+        if parts := [part for part in (energy, met) if part is not None]:
+            members = np.logical_or.reduce([part[1] for part in parts])
+            noticed.append(Finding(AccuracyWarning, "; ".join(part[0] for part in parts), members))
+    if (overshot := _of_a_control(run, system, start)) is not None:
+        noticed.append(Finding(ControlWarning, *overshot))
+    return noticed
 
 
-def _of_a_control(run: Run, bodies: NBody, start: State | None) -> str | None:
+def _visited(request: Request, index: Whole) -> tuple[Array, Array, Array]:
+    """Between which y some members have been at the ends of their steps, and how many attempts were rejected."""
+    from .events.attempts import extremes  # only runs beside a barrier need it
+
+    assert request.adaptive is not None
+    return extremes(request.plan, request.adaptive.pacing, request.adaptive.paces, request.v, request.y, index)
+
+
+def time_of(run: Run, step: int, index: Shape) -> float:
+    """The time of a step of fixed length of a member: t0 + k·dt."""
+    return float(np.broadcast_to(run.t0, run.status.shape)[index]) + step * run.dt
+
+
+def _only(run: Run, index: Shape) -> Any:
+    """One member alone."""
+    members = np.zeros(run.status.shape, dtype=bool)
+    members[index] = True
+    return members
+
+
+def of_a_strong_control(system: System, v: Array, y: Array, dt: float) -> list[Finding]:
+    """A control in the printed form that overshoots from the start on."""
+    batch, overshoots = y.shape[len(system.y_shape) :], getattr(system.keeper, "overshoots", None)
+    if overshoots is None:
+        return []
+    with np.errstate(all="ignore"):
+        about = overshoots(dt, lambda: system.uncontrolled.reference_at_step(1.0, batch).energies(v, y)[1])
+    return [] if about is None else [Finding(ControlWarning, about[0], np.broadcast_to(about[1], batch))]
+
+
+def _of_divergence(run: Run, request: Request) -> Finding | None:
+    """The members that diverged in this run."""
+    before = request.before
+    bad = run.first_bad_step >= 0 if before is None else (run.first_bad_step >= 0) & (before < 0)
+    if not bad.any():
+        return None
+    step = int(run.first_bad_step[bad].min())
+    first = tuple(np.argwhere(bad & (run.first_bad_step == step))[0].tolist())
+    why = ""
+    if run.collision is not None and (step - run.start_step) * run.v[-1].size // bad.size <= encounters.MAX_RERUN:
+        pair = run.collision(first, step)
+        if pair.distance < np.inf:
+            why = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
+    if not request.carried and step == run.start_step + 1 and not why:
+        start = request.v, request.y
+        if wrong := of_the_start(run.system, run.status.shape, run.t0 + run.start_step * run.dt, start, first):
+            why = f"; {wrong} at the start, t = {time_of(run, run.start_step, first):g}"
+    number = int(np.count_nonzero(bad))
+    return Finding(
+        DivergenceWarning,
+        f"{share(number, bad.shape, bad.size)} diverged{first_of(number, first, bad.size)} at step {step} "
+        f"(t = {time_of(run, step, first):g}), by {run.method.name} with dt = {run.dt:g}{why}",
+        bad,
+    )
+
+
+def _of_a_lost_motion(run: Run, request: Request) -> Finding | None:
+    """Members whose absolute tolerance is most of what a step may err, and much of the motion."""
+    assert run.controller_state is not None
+    pace = run.controller_state.pace
+    if request.plan.acceptance.own or not (pace[engine.ABSOLUTE] > engine.LEAST).any():
+        return None
+    lost = lost_in_tolerance(pace, engine.groups_of(request.plan))
+    if not lost.any():
+        return None
+    return Finding(
+        ToleranceWarning,
+        f"tolerance: for {share(int(lost.sum()), lost.shape, lost.size)} the absolute part lets a step err by more "
+        f"than {MAX_ABSOLUTE_SHARE:g} of the longest that v or y has been; give one number, which goes by these lengths, or "
+        f"a smaller absolute part",
+        lost,
+    )
+
+
+def _of_a_control(run: Run, bodies: NBody, start: State | None) -> About | None:
     """When h·C·K passed 1 under a control in the printed form, which overshoots from there on. At the start it was told before.
 
     It is looked at in saved states, and then in every state of the first such member, or of the first that diverged.
@@ -83,7 +180,7 @@ def _of_a_control(run: Run, bodies: NBody, start: State | None) -> str | None:
     control = bodies.control
     if not (isinstance(control, EnergyControl) and control.form == "printed"):
         return None
-    if run.paces is not None or start is None or run.overshoots is None or not is_heard(ControlWarning):
+    if run.paces is not None or start is None or run.overshoots is None:
         return None
     with np.errstate(all="ignore"):
         gain = run.dt * np.asarray(control.gain)
@@ -99,13 +196,14 @@ def _of_a_control(run: Run, bodies: NBody, start: State | None) -> str | None:
     if found is None:
         return None
     step, strength = found
-    return (
+    text = (
         f"gain: h·C·K = {strength:.3g} at step {step} (t = {time_of(run, step, index):g}){of_member(index)}, expected below 1: "
         f'from there on the printed form overshoots and may overflow; use a smaller gain or step, or form="limited"'
     )
+    return text, _only(run, index)
 
 
-def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple[int, ...] | None) -> str | None:
+def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: Shape | None) -> About | None:
     """Two bodies that met within a step, if there is reason to look for them and it takes a moment.
 
     Args:
@@ -114,8 +212,6 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple
         start: where it began; None if it went on.
         doubtful: a member whose energy is doubtful, or None.
     """
-    if not is_heard(AccuracyWarning):
-        return None
     suspects = [doubtful] if doubtful is not None else [] if start is None else _suspects(run, bodies, start)
     left = float(encounters.MAX_RERUN)
     for index in suspects:
@@ -126,20 +222,13 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple
             continue  # it diverged, which was told with the pair
         if (met := run.encounter(index, left)) is not None:
             i, j = met.bodies
-            return (
+            text = (
                 f"bodies {i} and {j}{of_member(index)} met within step {met.step} "
                 f"(t = {time_of(run, met.step, index):g}), {met.distance:.3g} apart, which steps of {run.dt:g} do not follow"
             )
+            return text, _only(run, index)
         left -= run.steps * float(np.prod(bodies.y_shape))
     return None
-
-
-def is_heard(kind: type[Warning]) -> bool:
-    """Whether such a warning is not ignored altogether: nothing need be looked for then."""
-    for action, message, category, module, _ in warnings.filters:
-        if message is None and module is None and issubclass(kind, category):
-            return action != "ignore"
-    return True
 
 
 def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
@@ -171,8 +260,8 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
     return [tuple(index) for index in np.argwhere(may).tolist()]
 
 
-def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
-    """What is to be said, and of which member."""
+def _of_energy(method: str, ends: Ends) -> tuple[str, Any, Shape] | None:
+    """What is to be said, of which members, and the first of them."""
     first, last, _ = ends
     wrong = _changed(ends)
     if not wrong.any():
@@ -184,7 +273,7 @@ def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
         f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}{last[index]:.3g} instead of {first[index]:.3g}, "
         f"so {method} did not follow its orbit"
     )
-    return text, index
+    return text, wrong, index
 
 
 def _changed(ends: Ends) -> Any:
@@ -195,8 +284,8 @@ def _changed(ends: Ends) -> Any:
     return wrong & np.isfinite(last)  # members that diverged were named before
 
 
-def _of_massless(run: Run, bodies: NBody, start: State) -> tuple[str, tuple[int, ...]] | None:
-    """What is to be said of bodies without mass around a single one with mass, and of which member.
+def _of_massless(run: Run, bodies: NBody, start: State) -> tuple[str, Any, Shape] | None:
+    """What is to be said of bodies without mass around a single one with mass, of which members, and the first of them.
 
     The energy of all bodies is blind to them. Relative to a single attractor each keeps its energy per unit of mass; several
     attractors may take from it or add to it as much as they like.
@@ -232,7 +321,7 @@ def _of_massless(run: Run, bodies: NBody, start: State) -> tuple[str, tuple[int,
         if some == 1
         else f"{some} bodies without mass have {energy}: {who} has {energies_at}, {followed} their orbits"
     )
-    return text, tuple(index)
+    return text, wrong.any(axis=0), tuple(index)
 
 
 def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:

@@ -21,6 +21,8 @@ Visited = Callable[[Whole], tuple[Array, Array, Array]]
 #: What steps own equations, by the name that the core knows.
 KERNEL_OF_EQUATIONS = "equations"
 Members = np.ndarray[Any, np.dtype[np.bool_]]
+#: What is to be said, and of which members.
+About = tuple[str, Members]
 
 #: It is looked at where a run made so many function evaluations, and has at most so many numbers: that is little work against it.
 FEW_EVALUATIONS, MOST_NUMBERS = 100, 100_000
@@ -59,8 +61,8 @@ def keeps_energy(run: Run) -> bool:
     return isinstance(system, RigidBody) or not system.given_inputs()
 
 
-def told(run: Run, start: State | None, visited: Visited | None = None) -> str | None:
-    """What is to be said, or None.
+def told(run: Run, start: State | None, visited: Visited | None = None) -> About | None:
+    """What is to be said and of which members, or None.
 
     With steps of fixed length a change of the energy is a property of the method, which grows or decays by nature; there it is
     said only where a method that keeps swings bounded passed a barrier.
@@ -71,21 +73,22 @@ def told(run: Run, start: State | None, visited: Visited | None = None) -> str |
         visited: between which y some members have been, by their places, at the ends of adaptive steps.
     """
     system, paces = run.system, run.paces
-    names = _names(system)
-    if start is None or not names or system.keeper is not None or not keeps_energy(run):
-        return None
-    made = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
-    if made < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS or not run.status.size:
+    if start is None or system.keeper is not None:
         return None
     if paces is None and (run.method.limit == 0.0 or not (isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS)):
         return None  # other systems have no barrier
+    made = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
+    if made < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS or not run.status.size:
+        return None
+    if not (names := _names(system)) or not keeps_energy(run):
+        return None
     start = np.broadcast_to(start[0], run.v.shape[1:]), np.broadcast_to(start[1], run.y.shape[1:])
     with np.errstate(all="ignore"):
         for name in names:
-            text = _of_one(run, name, start, made, visited)
+            about = _of_one(run, name, start, made, visited)
             # An invariant may have been declared to be recorded, as the energy of what is damped or driven.
-            if text is not None and (system.kernel != KERNEL_OF_EQUATIONS or _is_constant(run, name)):
-                return text
+            if about is not None and (system.kernel != KERNEL_OF_EQUATIONS or _is_constant(run, name)):
+                return about
     return None
 
 
@@ -108,7 +111,7 @@ def _is_constant(run: Run, name: str) -> bool:
     return bool((constant | ~np.isfinite(changes[0] + changes[1])).all())
 
 
-def _of_one(run: Run, name: str, start: State, made: int, visited: Visited | None) -> str | None:
+def _of_one(run: Run, name: str, start: State, made: int, visited: Visited | None) -> About | None:
     """What is to be said of one invariant. States are evaluated together, since a call takes longer than a thousand numbers."""
     system = run.system
     # Of few members it takes some tenths of a millisecond; else a place takes as long as some hundred evaluations of the core.
@@ -126,8 +129,8 @@ def _of_one(run: Run, name: str, start: State, made: int, visited: Visited | Non
             barrier = (
                 _upright(run, between) if isinstance(system, Pendulum) else _searched(run, name, start, first, between, places)
             )
-            if (text := _of_a_barrier(run, name, first, barrier)) is not None:
-                return text
+            if (about := _of_a_barrier(run, name, first, barrier)) is not None:
+                return about
     return None if run.paces is None else _of_a_change(run, name, start, (first, last))
 
 
@@ -169,7 +172,7 @@ def _values(system: System, name: str, states: State) -> Array:
     return np.broadcast_to(system.recordable(name, *states, 1.0), states[1].shape[len(system.y_shape) :])
 
 
-def _of_a_change(run: Run, name: str, start: State, values: tuple[Array, Array]) -> str | None:
+def _of_a_change(run: Run, name: str, start: State, values: tuple[Array, Array]) -> About | None:
     """An invariant that has another size at the end."""
     first, last = values
     change = np.abs(last - first)
@@ -192,11 +195,12 @@ def _of_a_change(run: Run, name: str, start: State, values: tuple[Array, Array])
     if not wrong.any():
         return None
     index, some = tuple(np.argwhere(wrong)[0].tolist()), int(np.count_nonzero(wrong))
-    return (
+    text = (
         f"{share(some, wrong.shape, wrong.size)} {'has' if some == 1 else 'have'} another {name} at the end: "
         f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}{last[index]:.3g} instead of {first[index]:.3g}, "
         f"so {run.method.name} did not follow the motion"
     )
+    return text, wrong
 
 
 def _end(run: Run) -> State:
@@ -311,7 +315,7 @@ class Barrier(NamedTuple):
     height: Array
 
 
-def _of_a_barrier(run: Run, name: str, first: Array, barrier: Barrier) -> str | None:
+def _of_a_barrier(run: Run, name: str, first: Array, barrier: Barrier) -> About | None:
     """A motion along a line that passed a place where even at rest it would have more energy than it has."""
     passed = (barrier.height > first + ROUNDING * np.abs(first)) & (barrier.height < np.inf) & (run.status == 0)
     if not passed.any():
@@ -319,11 +323,12 @@ def _of_a_barrier(run: Run, name: str, first: Array, barrier: Barrier) -> str | 
     index, some = tuple(np.argwhere(passed)[0].tolist()), int(np.count_nonzero(passed))
     who = f"{in_words(index)} passed" if passed.size > 1 else "it passed"
     place, height, had = (float(np.broadcast_to(each, passed.shape)[index]) for each in (*barrier, first))
-    return (
+    text = (
         f"{share(some, passed.shape, passed.size)} did not follow the motion, by {run.method.name}: {who} y = {place:.4g}, where "
         f"even at rest the {name} is {height:.10g}, with {had:.10g} at the start; take "
         f"{'shorter steps' if run.paces is None else 'a smaller tolerance'}"
     )
+    return text, passed
 
 
 def _saved(run: Run, start: State) -> State:

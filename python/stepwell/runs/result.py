@@ -11,11 +11,12 @@ import numpy as np
 from ..base import checks, registry
 from ..base.arrays import Array, Whole
 from ..base.immutable import ValueEquality, by_value
-from ..base.reprs import MAX_LINE, counted, facts, share, shortened
+from ..base.reprs import MAX_LINE, counted, facts, shortened
 from ..errors import UnsupportedError
 from ..model.methods import Method
 from ..model.systems import System
 from .encounters import Collision, Encounter
+from .findings import Finding
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -74,7 +75,7 @@ class Paces(NamedTuple):
 
 @by_value
 class AdaptiveState(NamedTuple):
-    """The state from which ``integrate`` continues a run with a tolerance; the ``carry`` of its ``resume`` is ``pace``.
+    """The state from which ``integrate`` continues a run with a tolerance.
 
     Attributes:
         v: velocities of each member at its own time, shape (*block, *batch).
@@ -123,6 +124,7 @@ class Run(ValueEquality):
         work: the energy that a control or a projection added to each member in this run, or None, shape (*batch). For a control
             it is the sum over the steps of ((1 − g)² − 1)·K, the change by its push −g·v alone, averaged over the evaluations.
             None in a run of fixed steps with events; with adaptive steps NaN for members that stopped at one.
+        findings: what was noticed of the run and warned of: each a class of warning, a message, and of which members.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
@@ -136,6 +138,7 @@ class Run(ValueEquality):
 
     #: Names of the events that change the state, ``Event(…, then=…)``.
     changed_by: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     def __init__(
         self,
@@ -267,53 +270,6 @@ class Run(ValueEquality):
             raise UnsupportedError(f"encounters: {why}")
         found = (self.encounter(index) for index in np.ndindex(self.status.shape))
         return tuple(each for each in found if each is not None)
-
-    @property
-    def resume(self) -> dict[str, Any]:
-        """Arguments with which ``integrate`` continues from here, to the bit, as if the run had never stopped.
-
-        Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
-        last one. A carry is for the same method only; with another system, or ``v`` or ``y`` of your own, the run begins anew
-        from the state at its last time. ``save`` writes all of it to a file. ``dt`` is that of this run; another is refused,
-        since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are given again;
-        if one changes the state, ``integrate`` asks for them.
-
-        Raises:
-            UnsupportedError: if a terminal event stopped a member, which has a time of its own.
-        """
-        if (stopped := int(np.count_nonzero(self.status >= Status.EVENT))) > 0:
-            raise UnsupportedError(
-                f"resume: {share(stopped, self.status.shape, self.status.size)} stopped at an event, "
-                f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run "
-                + (
-                    "for each member i: v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])"
-                    if self.status.shape
-                    else "from there: v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)"
-                )
-            )
-        from . import continuation  # only runs that go on need it
-
-        told: dict[str, Any] = {"fused": True} if self.fused else {}
-        if self.dtype != "float64":
-            told["dtype"] = self.dtype
-        if self.changed_by:
-            told["changed_by"] = self.changed_by
-        if self.controller_state is not None:
-            return continuation.with_tolerance(self) | told
-        state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
-        state |= {"dt_before": self.dt, **told}
-        if self.start is not None:
-            state["start"] = self.start
-        if self.status.any():
-            state["first_bad_step"] = self.first_bad_step
-        if self.system.keeper is not None:
-            state["control"] = self.system.keeper
-        if self.force is not None:
-            state["force"] = self.force
-        if self.carry is None:
-            return state
-        carried_for = continuation.identity(self.system, self.status.shape, self.v[-1], self.y[-1])
-        return state | {"carry": self.carry, "carried_by": self.method.name, "carried_for": carried_for}
 
     def save(self, path: str | Path) -> None:
         """Write the run to a file, from which ``stepwell.load`` reads it again, bit for bit, and from which it goes on.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from ..errors import ToleranceWarning
 from ..model.systems import System
 from ..reference.around import wrapped
 from . import engine
+from .findings import Finding
 from .positive import name_of, places_of
 from .result import Run, Status
 
@@ -37,20 +37,20 @@ USUAL = 2.0**-10
 State = tuple[Array, Array]
 
 
-def warn_of_stops(run: Run) -> None:
-    """Warn of the members that stopped by themselves: how many, which first, when, and what is known of its cause."""
+def of_stops(run: Run) -> list[Finding]:
+    """The members that stopped by themselves: how many, which first, when, and what is known of its cause."""
     assert run.paces is not None
-    stopped = run.status != 0
+    if not np.count_nonzero(run.status) or not (stopped := (run.status != 0) & (run.status < Status.EVENT)).any():
+        return []
     elapsed = np.where(stopped, np.abs(run.paces.t - run.t0), np.inf)
     first = tuple(np.argwhere(elapsed == elapsed.min())[0].tolist())
     time, end = float(run.paces.t[first]), float(_of_member(run, run.t[-1], first))
-    some = int(np.count_nonzero(stopped))
-    warnings.warn(
-        f"{share(some, stopped.shape, stopped.size)} stopped before t = {end:g}"
-        f"{first_of(some, first, stopped.size) or ','} at t = {time:g}; {_why(run, first)}",
-        ToleranceWarning,
-        stacklevel=4,
+    number = int(np.count_nonzero(stopped))
+    text = (
+        f"{share(number, stopped.shape, stopped.size)} stopped before t = {end:g}"
+        f"{first_of(number, first, stopped.size) or ','} at t = {time:g}; {_why(run, first)}"
     )
+    return [Finding(ToleranceWarning, text, stopped)]
 
 
 def _why(run: Run, index: Shape) -> str:

@@ -72,7 +72,7 @@ class Tight:
             runs.append(run)
             if run.status:
                 break
-            self._place(float(part[-1]), (run.v[-1], run.y[-1]), run.resume if tight else None)
+            self._place(float(part[-1]), (run.v[-1], run.y[-1]), {"resume": run} if tight else None)
         missing = len(times) - sum(len(run.t) for run in runs)
         blocks = (np.concatenate([getattr(run, name) for run in runs]) for name in "vy")
         v, y = (np.concatenate([block, np.full((missing, *block.shape[1:]), np.nan)]) for block in blocks)
@@ -81,7 +81,7 @@ class Tight:
     def _place(self, time: float, state: tuple[Array, Array], on: dict[str, Any] | None) -> None:
         """Add a place from which to continue: by the run's own continuation, or from the state alone."""
         if on is None:
-            on = self._run(np.array([time]), self._fresh(time, state, self.tolerance)).resume
+            on = {"resume": self._run(np.array([time]), self._fresh(time, state, self.tolerance))}
         self._places.append((time, state, on))
 
     def _fresh(self, time: float, state: tuple[Array, Array], tolerance: float) -> dict[str, Any]:

@@ -82,7 +82,7 @@ class System(Immutable, ValueEquality, ABC):
     def _instead(self) -> str:
         return (
             f"make another {self.kind_name}, with what is to change; for a number that changes each frame use force=, or a state "
-            f"whose rate is zero. A World that goes on from here: World(system, method, dt=world.dt, **world.resume)"
+            f"whose rate is zero. A World that goes on from here: World(system, method, resume=world)"
         )
 
     def part(self, kind: str) -> Any:
@@ -271,8 +271,8 @@ class System(Immutable, ValueEquality, ABC):
         for each in self.all_inputs().values():
             each.check(last)
 
-    def doubt(self, y: Array) -> str | None:
-        """A message if the rates are meaningless at some of these coordinates, or None."""
+    def doubt(self, y: Array) -> tuple[str, Any] | None:
+        """A message if the rates are meaningless at some of these saved coordinates, and of which members; or None."""
         return None
 
     def for_state_shapes(self, *states: Any) -> System:

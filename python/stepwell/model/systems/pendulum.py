@@ -61,14 +61,15 @@ class Pendulum(System):
         """Parameters and input."""
         return {"omega": self.omega, "damping": self.damping, "a": signal(self.a)}
 
-    def doubt(self, y: Array) -> str | None:
+    def doubt(self, y: Array) -> tuple[str, Any] | None:
         """A message if an angle is too large for its sine to be known."""
         last = LAST_SINGLE_ANGLE if y.dtype == np.float32 else LAST_ANGLE
         with np.errstate(invalid="ignore"):
-            beyond = np.abs(y[np.isfinite(y) & (np.abs(y) > last)])
-        return (
-            f"an angle grew to {beyond.max():.3g} rad, and beyond {last:.3g} rad its sine means nothing" if beyond.size else None
-        )
+            beyond = np.isfinite(y) & (np.abs(y) > last)
+        if not beyond.any():
+            return None
+        largest = np.abs(y[beyond]).max()
+        return f"an angle grew to {largest:.3g} rad, and beyond {last:.3g} rad its sine means nothing", beyond.any(axis=0)
 
     def energy(self, v: Array, y: Array) -> Array:
         """Energy per moment of inertia, ½v² + ω₀²(1 − cos y), which is 0 at rest hanging down."""

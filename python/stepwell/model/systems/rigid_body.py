@@ -132,9 +132,10 @@ class RigidBody(System):
         """Whether there are torques or damping, so that the energy need not be constant; a weight has its share in the energy."""
         return bool(self.given_inputs()) or (self.damping is not None and bool((self.damping != 0.0).any()))
 
-    def doubt(self, y: Array) -> str | None:
+    def doubt(self, y: Array) -> tuple[str, Any] | None:
         """A message if a quaternion is zero, which is no attitude."""
-        return "a quaternion is zero, which is no attitude" if (y == 0.0).all(axis=1).any() else None
+        zero = (y == 0.0).all(axis=1)
+        return ("a quaternion is zero, which is no attitude", zero.any(axis=0)) if zero.any() else None
 
     def energy(self, v: Array, y: Array) -> Array:
         """½·ω·J·ω, and the height of ``centre`` above the fixed point times ``weight``."""

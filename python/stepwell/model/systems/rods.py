@@ -50,19 +50,20 @@ class RodSystem(System):
         """The quantities that can be recorded, with the shape of each."""
         return {name: each.shape(self.y_shape[-1]) for name, each in reference.QUANTITIES.items()}
 
-    def doubt(self, y: Array) -> str | None:
+    def doubt(self, y: Array) -> tuple[str, Any] | None:
         """A message if a rod has another length in the first or last of these states."""
         y = y[[0, -1]]
         batch = y.shape[1 + len(self.y_shape) :]
         with np.errstate(all="ignore"):
             error = np.asarray([self.reference_at_step(1.0, batch).record("length_error", each, each) for each in y])
-            wrong = error[np.isfinite(error) & (error > DOUBTFUL_LENGTH_ERROR)]
-        if not wrong.size:
+            wrong = np.isfinite(error) & (error > DOUBTFUL_LENGTH_ERROR)
+        if not wrong.any():
             return None
-        return (
-            f"a rod is {100.0 * wrong.max():.3g} % off its length in a saved state: the start has another, or the step is too "
-            f'long; control=LengthControl(0.5) or Projection("length") keeps it'
+        text = (
+            f"a rod is {100.0 * error[wrong].max():.3g} % off its length in a saved state: the start has another, or the step is "
+            f'too long; control=LengthControl(0.5) or Projection("length") keeps it'
         )
+        return text, wrong.reshape(-1, *batch).any(axis=0)
 
 
 def surfaces_for_rods(floor: Any, given: set[int]) -> tuple[tuple[surfaces.Surface, ...], set[int]]:

@@ -365,4 +365,4 @@ class _Resetting(_Driver):
         rests = (self._rests >= 0).reshape(self.plan.batch)
         if rests.any():
             run.status = np.where(rests, Status.REST, run.status).astype(np.int8)
-            self._resets.warn_of_rest(self._rests, self.stopped_at)
+            run.findings += (self._resets.of_rest(self._rests, self.stopped_at),)

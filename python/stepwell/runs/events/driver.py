@@ -337,4 +337,4 @@ class _Resetting(_Driver):
         rests = (self.rests >= 0).reshape(self.plan.batch)
         if rests.any():
             run.status = np.where(rests, Status.REST, run.status).astype(np.int8)
-            self.resets.warn_of_rest(self.rests, self.stopped_at)
+            run.findings += (self.resets.of_rest(self.rests, self.stopped_at),)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from ...base.arrays import Array, Whole
 from ...base.reprs import first_of, share
 from ...errors import EventWarning
+from ..findings import Finding
 from .collected import Collected
 from .parts import Changes
 from .traced import NewState
@@ -297,8 +297,8 @@ class Resets:
         share[returns >= 0] = np.inf
         return Ahead(share, stops, t, v, y, at, event), returns
 
-    def warn_of_rest(self, rests: Whole, times: Array) -> None:
-        """Warn of members that are at rest at an event, by its number, since these times; −1 for others."""
+    def of_rest(self, rests: Whole, times: Array) -> Finding:
+        """The members that are at rest at an event, by its number, since these times; −1 for others."""
         batch, is_at_rest = self._run.plan.batch, (rests >= 0).reshape(self._run.plan.batch)
         first = int(np.argmin(np.where(rests >= 0, self._way * times, np.inf)))
         some, place = int(is_at_rest.sum()), tuple(int(i) for i in np.unravel_index(first, batch)) if batch else ()
@@ -306,9 +306,8 @@ class Resets:
             why = "its change of the state leads back onto it, and the motion across it, so that it does not go on"
         else:
             why = "changes of its state follow each other within no time, so that it does not go on by them"
-        warnings.warn(
+        text = (
             f"{share(some, batch, is_at_rest.size)} came to rest at event {self._run.events[rests[first]].name}"
-            f"{first_of(some, place, is_at_rest.size) or ','} at t = {self._run.sign * times[first]:.9g}: {why}",
-            EventWarning,
-            stacklevel=5,
+            f"{first_of(some, place, is_at_rest.size) or ','} at t = {self._run.sign * times[first]:.9g}: {why}"
         )
+        return Finding(EventWarning, text, is_at_rest)

@@ -151,7 +151,7 @@ class AdaptiveTrials:
                 warnings.simplefilter("ignore", AccuracyWarning)
                 run = integrate(self.scene.system, method, at=self.asked[leg.end : end], max_steps=10**9, **leg.on)
             assert run.paces is not None
-            leg = Leg(end, run.resume, int(run.paces.evaluations) // method.attempt_evaluations)
+            leg = Leg(end, {"resume": run}, int(run.paces.evaluations) // method.attempt_evaluations)
             yield leg
             if run.status:
                 break

@@ -180,7 +180,7 @@ class Trials:
             while done < steps and worst <= self.lost:
                 number = min(piece, steps - done)
                 pieces.append(run := integrate(self.scene.system, method, steps=number, every=every, **state))
-                done, state = done + number, run.resume
+                done, state = done + number, {"resume": run}
                 worst = max(worst, float(self.scene.state_error(_part(run, np.array([-1])))[0]))
         self.work += self.evaluations(method) * done
         whole = copy.copy(pieces[-1])

@@ -11,11 +11,11 @@ from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError, ShapeError, UnsupportedError
 from ...model.methods import Method
-from ...runs.adaptive import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
 from ...runs.engine import PACE_NUMBERS
 from ...runs.request import goes_with_times
 from ...runs.result import Run, Status
 from ...runs.stops import WHY_STOPPED
+from ...runs.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
 from .axes import Grid
 from .exponents import Exponents
 from .observed import Piece

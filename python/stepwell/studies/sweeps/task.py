@@ -183,7 +183,8 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
     bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)
     parts.append({"status": status, "first_bad_step": bad})
     grown = _growth_of(task, given, last) if task.at is None else None
-    return Done(together(parts), last.system.doubt(last.y), lost(last), grown)
+    doubt = last.system.doubt(last.y)
+    return Done(together(parts), None if doubt is None else doubt[0], lost(last), grown)
 
 
 def _growth_of(task: Task, given: dict[str, Any], last: Run) -> Growth | None:
@@ -289,8 +290,7 @@ def _pieces_between_times(
 
 def _going_on(given: dict[str, Any], run: Run) -> dict[str, Any]:
     """Arguments with which a run goes on; what it does not carry, such as threads, is given again."""
-    kept = {name: value for name, value in given.items() if name in ("threads", "backend", "max_steps")}
-    return {**kept, **run.resume}
+    return {"resume": run} | {name: value for name, value in given.items() if name in ("threads", "backend", "max_steps")}
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,12 +15,13 @@ from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
 from ...base.tables import Table
-from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, ShapeError
+from ...errors import ArgumentError, ShapeError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import Oscillator
-from ...runs.integration import integrate
+from ...runs.integration import step
+from ...runs.request import Options, Request
 from .zplane import within
 
 if TYPE_CHECKING:
@@ -115,11 +115,8 @@ class StabilityMap(Table, ValueEquality):
         threshold = 2.0 * (1.0 + steps * float(norms.max(initial=0.0)))
         band = math.expm1(math.log(math.sqrt(2.0) * threshold) / steps)
         unit = np.eye(2).reshape(2, 2, 1, 1)
-        begin: dict[str, Any] = {"v": unit[0], "y": unit[1]} | ({"carry": unit[0]} if self.method.carry else {})
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DivergenceWarning)
-            warnings.simplefilter("ignore", AccuracyWarning)
-            run = integrate(self.system, self.method, dt=1.0, steps=steps, **begin)
+        request = Request.fixed(self.system, self.method, Options(v=unit[0], y=unit[1], dt=1.0, steps=steps))
+        run = step(request._replace(carried=self.method.carry is not None))
         slot = run.v[-1] if run.carry is None else run.carry
         with np.errstate(all="ignore"):
             kappa = 1.0 + self.nonnormal / self.imaginary  # infinite for two real ones, whose area says nothing

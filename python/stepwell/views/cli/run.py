@@ -17,7 +17,8 @@ from ...base import checks
 from ...base.pictures import new_figure
 from ...errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning, ToleranceWarning
 from ...model.controls import WAYS, AnyControl, EnergyControl, Projection
-from ...runs.integration import FORMS, integrate
+from ...runs.integration import integrate
+from ...runs.request import FORMS
 from ...runs.result import Run
 from ...scenes import Scene
 from ..charts import RunPicture, run_picture

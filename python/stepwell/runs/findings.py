@@ -1,0 +1,32 @@
+"""What a run noticed: data on the run, which the public functions turn into warnings."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.immutable import by_value
+
+
+@by_value
+class Finding(NamedTuple):
+    """Something that a run noticed.
+
+    Attributes:
+        category: the class of the warning, such as ``stepwell.DivergenceWarning``.
+        message: what was noticed, in words.
+        members: of which members, an array of truths of shape (*batch); ``run.select(members)`` is a run of them alone.
+    """
+
+    category: type[Warning]
+    message: str
+    members: np.ndarray[Any, np.dtype[np.bool_]]
+
+
+def warn_of(findings: Iterable[Finding], stacklevel: int = 2) -> None:
+    """Warn of findings, as of the caller of the function that calls this."""
+    for each in findings:
+        warnings.warn(each.message, each.category, stacklevel=stacklevel + 1)
