@@ -91,7 +91,7 @@ def suite(tree: Path, named: str, *files: str) -> int:
 
 def test_the_suite_tests_the_method(tree: Path) -> None:
     """Order, stability, matrix form, world, bits: by iterating over the catalogue. Graphs are of all methods at once."""
-    assert suite(tree, "midpoint", "orders", "stability", "world", "matrix") > 80
+    assert suite(tree, "midpoint", "orders", "stability", "world", "matrix") > 60
     assert suite(tree, "midpoint and reference", "bits") > 4
     assert suite(tree, "midpoint", "package", "quaternion_norm", "stability_series", "friction", "truth") > 25
     assert suite(tree, "the_title_of_the_figures", "looks") == 1
@@ -101,7 +101,7 @@ def test_the_suite_tests_the_method(tree: Path) -> None:
 def test_the_suite_tests_the_system(tree: Path) -> None:
     """The same graph by every method, and the same bits on every level, in any company, on threads, in pieces, diverged."""
     assert suite(tree, "Pol", "graphs", "tracing") > 5
-    assert suite(tree, "Pol", "bits") >= 8  # each test of bits has every system
+    assert suite(tree, "Pol", "bits") >= 7  # each test of bits has every system
 
 
 def test_the_command_line_and_the_docs_show_it(tree: Path) -> None:

@@ -362,7 +362,7 @@ def by_both_backends(every: Iterable[Case], several: Mapping[str, int], salt: st
 
 
 #: How many methods a test tries with each system, which draws them; in the long run all.
-SOME = pytest.mark.parametrize("some", family([4, None], lambda some: some is not None, lambda some: "some" if some else "all"))
+SOME = pytest.mark.parametrize("some", family([2, None], lambda some: some is not None, lambda some: "some" if some else "all"))
 
 
 def drawn(methods: Sequence[sw.Method], some: int | None, *salt: Any) -> list[sw.Method]:
