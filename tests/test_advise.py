@@ -12,9 +12,10 @@ import pytest
 import stepwell as sw
 from stepwell.studies.advice import by_cost_and_error
 from stepwell.studies.advice.candidates import Candidate
+from stepwell.studies.advice.costs import Times, cost_noise
 from stepwell.studies.advice.result import about
 from stepwell.studies.advice.search import Search
-from stepwell.studies.advice.trials import Times, Trial, cost_noise
+from stepwell.studies.advice.trials import Trial
 from support.advised import (  # noqa: F401
     RATIO,
     WORTH,

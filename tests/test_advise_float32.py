@@ -10,8 +10,9 @@ import pytest
 import stepwell as sw
 from stepwell.scenes import Scene
 from stepwell.studies.advice import Row
+from stepwell.studies.advice.costs import Times, single_name
 from stepwell.studies.advice.motion import motion_of
-from stepwell.studies.advice.trials import Times, Trials, single_name
+from stepwell.studies.advice.trials import Trials
 from stepwell.views import cli
 from support.advised import _times_are_measured_once, scene_of, unmeasured  # noqa: F401
 

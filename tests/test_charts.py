@@ -9,7 +9,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, UnknownNameError
 from stepwell.runs import engine
-from stepwell.studies.measuring import data, known, measure, peers
+from stepwell.studies.measuring import data, known, measure, peers, timing
 from support.charted import LADDER, METHODS, SCENES, the_charts, the_small, the_whole  # noqa: F401
 
 UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None]
@@ -205,15 +205,56 @@ def test_a_step_is_timed_per_member(monkeypatch):
     def integrate(system, method, *, v, y, dt, steps, threads, fused, dtype):
         nonlocal clock
         assert threads == 1
-        assert v.shape == y.shape == (3, 2, measure.MEMBERS)
-        clock += 1e-9 * steps * measure.MEMBERS
+        assert v.shape == y.shape == (3, 2, timing.CHARTS.members)
+        clock += 1e-9 * steps * timing.CHARTS.members
 
-    monkeypatch.setattr(measure, "integrate", integrate)
-    monkeypatch.setattr(measure.time, "perf_counter", lambda: clock)
-    times = measure.step_times(sw.scenes.clover(), METHODS[:2])
+    monkeypatch.setattr(timing, "integrate", integrate)
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: clock)
+    times = timing.step_times(sw.scenes.clover(), METHODS[:2])
     assert list(times) == [m.name for m in METHODS[:2]]
-    for timing in times.values():
-        assert (timing.median, timing.low, timing.high) == pytest.approx((1.0, 1.0, 1.0), rel=1e-6)
+    for each in times.values():
+        assert (each.median, each.low, each.high) == pytest.approx((1.0, 1.0, 1.0), rel=1e-6)
+
+
+@pytest.mark.parametrize("fused", [False, True])
+def test_a_tried_step_is_timed_per_member(monkeypatch, fused):
+    """With a clock that counts attempts times members, every attempt takes one nanosecond, of a batch and of one member."""
+    clock, tolerances = 0.0, set()
+
+    def integrate(system, method, *, v, y, **options):
+        nonlocal clock
+        run = sw.integrate(system, method, v=v, y=y, **options)
+        clock += 1e-9 * run.paces.evaluations.sum() / method.attempt_evaluations
+        tolerances.add((v.shape[2:], options["tolerance"]))
+        return run
+
+    monkeypatch.setattr(timing, "integrate", integrate)
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: clock)
+    monkeypatch.setattr(timing, "CHARTS", timing.CHARTS._replace(seconds=1e-6))
+    scene = dataclasses.replace(sw.scenes.clover(), horizon=0.5)
+    for members in (3, 0):
+        times = timing.tried_times(scene, [sw.method("merson"), sw.method("dop853")], members, fused)
+        assert [each.median for each in times.values()] == pytest.approx([1.0, 1.0])
+    assert tolerances == {((3,), timing.BATCH_TOLERANCE), ((), timing.BATCH_TOLERANCE), ((), timing.SINGLE_TOLERANCE)}
+
+
+def test_repeats_end_when_they_take_too_long(monkeypatch):
+    """A clock on which a step of the one takes a second, and one of the other a millisecond."""
+    clock, effort = 0.0, timing.Effort(members=4, numbers=64, fewest=1, seconds=0.01, repeats=5, slow=2.5)
+
+    def timed(seconds):
+        def steps(n):
+            nonlocal clock
+            clock += seconds * n
+            return seconds * n, n
+
+        return steps
+
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: clock)
+    repeats = timing.in_turns({"slow": timed(1.0), "quick": timed(0.001)}, effort, members=1)
+    assert [len(each) for each in repeats.values()] == [3, 3]
+    assert {round(x) for x in repeats["slow"]} == {10**9}
+    assert {round(x) for x in repeats["quick"]} == {10**6}
 
 
 def test_everything_but_the_time_is_repeatable(small):

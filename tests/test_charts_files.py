@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, UnknownNameError, UnsupportedError
-from stepwell.studies.measuring import data, measure, peers
+from stepwell.studies.measuring import data, peers, timing
 from stepwell.views.charts import style
 from support.charted import METHODS, SCENES, the_charts, the_small  # noqa: F401
 
@@ -200,7 +200,7 @@ def test_the_json_is_strict_and_whole(small, tmp_path):
     whole = json.loads((tmp_path / "chart.json").read_text(encoding="utf-8"), parse_constant=refuse)
     assert whole["scene"]["name"] == "forced_oscillator"
     assert whole["refused"] == small.refused
-    assert whole["measured_on"] == {"members": 4096, "threads": 1, "repeats": measure.REPEATS, "isa": sw.isa()}
+    assert whole["measured_on"] == {"members": 4096, "threads": 1, "repeats": timing.CHARTS.repeats, "isa": sw.isa()}
     assert [row["state_error"] for row in whole["rows"][:3]] == [p.state_error for p in small.curves[0].points]
     assert [row["method"] for row in whole["summary"]] == ["false_euler", "rk4"]
     assert data.finite({"a": [math.inf, 1.0], "b": math.nan}) == {"a": [None, 1.0], "b": None}

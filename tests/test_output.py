@@ -13,6 +13,7 @@ import pytest
 import stepwell as sw
 from stepwell.base import checks
 from stepwell.errors import ArgumentError, DTypeError
+from stepwell.studies.measuring import timing
 from stepwell.views import charts, cli
 
 #: Each command that writes: its words, what its work is done by, the name of a file, or one that it writes into a folder.
@@ -102,7 +103,7 @@ def test_what_was_found_is_printed_though_it_cannot_be_written(
 ) -> None:
     """As when the disk is full in the end."""
     words, _, file, _ = COMMANDS[command]
-    monkeypatch.setattr(charts.work_precision.__globals__["measure"], "REPEATS", 1)
+    monkeypatch.setattr(timing, "CHARTS", timing.CHARTS._replace(repeats=1))
 
     def full(*_: Any, **__: Any) -> Any:
         raise OSError(28, "No space left on device")

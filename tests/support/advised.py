@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.scenes import Scene
-from stepwell.studies.advice.trials import single_name
+from stepwell.studies.advice.costs import single_name
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 

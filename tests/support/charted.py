@@ -5,7 +5,7 @@ import importlib
 
 import pytest
 import stepwell as sw
-from stepwell.studies.measuring import measure
+from stepwell.studies.measuring import timing
 
 #: The scenes with a solution that a fixed step does well; the others have their own test of orders. That of a ball is not smooth.
 HARD = ("bouncing_ball", "figure_eight", "kepler", "pythagorean", "arenstorf", "sliding_block", "sticking_block")
@@ -45,8 +45,7 @@ def the_whole():
 
 def hasty(patched):
     """Times of steps are not what is looked at."""
-    patched.setattr(measure, "REPEATS", 2)
-    patched.setattr(measure, "TIMED_SECONDS", 1e-4)
+    patched.setattr(timing, "CHARTS", timing.CHARTS._replace(repeats=2, seconds=1e-4))
 
 
 @pytest.fixture(scope="module", name="small")

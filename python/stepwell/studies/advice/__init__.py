@@ -21,14 +21,15 @@ from ...runs import float32
 from ...runs.integration import integrate
 from ...scenes import Scene
 from ...scenes import scene as find_scene
-from ..measuring.measure import TIMED_STEP
+from ..measuring.timing import TIMED_STEP
 from . import predict
 from .adaptive import AdaptiveTrials
 from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed, Single
+from .costs import Times, step_times, tried_times
 from .motion import SINGLE_STEP_ROUNDING, Grid, Motion, motion_of
 from .result import Advice, Rejected, Row, Shortfall
 from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
-from .trials import ASYMPTOTIC_ERROR, Times, Trial, Trials, step_times, tried_times
+from .trials import ASYMPTOTIC_ERROR, Trial, Trials
 
 if TYPE_CHECKING:
     from ...base.literals import Cost, Dtypes

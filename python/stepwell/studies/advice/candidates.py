@@ -12,9 +12,10 @@ from typing import Protocol
 
 from ...model.methods import Method
 from .adaptive import AdaptiveTrials
+from .costs import single_name
 from .motion import Grid
 from .predict import keeps_margin, longest_step
-from .trials import ASYMPTOTIC_ERROR, Trial, Trials, single_name
+from .trials import ASYMPTOTIC_ERROR, Trial, Trials
 
 #: The k that stands for a tolerance of 1; one more makes steps 1.5 % shorter there.
 UNIT_TOLERANCE_K = 64

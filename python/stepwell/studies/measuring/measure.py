@@ -1,12 +1,11 @@
-"""Measurements of one method on one scene: its errors, whether it is stable, and its time."""
+"""Measurements of one method on one scene: its errors, and whether it is stable."""
 
 from __future__ import annotations
 
 import math
 import statistics
-import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from ...runs.result import Run
 from ...scenes import Scene
 from .data import Curve, Point, Timing
 from .peers import Peer, Solved
+from .timing import MOST_TRIED
 
 #: Errors are looked for in at least this many states of a run, or in all if it has fewer.
 SAMPLES = 1000
@@ -36,35 +36,12 @@ SAVED_TIMES = 10
 #: Extra steps for a saved state within a step: one that ends at it, and the step that passes it once more.
 EXTRA_STEPS = 2
 
-#: And it makes no more steps than this, rejected ones counted.
-MOST_TRIED = 10_000_000
-
 #: The phase error is searched from the best of so many shifts in time, evenly spaced over a period, if the state at the end is
 #: wrong by more than this.
 COARSE_SHIFTS, COARSE_SEARCH_ABOVE = 64, 0.05
 
-#: Members of the batch that is timed, on one thread: enough to hide the cost of the call, few enough for the cache.
-MEMBERS = 4096
-
-#: Step of a timed run, as a share of the scene's: so small that no method leaves the finite numbers.
-TIMED_STEP = 1e-4
-
-#: A batch that is timed has no more numbers than this in a block, so that a cluster of stars does not take minutes.
-NUMBERS = 65_536
-
-#: Tolerance of the runs with a tolerance that are timed: those of a batch, and those of one member, whose call must be lost among
-#: many steps.
-TIMED_TOLERANCE = {True: 1e-6, False: 1e-12}
-
-#: A batch with a tolerance is timed over this share of the horizon at first, doubled until it takes long enough.
-FIRST_PART = 1 / 256
-
 #: How often a peer is run at each of its settings; the median counts.
 PEER_REPEATS = 3
-
-#: A timed run takes at least this many seconds, fifty times a call's own cost, and there are so many of each method.
-TIMED_SECONDS = 0.005
-REPEATS = 11
 
 
 def refusal(scene: Scene, method: Method) -> str | None:
@@ -85,22 +62,25 @@ def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = Fa
         run = scene.run(method, dt, steps=steps, every=max(1, steps // SAMPLES), fused=fused, dtype=dtype)
     state_error, end_error, energy_error = _errors(scene, run)
     amplitude = scene.amplitude(run)
-    half = len(amplitude) // 2
-    # Not above the exact solution is no growth: a driven system may well start small. NaN is above everything.
-    grown = not amplitude[half:].max() <= MIN_GROWTH * max(1.0, float(amplitude[:half].max()))
     return Point(
         steps=steps,
         dt=dt,
         cost=engine.evaluations(method, scene.system) / dt,
         state_error=state_error,
         energy_error=energy_error,
-        unstable=grown and state_error > 1.0,
+        unstable=state_error > 1.0 and grew(amplitude, len(amplitude) // 2),
         end_error=end_error,
         phase_error=_phase(scene, run, state_error),
     )
 
 
-def asked(scene: Scene) -> Array:
+def grew(amplitude: Array, half: int) -> bool:
+    """Whether the amplitude of a run grows in its second half, which begins at state ``half``."""
+    # Not above the exact solution is no growth: a driven system may well start small. NaN is above everything.
+    return not amplitude[half:].max() <= MIN_GROWTH * max(1.0, float(amplitude[: max(1, half)].max()))
+
+
+def output_times(scene: Scene) -> Array:
     """The times at which a run with a tolerance, or a peer's, saves its state."""
     return np.linspace(0.0, scene.horizon, SAVED_TIMES + 1)[1:]
 
@@ -110,7 +90,7 @@ def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool
 
     Its cost includes rejected steps, and the extra steps for the state at the end, but not those for the other output times.
     """
-    times = asked(scene)
+    times = output_times(scene)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ToleranceWarning)
         warnings.simplefilter("ignore", AccuracyWarning)
@@ -139,7 +119,7 @@ def assess_peer(scene: Scene, peer: Peer) -> Curve:
     Raises:
         UnsupportedError: if the peer cannot do the scene, or is not installed.
     """
-    times = asked(scene)
+    times = output_times(scene)
     points, spent = [], []
     for setting in sorted(peer.settings, reverse=True):
         solved = [peer.solve(scene, times, setting) for _ in range(PEER_REPEATS)]
@@ -252,93 +232,3 @@ def largest_stable_step(
         point = assess(scene, method, middle, scene.steps_for(middle), fused, dtype)
         low, high = (low, middle) if point.unstable else (middle, high)
     return low
-
-
-def members_of(scene: Scene) -> int:
-    """How many members of the scene are timed as a batch."""
-    return max(8, min(MEMBERS, NUMBERS // max(1, scene.v.size, scene.y.size)))
-
-
-def step_times(
-    scene: Scene, methods: Sequence[Method], members: int | None = None, fused: bool = False, dtype: str = "float64"
-) -> dict[str, Timing]:
-    """Nanoseconds per step of one member of a batch, by method.
-
-    The time of a step depends neither on its length nor on the state, so one measurement serves a whole curve. The
-    methods take turns, so that whatever else the machine does meets them all alike.
-
-    Args:
-        scene: what to step.
-        methods: by which.
-        members: of the batch; ``members_of`` the scene if None, and 0 for a run without a batch.
-        fused: with fused multiply-adds.
-        dtype: in float64 or float32.
-    """
-    v, y, members = _batch(scene, members)
-    how: Any = {"threads": 1, "fused": fused, "dtype": dtype}
-
-    def timed(method: Method, steps: int) -> tuple[float, int]:
-        begin = time.perf_counter()
-        integrate(scene.system, method, v=v, y=y, dt=TIMED_STEP * scene.dt, steps=steps, **how)
-        return time.perf_counter() - begin, steps
-
-    # A step of many bodies alone takes long enough.
-    return _in_turns(methods, timed, 50 if scene.y.size <= 16 else 1, members)
-
-
-def tried_times(scene: Scene, methods: Sequence[Method], members: int | None = None, fused: bool = False) -> dict[str, Timing]:
-    """Nanoseconds per step that is tried, of one member of a batch, by method, in runs with a tolerance; as ``step_times``."""
-    v, y, members = _batch(scene, members)
-
-    def timed(method: Method, runs: int) -> tuple[float, int]:
-        # A batch goes over a part of the horizon at first, which is enough of most.
-        part = min(1.0, runs * FIRST_PART) if members > 1 else 1.0
-        begin, tried = time.perf_counter(), 0
-        for _ in range(max(1, round(runs * FIRST_PART)) if members > 1 else runs):
-            run = integrate(
-                scene.system,
-                method,
-                v=v,
-                y=y,
-                tolerance=TIMED_TOLERANCE[members > 1],
-                at=[part * scene.horizon],
-                dt=scene.dt,
-                threads=1,
-                fused=fused,
-                **scene.adaptive_options,
-            )
-            assert run.paces is not None
-            tried += int(run.paces.evaluations.max()) // method.attempt_evaluations
-        return time.perf_counter() - begin, tried
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ToleranceWarning)
-        warnings.simplefilter("ignore", AccuracyWarning)
-        return _in_turns(methods, timed, 1, members)
-
-
-def _batch(scene: Scene, members: int | None) -> tuple[Array, Array, int]:
-    """Blocks of equal members, or without a batch axis, and how many they are."""
-    members = members_of(scene) if members is None else members
-    v, y = (np.asarray(block) for block in (scene.v, scene.y))
-    if members:
-        v, y = (np.repeat(block[..., np.newaxis], members, axis=-1) for block in (v, y))
-    return v, y, max(1, members)
-
-
-def _in_turns(
-    methods: Sequence[Method], timed: Callable[[Method, int], tuple[float, int]], least: int, members: int
-) -> dict[str, Timing]:
-    sizes = {}
-    for method in methods:
-        n = least
-        timed(method, n)  # whose step is traced and written as machine code now, and not in what is timed
-        while timed(method, n)[0] < TIMED_SECONDS:
-            n *= 2
-        sizes[method.name] = n
-    found: dict[str, list[float]] = {method.name: [] for method in methods}
-    for _ in range(REPEATS):
-        for method in methods:
-            seconds, steps = timed(method, sizes[method.name])
-            found[method.name].append(1e9 * seconds / (steps * members))
-    return {name: Timing(statistics.median(ns), min(ns), max(ns)) for name, ns in found.items()}

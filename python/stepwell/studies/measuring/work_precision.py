@@ -15,7 +15,7 @@ from ...errors import ArgumentError, UnsupportedError
 from ...model.methods import Method, choice
 from ...scenes import Scene
 from ...scenes import scene as find_scene
-from . import measure
+from . import measure, timing
 from .data import Curve, WorkPrecision
 from .known import chartable
 from .peers import TOLERANCES, Peer, Solved
@@ -118,14 +118,14 @@ def work_precision(
             progress((len(curves) + len(refused) - len(chosen) + len(able)) / in_all)
 
     for kind, way in itertools.product(dtypes, ways):
-        batch, single = (measure.step_times(scene, able, members, way, kind) for members in (None, 0))
+        batch, single = (timing.step_times(scene, able, members, way, kind) for members in (None, 0))
         for method in able:
             points = tuple(measure.assess(scene, method, scene.horizon / n, n, way, kind) for n in ladder)
             edge = measure.largest_stable_step(scene, method, points, way, kind)
             curves.append(Curve(method, points, edge, batch[method.name], single[method.name], fused=way, dtype=kind))
             done()
     for way in ways:
-        batch, single = measure.tried_times(scene, adaptive, None, way), measure.tried_times(scene, adaptive, 0, way)
+        batch, single = timing.tried_times(scene, adaptive, None, way), timing.tried_times(scene, adaptive, 0, way)
         for method in adaptive:
             points = tuple(measure.assess_tolerance(scene, method, tolerance, way) for tolerance in asked)
             times = batch[method.name], single[method.name]
@@ -138,7 +138,9 @@ def work_precision(
             refused[peer.name] = str(error)
         done()
     cut = scene.horizon < whole.horizon
-    return WorkPrecision(scene, tuple(curves), refused, measure.members_of(scene), measure.REPEATS, _core.isa(), floor, cut)
+    return WorkPrecision(
+        scene, tuple(curves), refused, timing.CHARTS.members_of(scene), timing.CHARTS.repeats, _core.isa(), floor, cut
+    )
 
 
 def _ladder(scene: Scene) -> list[int]:

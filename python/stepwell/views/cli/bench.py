@@ -14,7 +14,8 @@ from ...errors import UnsupportedError
 from ...model.methods import Method, methods
 from ...runs.engine import evaluations
 from ...scenes import Scene, scene
-from ...studies.measuring.measure import REPEATS, members_of, refusal, step_times
+from ...studies.measuring.measure import refusal
+from ...studies.measuring.timing import CHARTS, step_times
 from . import options, show
 
 COLUMNS = ("method", "ns a step>", "±>", "ns an evaluation>", "times the least>", "share of all>", "steps a second>")
@@ -45,7 +46,7 @@ def command(args: argparse.Namespace) -> None:
     able = [each for each in chosen if each.name not in refused]
     if not able:
         raise UnsupportedError("; ".join(refused.values()))
-    members = members_of(one) if args.members is None else args.members
+    members = CHARTS.members_of(one) if args.members is None else args.members
     timed = rows(one, able, members, args.fused)
     show.listing(
         args,
@@ -65,7 +66,7 @@ def command(args: argparse.Namespace) -> None:
         ],
         timed,
         notes=[
-            f"± is by how much the median of {REPEATS} repeats is above their least, which is what is listed.",
+            f"± is by how much the median of {CHARTS.repeats} repeats is above their least, which is what is listed.",
             *(f"{name} is refused: {why}" for name, why in refused.items()),
         ],
     )
