@@ -244,8 +244,8 @@ class Explanation(ValueEquality):
         return "\n".join([*out, self.machine, *self.words()])
 
     def _hoisted(self) -> str:
-        said = [f"{n} {self._when(Section(when, ()))}" for when, n in self.hoisted.items() if n]
-        return f"Operations that are made before: {'; '.join(said) if said else 'none'}."
+        counts = [f"{n} {self._when(Section(when, ()))}" for when, n in self.hoisted.items() if n]
+        return f"Operations that are made before: {'; '.join(counts) if counts else 'none'}."
 
     def words(self) -> list[str]:
         """What names in the listing mean that are no arguments."""

@@ -27,28 +27,28 @@ def operations_of(function: str, single: bool = False) -> Body:
 def argument(function: str, operations: Sequence[Operation], line: int, single: bool = False) -> int | None:
     """The argument if this line is a value of the function, else None."""
     pattern, (root,) = operations_of(function, single)
-    found: dict[int, int] = {}
+    matched: dict[int, int] = {}
 
     def fits(place: int, line: int) -> bool:
-        if place in found:
-            return found[place] == line
+        if place in matched:
+            return matched[place] == line
         name, of, given = pattern[place]
         if name != "state":
             its_name, its_operands, its_given = operations[line]
             if (name, len(of), given) != (its_name, len(its_operands), its_given):
                 return False
-            before = dict(found)
+            before = dict(matched)
             if not all(map(fits, of, its_operands)):
-                found.clear()
-                found.update(before)
+                matched.clear()
+                matched.update(before)
                 if name not in COMMUTE or not all(map(fits, of, reversed(its_operands))):
                     return False
-        found[place] = line
+        matched[place] = line
         return True
 
     if not fits(root, line):
         return None
-    return next(found[place] for place, (name, _, _) in enumerate(pattern) if name == "state")
+    return next(matched[place] for place, (name, _, _) in enumerate(pattern) if name == "state")
 
 
 def named(operations: list[Operation], single: bool = False) -> None:

@@ -51,7 +51,7 @@ def head(w: Written, language: Skeleton, v: list[float], y: list[float]) -> list
 
 def _options(fused: bool, single: bool) -> str:
     """The arguments of integrate that decide on the bits."""
-    options = [text for text, given in (("fused=True", fused), ('dtype="float32"', single)) if given]
+    options = [text for text, is_on in (("fused=True", fused), ('dtype="float32"', single)) if is_on]
     return f"(..., {', '.join(options)})" if options else ""
 
 

@@ -117,10 +117,10 @@ class Writer:
                 operands.append(Formula(f"{text} != {self.language.literal(0.0)}", COMPARISON, is_truth=True))
             else:
                 operands.append(Formula(text))
-        made = self.language.formula(name, operands, given, bits)
-        if made.is_truth:
-            made = Formula(self.language.choice(made, *(Formula(self.language.literal(x)) for x in (1.0, 0.0))))
-        return self.language.text(made.text)
+        value = self.language.formula(name, operands, given, bits)
+        if value.is_truth:
+            value = Formula(self.language.choice(value, *(Formula(self.language.literal(x)) for x in (1.0, 0.0))))
+        return self.language.text(value.text)
 
     def at(self, array: str, places: Sequence[int]) -> str:
         """Element i of an array, for each i; what is one for all is no array."""
@@ -134,14 +134,14 @@ class Writer:
         table = self.tables.setdefault(tuple(places), f"places_{len(self.tables)}")
         return f"{array}[{self.language.table_name(table)}[i]]"
 
-    def moved(self, found: Sequence[Place], to: Sequence[Place]) -> list[Loop]:
+    def moved(self, begin_places: Sequence[Place], to: Sequence[Place]) -> list[Loop]:
         """Loops that write values to other arrays."""
         loops: list[Loop] = []
         begin = 0
-        for i in range(1, len(found) + 1):
-            if i == len(found) or (found[i][0], to[i][0]) != (found[begin][0], to[begin][0]):
-                ((array, _), *_), ((target, _), *_) = found[begin:i], to[begin:i]
-                text = self.at(array, [at for _, at in found[begin:i]])
+        for i in range(1, len(begin_places) + 1):
+            if i == len(begin_places) or (begin_places[i][0], to[i][0]) != (begin_places[begin][0], to[begin][0]):
+                ((array, _), *_), ((target, _), *_) = begin_places[begin:i], to[begin:i]
+                text = self.at(array, [at for _, at in begin_places[begin:i]])
                 loops.append(Loop(i - begin, self.at(target, [at for _, at in to[begin:i]]), text))
                 begin = i
         return loops

@@ -133,25 +133,25 @@ class Field(NamedTuple):
 
 def fields(numbers: list[tuple[str, float]], used: set[int], names: Names) -> tuple[list[Field], dict[int, tuple[str, Shape]]]:
     """Parameters that are used as fields, those of one array together; and of each parameter its field and its place there."""
-    found = [ELEMENT.fullmatch(name) for name, _ in numbers]
+    matches = [ELEMENT.fullmatch(name) for name, _ in numbers]
     # If x[1].amplitude exists, x[0] is not an element of an array.
     alone = {name.partition("[")[0] for name, _ in numbers if "]." in name} | {name for name, _ in numbers if "[" not in name}
     groups: dict[str, list[int]] = {}
     for i, (name, _) in enumerate(numbers):
-        match = found[i]
+        match = matches[i]
         groups.setdefault(match[1] if match and match[1] not in alone else name, []).append(i)
     out: list[Field] = []
     where: dict[int, tuple[str, Shape]] = {}
     for name, members in groups.items():
         if not used & set(members):
             continue
-        match = found[members[0]]
+        match = matches[members[0]]
         if match is None or match[1] != name:
             (i,) = members
             out.append(Field(names(name, f"parameter {name}"), name, [numbers[i][1]]))
             where[i] = out[-1].name, ()
             continue
-        places = [tuple(map(int, found[i][2].split(","))) for i in members]  # type: ignore[index]
+        places = [tuple(map(int, matches[i][2].split(","))) for i in members]  # type: ignore[index]
         shape = tuple(1 + max(axis) for axis in zip(*places, strict=True))
         values = dict.fromkeys(indices(shape), 0.0) | {place: numbers[i][1] for i, place in zip(members, places, strict=True)}
         out.append(Field(names(name, f"parameter {name}"), name, list(values.values()), shape))

@@ -160,7 +160,7 @@ class Written:
         language = self.language
         shapes = {each.name: each.shape for each in self.parameters}
         loops = LoopWriter(operations, language)
-        made: dict[int, LoopPlace] = {}
+        kept_places: dict[int, LoopPlace] = {}
 
         def before(line: int) -> LoopPlace:
             name, _, given = operations.all[line]
@@ -172,8 +172,8 @@ class Written:
 
         def source(part: Part, line: int) -> LoopPlace:
             name, _, given = operations.all[line]
-            if line in made:
-                return made[line]
+            if line in kept_places:
+                return kept_places[line]
             if name == "constant":
                 return language.text(language.number(given).text), -1
             if name == "time":
@@ -188,7 +188,7 @@ class Written:
         inner = [line for line in operations.needed(kept, lambda line: False) if operations.all[line][1]]
         try:
             first = loops.looped(inner, kept, before, keep=True)
-            made |= dict(zip(kept, [(f"{language.me}{self.array}", at) for _, at in first.places], strict=True))
+            kept_places |= dict(zip(kept, [(f"{language.me}{self.array}", at) for _, at in first.places], strict=True))
             self.loops = [
                 each._replace(
                     target=language.me + each.target.replace(MADE, self.array, 1),
@@ -198,7 +198,7 @@ class Written:
             ]
             self.made_size = first.size
             functions = {
-                name: self._loops(part, operations, loops, made, partial(source, part))
+                name: self._loops(part, operations, loops, kept_places, partial(source, part))
                 for name, part in self.traced.parts.items()
             }
         except NoLoopError:
@@ -211,32 +211,34 @@ class Written:
         part: Part,
         operations: Operations,
         loops: LoopWriter,
-        made: dict[int, LoopPlace],
+        kept_places: dict[int, LoopPlace],
         source: Callable[[int], LoopPlace],
     ) -> Function:
         needed = [
-            line for line in operations.needed(part.roots, made.__contains__) if operations.all[line][1] and line not in made
+            line
+            for line in operations.needed(part.roots, kept_places.__contains__)
+            if operations.all[line][1] and line not in kept_places
         ]
-        found = loops.looped(needed, part.roots, source, keep=False)
+        body = loops.looped(needed, part.roots, source, keep=False)
         # What stays as it was is read before anything is written.
-        own = [i for i, (array, _) in enumerate(found.places) if array != WORK]
-        aside = [(WORK, found.size + k) for k in range(len(own))]
-        values = list(found.places)
+        own = [i for i, (array, _) in enumerate(body.places) if array != WORK]
+        aside = [(WORK, body.size + k) for k in range(len(own))]
+        values = list(body.places)
         for i, place in zip(own, aside, strict=True):
             values[i] = place
         to: list[LoopPlace] = []
         for i, name in enumerate(part.results):
             block = name.partition("'")[0]
             to.append((f"#{block}", -1 if block == TALLY else i if i < self.n_v else i - self.n_v))
-        lines = [*found.loops, *loops.moved([found.places[i] for i in own], aside), *loops.moved(values, to)]
+        lines = [*body.loops, *loops.moved([body.places[i] for i in own], aside), *loops.moved(values, to)]
         needs_time = any(re.search(r"\bt\b", text) for text in texts(lines))
-        return Function([], needs_time, [], list(lines), [], found.size + len(own))
+        return Function([], needs_time, [], list(lines), [], body.size + len(own))
 
     def _function(self, part: Part, operations: Operations, kept: list[int], known: list[Leaf]) -> Function:
         language, tape = self.language, part.tape
         language.names = Names(LOCALS)
         reads: dict[int, Place] = {}
-        asked: set[str] = set()
+        leaf_names: set[str] = set()
 
         def place(names: list[str], i: int) -> Place:
             """The place of a number of the state; the sum of a control comes last."""
@@ -251,7 +253,7 @@ class Written:
         entries: list[Leaf] = []
 
         def leaf(name: str, given: int) -> Leaf:
-            asked.add(name)
+            leaf_names.add(name)
             match name:
                 case "made":  # names are by numbers on a tape, here that of the step
                     return known[given] if tape is self.traced.parts["step"].tape else known[given]._replace(symbol=None)
@@ -291,7 +293,7 @@ class Written:
         writes = [place(part.results, i) for i in range(len(part.results))]
         return Function(
             [reads[i] for i in sorted(reads)],
-            "time" in asked,
+            "time" in leaf_names,
             of_time_lines,
             lines,
             writes,

@@ -319,8 +319,8 @@ class Advice:
         same = [row.name for row in self.ranked[1:] if row.seconds_per_time <= alike and row.error >= best.error]
         if not same:
             return []
-        said = f"{'; '.join(same)} cost{'s' * (len(same) == 1)} the same, and the error is larger"
-        return [f"As far as can be measured (±{100 * self.cost_noise:.0f} %), {said}."]
+        sentence = f"{'; '.join(same)} cost{'s' * (len(same) == 1)} the same, and the error is larger"
+        return [f"As far as can be measured (±{100 * self.cost_noise:.0f} %), {sentence}."]
 
     def _beside(self, best: Row) -> list[str]:
         """What float32 gains and costs, where it was asked for."""
@@ -353,9 +353,9 @@ class Advice:
         lines = ["Nothing fits."]
         if gap.method is not None:
             within = "within the budget" if self.budget is not None else "found"
-            how = f"{gap.substeps} {unit}" if gap.tolerance is None else f"a tolerance of {gap.tolerance:g}"
+            steps = f"{gap.substeps} {unit}" if gap.tolerance is None else f"a tolerance of {gap.tolerance:g}"
             single = " in float32" if gap.dtype == "float32" else ""
-            lines.append(f"The least error {within} is {gap.least_error:.2g}, by {gap.method}{single} with {how}.")
+            lines.append(f"The least error {within} is {gap.least_error:.2g}, by {gap.method}{single} with {steps}.")
         elif self.budget is not None:
             lines.append(f"The budget of {self.budget:.3g} s {per} does not suffice for one step of any method.")
         if gap.needed_budget is not None:
@@ -397,10 +397,10 @@ class Advice:
             for each in self.rejected:
                 if each.kind == kind:
                     reasons.setdefault(each.reason, []).append(each.name)
-            said = ["; ".join(names) for names in reasons.values()]
-            lines += [f"{names}: {reason}" for names, reason in zip(said[:most], reasons, strict=False)]
-            if most is not None and len(said) > most:
-                lines.append(f"{kind} likewise: {'; '.join(said[most:])}")
+            groups = ["; ".join(names) for names in reasons.values()]
+            lines += [f"{names}: {reason}" for names, reason in zip(groups[:most], reasons, strict=False)]
+            if most is not None and len(groups) > most:
+                lines.append(f"{kind} likewise: {'; '.join(groups[most:])}")
         return lines
 
     def plot(self, path: str | Path | None = None) -> Figure:
@@ -428,8 +428,8 @@ class Advice:
         """What was asked."""
         frame = "any step" if self.frame is None else f"frame {self.frame:.4g}"
         per = "a unit of time" if self.frame is None else "a frame"
-        asked = f"error of {self.tolerance:g} or less up to t = {self.scene.horizon:.4g}, {frame}"
-        return f"{self.scene.title}: {asked}; costs are for {per}"
+        request = f"error of {self.tolerance:g} or less up to t = {self.scene.horizon:.4g}, {frame}"
+        return f"{self.scene.title}: {request}; costs are for {per}"
 
     def __str__(self) -> str:
         lines = [self.title, *self.summary()]
@@ -452,9 +452,9 @@ class Advice:
         best = self.best
         if best is None:
             return f"<advice for {self.scene.name}: nothing fits>"
-        how = f"dt = {best.dt:g}" if best.tolerance is None else f"tolerance {best.tolerance:g}"
+        steps = f"dt = {best.dt:g}" if best.tolerance is None else f"tolerance {best.tolerance:g}"
         single = ", float32" if best.dtype == "float32" else ""
-        return f"<advice for {self.scene.name}: {best.method.name}{single}, {how}, error {best.error:.2g}>"
+        return f"<advice for {self.scene.name}: {best.method.name}{single}, {steps}, error {best.error:.2g}>"
 
 
 def about(number: int) -> str:
@@ -499,9 +499,9 @@ def _margin(row: Row) -> str:
         if row.limit == 0.0:
             return f"It is never stable: {row.mode}{turns} grows slowly with every step, so not beyond this horizon.{seen}"
         return f"It blows up beyond dt = {row.limit:.5g}, a step {row.margin:.3g} times as long: {row.mode}{turns}."
-    said = f"It blows up beyond about dt = {row.observed_limit:.3g}, a step {row.margin:.3g} times as long."
+    sentence = f"It blows up beyond about dt = {row.observed_limit:.3g}, a step {row.margin:.3g} times as long."
     if math.isinf(row.observed_limit):
-        said = "No step that was tried blows up."
+        sentence = "No step that was tried blows up."
     if row.limit and row.mode_frequency:
-        said += f" The fastest oscillation along the motion,{turns[3:]}, could be held up to dt = {row.limit:.3g}."
-    return said
+        sentence += f" The fastest oscillation along the motion,{turns[3:]}, could be held up to dt = {row.limit:.3g}."
+    return sentence

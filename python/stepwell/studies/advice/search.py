@@ -125,11 +125,11 @@ class Search:
         return min(self.short, self.longest, RUN_SHARE * max(0.0, TOTAL_BUDGET * self.longest - self.spent()))
 
     def cost(self, candidate: Candidate, k: int) -> float:
-        """Of a span, in a run that was made."""
+        """The cost of a span, in a run that was made."""
         return self.prices[candidate.name] * candidate.look(k).steps / self.spans
 
     def allowed(self, candidate: Candidate) -> float:
-        """The error that its runs may have."""
+        """The error that the candidate's runs may have."""
         return self.tolerance * candidate.share
 
     def good(self, candidate: Candidate, k: int) -> bool:
@@ -137,13 +137,13 @@ class Search:
         return candidate.look(k).error <= self.allowed(candidate)
 
     def confirmed(self, candidate: Candidate, k: int) -> bool:
-        """Whether it is so at every step."""
+        """Whether the run is good enough at every step."""
         return self.good(candidate, k) and candidate.confirm(k).error <= self.allowed(candidate)
 
     def affordable(self, candidate: Candidate, k: int, known: int) -> bool:
-        """Whether the run is short enough to be made, by one that was."""
-        made = candidate.look(known)
-        return candidate.possible(k) and made.steps * candidate.evaluations * (k / known) <= self.most
+        """Whether the run is short enough to be tried, judged by the run with ``known``."""
+        trial = candidate.look(known)
+        return candidate.possible(k) and trial.steps * candidate.evaluations * (k / known) <= self.most
 
     def run(
         self,

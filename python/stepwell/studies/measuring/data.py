@@ -238,7 +238,7 @@ class WorkPrecision(Drawn, Table, ValueEquality):
         """
         known("error", error, ERRORS)
         known("cost", cost, COSTS)
-        found = [
+        points = [
             (spent, point.error(error), i, curve, point)
             for i, curve in enumerate(self.curves)
             for dependable in [curve.dependable(error, self.floor)]
@@ -250,7 +250,7 @@ class WorkPrecision(Drawn, Table, ValueEquality):
         ]
         rows: list[dict[str, Any]] = []
         least = math.inf
-        for spent, wrong, _, curve, point in sorted(found, key=lambda each: each[:3]):
+        for spent, wrong, _, curve, point in sorted(points, key=lambda each: each[:3]):
             if wrong < least:
                 least = wrong
                 which = {"steps": point.steps, "dt": point.dt, "tolerance": point.tolerance}

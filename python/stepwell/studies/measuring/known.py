@@ -50,10 +50,11 @@ def dense(exact: Exact, until: float) -> Exact:
     wanted = exact(between)
     nodes = FIRST_NODES
     while True:
-        found = Interpolant(*exact(np.linspace(0.0, until, nodes + 1)), until / nodes)
-        apart = max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in zip(found(between), wanted, strict=True) if b.size)
+        interpolant = Interpolant(*exact(np.linspace(0.0, until, nodes + 1)), until / nodes)
+        pairs = zip(interpolant(between), wanted, strict=True)
+        apart = max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in pairs if b.size)
         if apart <= MAX_INTERPOLATION_ERROR or nodes >= MAX_NODES:
-            return found
+            return interpolant
         nodes *= 2
 
 
@@ -77,12 +78,12 @@ class Interpolant(ValueEquality):
         place = np.asarray(t, dtype=np.float64) / self.spacing
         first = np.clip(np.floor(place).astype(np.int64) - (INTERPOLATION_POINTS // 2 - 1), 0, last + 1 - INTERPOLATION_POINTS)
         u = place - first
-        found = []
+        blocks = []
         for block in (self.v, self.y):
             value = np.zeros((len(u), *block.shape[1:]))
             for j in range(INTERPOLATION_POINTS):
                 others = [k for k in range(INTERPOLATION_POINTS) if k != j]
                 share = np.prod([(u - k) / (j - k) for k in others], axis=0)
                 value += share.reshape(-1, *(1,) * (block.ndim - 1)) * block[first + j]
-            found.append(value)
-        return found[0], found[1]
+            blocks.append(value)
+        return blocks[0], blocks[1]

@@ -105,15 +105,15 @@ class Peer(ValueEquality):
         return Peer, (self.name, self.solve, self.settings, self.by, self.order)
 
 
-def peer(given: Peer | Callable[[Scene, Array, float], Solved]) -> Peer:
+def peer(function: Peer | Callable[[Scene, Array, float], Solved]) -> Peer:
     """A peer of a function: its name is the function's, its settings are tolerances.
 
     Raises:
         DTypeError: if it is neither a peer nor a function.
     """
-    if not isinstance(given, Peer) and not callable(given):
-        raise DTypeError(f"peers: expected a Peer, such as peers.scipy(), or a function, got {short(given)}")
-    return given if isinstance(given, Peer) else Peer(getattr(given, "__name__", type(given).__name__), given)
+    if not isinstance(function, Peer) and not callable(function):
+        raise DTypeError(f"peers: expected a Peer, such as peers.scipy(), or a function, got {short(function)}")
+    return function if isinstance(function, Peer) else Peer(getattr(function, "__name__", type(function).__name__), function)
 
 
 def scipy(method: str = "RK45", settings: Sequence[float] = TOLERANCES) -> Peer:
@@ -160,11 +160,11 @@ class ByScipy(ValueEquality):
         start = np.concatenate([np.ravel(scene.v), np.ravel(scene.y)])
         begin = time.perf_counter()
         span = 0.0, float(times[-1])
-        found = solver.solve_ivp(rates, span, start, method=self.method, t_eval=times, rtol=tolerance, atol=tolerance)
+        solution = solver.solve_ivp(rates, span, start, method=self.method, t_eval=times, rtol=tolerance, atol=tolerance)
         seconds = time.perf_counter() - begin
         states = np.full((len(times), len(start)), np.nan)
-        states[: found.y.shape[1]] = found.y.T
-        return Solved(*_blocks(scene, states), int(found.nfev), seconds)
+        states[: solution.y.shape[1]] = solution.y.T
+        return Solved(*_blocks(scene, states), int(solution.nfev), seconds)
 
 
 def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:

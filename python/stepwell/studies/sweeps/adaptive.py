@@ -19,13 +19,13 @@ from ...runs.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_se
 from .axes import Grid
 from .exponents import Exponents
 from .observed import Piece
-from .outcomes import Found, Outcome, Reduction, Variable
+from .outcomes import Found, Outcome, ReducedOutcome, Reduction, Variable
 
 #: A member takes so many numbers for the step-size controller while it is computed: before, after, and as it is handed over.
 NUMBERS_OF_A_CONTROLLER = 4 * PACE_NUMBERS
 
 
-class Evaluations(Outcome):
+class Evaluations(ReducedOutcome):
     """What a member cost, with a tolerance: ``evaluations``, ``accepted_steps``, ``rejected_steps``.
 
     Those of ``run.paces``: function (rate) evaluations of accepted and rejected steps, and of the extra steps for the times of
@@ -49,7 +49,7 @@ class _Evaluations(Reduction):
     def see(self, piece: Piece) -> None:
         self.run = piece.run
 
-    def found(self) -> Found:
+    def results(self) -> Found:
         paces = self.run.paces
         assert paces is not None
         return {

@@ -158,18 +158,18 @@ def grid(axes: Any) -> Grid:
     return Grid([_axis(name, value) for name, value in axes.items()])
 
 
-def _axis(name: Any, given: Any) -> Axis:
+def _axis(name: Any, axis: Any) -> Axis:
     if not isinstance(name, str) or not name.isidentifier():
         raise ArgumentError(f"axes: expected names of arguments, got {checks.short(name)}")
     argument, attrs = f"axes: {name}", {}
-    if hasattr(given, "dims") and hasattr(given, "values"):  # of xarray
-        dims, values, attrs = given.dims, given.values, dict(given.attrs)
-    elif isinstance(given, tuple) and given and (isinstance(given[0], str) or _words(given[0])):
-        if len(given) not in (2, 3):
+    if hasattr(axis, "dims") and hasattr(axis, "values"):  # of xarray
+        dims, values, attrs = axis.dims, axis.values, dict(axis.attrs)
+    elif isinstance(axis, tuple) and axis and (isinstance(axis[0], str) or _words(axis[0])):
+        if len(axis) not in (2, 3):
             raise ShapeError(
-                f"{argument}: expected (dimension, values) or (dimension, values, attributes), got {len(given)} parts"
+                f"{argument}: expected (dimension, values) or (dimension, values, attributes), got {len(axis)} parts"
             )
-        dims, values, *more = given
+        dims, values, *more = axis
         if more:
             if not isinstance(more[0], Mapping):
                 raise DTypeError(
@@ -177,7 +177,7 @@ def _axis(name: Any, given: Any) -> Axis:
                 )
             attrs = dict(more[0])
     else:
-        dims, values = name, given
+        dims, values = name, axis
     dims = (dims,) if isinstance(dims, str) else tuple(dims)
     numbers = checks.numbers(argument, values, positive=name in ("dt", "tolerance"))
     if len(set(dims)) < len(dims) or not all(isinstance(dim, str) and dim for dim in dims):

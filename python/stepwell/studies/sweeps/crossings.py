@@ -13,7 +13,7 @@ from ...errors import ShapeError
 from ...model.systems import System
 from ...runs.result import Run
 from .observed import Of, Piece, checked, name_of, possible, rates
-from .outcomes import Found, Outcome, Reduction, Variable, called
+from .outcomes import Found, ReducedOutcome, Reduction, Variable, called
 
 if TYPE_CHECKING:
     from ...base.literals import Direction
@@ -26,7 +26,7 @@ HALVINGS = 53
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 
-class _Passages(Outcome):
+class _Passages(ReducedOutcome):
     """Of a level."""
 
     def __init__(self, of: Any = "y", level: float = 0.0, direction: int | Direction = 1, *, name: str | None = None) -> None:
@@ -196,7 +196,7 @@ class _Crossing(_Seeing):
         if new.any():
             self.time = np.where(new, states.times(states.mask.argmax(axis=0), new), self.time)
 
-    def found(self) -> Found:
+    def results(self) -> Found:
         name = self.outcome.name
         about = f"first time at which {name} passes {self.outcome.level:g}, {WORDS[self.outcome.direction]}"
         assert self.time is not None
@@ -214,13 +214,13 @@ class _Period(_Seeing):
             self.count = np.zeros(states.value.shape[1:], dtype=np.int64)
         if len(states.mask) == 0 or not states.mask.any():
             return
-        some: Mask = np.asarray(states.mask.any(axis=0))
-        new = some & (self.count == 0)
+        passing: Mask = np.asarray(states.mask.any(axis=0))
+        new = passing & (self.count == 0)
         self.first = np.where(new, states.times(states.mask.argmax(axis=0), new), self.first) if new.any() else self.first
-        self.last = np.where(some, states.times(len(states.mask) - 1 - states.mask[::-1].argmax(axis=0), some), self.last)
+        self.last = np.where(passing, states.times(len(states.mask) - 1 - states.mask[::-1].argmax(axis=0), passing), self.last)
         self.count = self.count + states.mask.sum(axis=0)
 
-    def found(self) -> Found:
+    def results(self) -> Found:
         name = self.outcome.name
         assert self.first is not None
         with np.errstate(all="ignore"):

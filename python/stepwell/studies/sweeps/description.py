@@ -22,7 +22,7 @@ from .task import Task
 
 
 def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str, str]) -> Layout:
-    """How the results of a task are laid out, and what is told of it.
+    """The layout of the results of a task, and its description in attributes.
 
     Args:
         task: what is done with every chunk.
@@ -35,7 +35,7 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
     renamed = {"t": "saved"} if grid.of_dt else {}
     if task.kinds(History):
         coords["t"] = _times(task, grid, renamed, units)
-    told: dict[str, Any] = {
+    identity: dict[str, Any] = {
         "stepwell": str(_core.__version__),
         "system": system.kind_name,
         "method": task.method,
@@ -43,41 +43,41 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
         "transient": task.transient,
         "observe": task.observe,
         "every": task.every,
-        "outcomes": [_told(each) for each in task.outcomes],
+        "outcomes": [_identity(each) for each in task.outcomes],
         "axes": {axis.argument: f"along {', '.join(axis.dims)}: {_digest(axis.values)}" for axis in grid.axes},
         "given": {name: _digest(value) for name, value in task.given.items() if name != "threads"},
         "first steps": bits,
     }
     if "events" in task.given:
-        told["given"]["events"] = [_told(each) for each in task.given["events"]]
+        identity["given"]["events"] = [_identity(each) for each in task.given["events"]]
     if task.at is not None:
-        told["at"] = _digest(task.at)
+        identity["at"] = _digest(task.at)
     attrs: dict[str, Any] = {
         "title": f"{system.kind_name} by {find_method(task.method).title}: a sweep of {counted(grid.members, 'member')}",
         "stepwell_version": str(_core.__version__),
         "numpy_version": np.__version__,
         "system": repr(task.system) if isinstance(task.system, System) else system.kind_name,
         "method": task.method,
-        **_steps_told(task, grid),
+        **_step_facts(task, grid),
         "t0": task.given["t0"],
         "fused": int(task.given["fused"]),
         **({"dtype": "float32"} if task.single else {}),
         **({} if task.every is None else {"every": task.every}),
         **({"control": repr(task.given["control"])} if "control" in task.given else {}),
-        SWEEP: json.dumps(told, ensure_ascii=False),
+        SWEEP: json.dumps(identity, ensure_ascii=False),
     }
     return Layout(grid, coords, attrs, units, renamed)
 
 
-def _steps_told(task: Task, grid: Grid) -> dict[str, Any]:
+def _step_facts(task: Task, grid: Grid) -> dict[str, Any]:
     """How long the steps are, and how many."""
     if task.at is None:
         dt = {} if grid.of_dt else {"dt": task.given["dt"]}
         return {**dt, "steps": task.steps, "transient": task.transient, "observe": task.observe}
-    told: dict[str, Any] = {name: task.given[name] for name in ("dt", "max_steps") if name in task.given}
+    facts: dict[str, Any] = {name: task.given[name] for name in ("dt", "max_steps") if name in task.given}
     if (tolerance := task.given.get("tolerance")) is not None:
-        told["tolerance"] = repr(tolerance) if isinstance(tolerance, tuple) else float(tolerance)
-    return told | {"end": float(task.at[-1])}
+        facts["tolerance"] = repr(tolerance) if isinstance(tolerance, tuple) else float(tolerance)
+    return facts | {"end": float(task.at[-1])}
 
 
 def _times(
@@ -106,14 +106,14 @@ def _digest(value: Any) -> str:
     return f"{array.shape} {blake2b(np.ascontiguousarray(array).tobytes(), digest_size=8).hexdigest()}"
 
 
-def _told(value: Any) -> Any:
+def _identity(value: Any) -> Any:
     """An outcome in words that are the same in every process; a function by its name and its instructions."""
     if isinstance(value, Event):
-        return {name: _told(part) for name, part in vars(value).items()}
+        return {name: _identity(part) for name, part in vars(value).items()}
     if isinstance(value, Outcome):
-        return {"kind": type(value).__name__, **{name: _told(each) for name, each in vars(value).items()}}
+        return {"kind": type(value).__name__, **{name: _identity(each) for name, each in vars(value).items()}}
     if isinstance(value, partial):
-        return [_told(value.func), repr(value.args), repr(value.keywords)]
+        return [_identity(value.func), repr(value.args), repr(value.keywords)]
     code = getattr(value, "__code__", None)
     if code is not None:
         plain = [each for each in code.co_consts if not hasattr(each, "co_code")]
@@ -121,4 +121,4 @@ def _told(value: Any) -> Any:
         return f"{value.__qualname__} {digest.hexdigest()}"
     if callable(value):
         return getattr(value, "__qualname__", type(value).__qualname__)
-    return [_told(each) for each in value] if isinstance(value, tuple) else value
+    return [_identity(each) for each in value] if isinstance(value, tuple) else value

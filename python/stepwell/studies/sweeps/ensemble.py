@@ -252,27 +252,28 @@ def _fits_single(grid: Grid, paced: bool) -> None:
             float32.rounded_step(float(axis.values.min()))
 
 
-def _outcomes(given: Any, every: int | None) -> tuple[Outcome, ...]:
-    if given is None:
-        given = "last" if every is None else "history"
-    several = [given] if isinstance(given, (str, Outcome)) or callable(given) else checks.several("outcomes", given, "outcomes")
-    found: list[Outcome] = []
+def _outcomes(outcomes: Any, every: int | None) -> tuple[Outcome, ...]:
+    if outcomes is None:
+        outcomes = "last" if every is None else "history"
+    is_one = isinstance(outcomes, (str, Outcome)) or callable(outcomes)
+    several = [outcomes] if is_one else checks.several("outcomes", outcomes, "outcomes")
+    chosen: list[Outcome] = []
     for each in several:
         if isinstance(each, str):
-            found.append(WORDS[checks.known("outcomes", each, WORDS)]())
+            chosen.append(WORDS[checks.known("outcomes", each, WORDS)]())
         elif isinstance(each, Outcome):
-            found.append(each)
+            chosen.append(each)
         elif isinstance(each, type) and issubclass(each, Outcome) and each is not Function:
-            found.append(each())
+            chosen.append(each())
         elif callable(each):
-            found.append(Function(each))
+            chosen.append(Function(each))
         else:
             raise DTypeError(f"outcomes: expected words, outcomes or functions of a run, got {checks.short(each)}")
-    if not found:
+    if not chosen:
         raise ArgumentError(f"outcomes: expected at least one of {', '.join(WORDS)}, or a function of a run, got none")
-    if every is not None and not any(isinstance(each, (History, Function)) for each in found):
+    if every is not None and not any(isinstance(each, (History, Function)) for each in chosen):
         raise ArgumentError("every: goes with the outcome 'history' or a function of a run; reductions see states by observe=")
-    return tuple(found)
+    return tuple(chosen)
 
 
 def _probe(task: Task, grid: Grid) -> tuple[System, str, set[str]]:
@@ -281,11 +282,11 @@ def _probe(task: Task, grid: Grid) -> tuple[System, str, set[str]]:
     for member in dict.fromkeys((0, grid.members - 1)):
         index = np.unravel_index(member, grid.shape)
         one = Chunk(tuple(map(int, index)), tuple(slice(int(i), int(i) + 1) for i in index), (1,) * len(index), member)
-        found = probed(task, grid.values(one))
-        for block in found.state:
+        tested = probed(task, grid.values(one))
+        for block in tested.state:
             digest.update(np.where(np.isnan(block), np.nan, block).tobytes())
         if member == 0:
-            first = found
+            first = tested
     return first.system, digest.hexdigest(), first.names
 
 

@@ -47,26 +47,30 @@ class Exponents(Outcome):
         self,
         system: System,
         method: str,
-        given: dict[str, Any],
+        options: dict[str, Any],
         transient: int,
         steps: int,
         look: Callable[[], object],
         at: Array | None = None,
     ) -> Found:
-        """Of members that start so; ``look`` is called now and then, and may raise. ``at`` has the times, with a tolerance."""
+        """The exponents of members with these start values and options.
+
+        ``look`` is called now and then, and may raise. ``at`` has the output times of adaptive steps.
+        """
         from ...analysis.dynamics.exponents import adaptive_averages, averages
 
-        if refused := [name for name in ("control", "dtype", "force", "fused", "start") if given.get(name)]:
+        if refused := [name for name in ("control", "dtype", "force", "fused", "start") if options.get(name)]:
             raise ArgumentError(f"{', '.join(refused)}: goes without Lyapunov exponents, which are those of plain steps")
-        more: dict[str, Any] = {"exponents": self.exponents, "t0": given["t0"], "keep_history": False, "look": look, "threads": 1}
-        v, y, dt = given.get("v"), given["y"], given.get("dt")
+        more: dict[str, Any] = {"exponents": self.exponents, "t0": options["t0"], "keep_history": False}
+        more |= {"look": look, "threads": 1}
+        v, y, dt = options.get("v"), options["y"], options.get("dt")
         if at is None:
-            found = averages(system, method, v, y, dt, steps, transient=transient, every=self.every, **more)
+            averaged = averages(system, method, v, y, dt, steps, transient=transient, every=self.every, **more)
         else:
-            more |= {"dt": dt, "max_steps": given.get("max_steps"), "transient": self.transient}
-            found = adaptive_averages(system, method, v, y, given["tolerance"], at, **more)
+            more |= {"dt": dt, "max_steps": options.get("max_steps"), "transient": self.transient}
+            averaged = adaptive_averages(system, method, v, y, options["tolerance"], at, **more)
         return {
             "lyapunov": Variable(
-                ("exponent",), np.array(found.exponents), "Lyapunov exponents per unit of time, the largest first"
+                ("exponent",), np.array(averaged.exponents), "Lyapunov exponents per unit of time, the largest first"
             )
         }

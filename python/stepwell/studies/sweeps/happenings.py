@@ -15,7 +15,7 @@ from ...runs.events.event import several
 from ...runs.result import Run, Status
 from .exponents import Exponents
 from .observed import Piece
-from .outcomes import Found, Function, Outcome, Reduction, Variable
+from .outcomes import Found, Function, Outcome, ReducedOutcome, Reduction, Variable
 
 #: How a member ended that an event stopped.
 EVENTS = (int(Status.EVENT), int(Status.REST))
@@ -48,7 +48,7 @@ def events_of(events: Any, outcomes: Iterable[Outcome], transient: Any) -> tuple
     return tuple(changed(event, most=1) for event in located)
 
 
-class Happenings(Outcome):
+class Happenings(ReducedOutcome):
     """What a sweep keeps of its events."""
 
     observes = False
@@ -69,13 +69,13 @@ class _Happenings(Reduction):
     def see(self, piece: Piece) -> None:
         self.run: Run = piece.run
 
-    def found(self) -> Found:
-        run, found = self.run, {}
+    def results(self) -> Found:
+        run, results = self.run, {}
         for name, each in run.events.items():
             first = np.full(run.status.size, np.nan)
             first[each.member[::-1]] = each.t[::-1]
-            found[f"{name}_count"] = Variable((), np.array(each.count), f"how often {name} happened")
-            found[f"{name}_t"] = Variable((), first, f"time at which {name} first happened", "t")
+            results[f"{name}_count"] = Variable((), np.array(each.count), f"how often {name} happened")
+            results[f"{name}_t"] = Variable((), first, f"time at which {name} first happened", "t")
         times = np.nan if run.stopped_at is None else run.stopped_at
         stopped = np.where(np.isin(run.status, EVENTS), times, np.nan)
-        return found | {"stopped_at": Variable((), stopped, "time at which an event stopped the member", "t")}
+        return results | {"stopped_at": Variable((), stopped, "time at which an event stopped the member", "t")}

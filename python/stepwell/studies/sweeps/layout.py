@@ -59,13 +59,13 @@ class Layout(NamedTuple):
     units: Mapping[str, str]
     renamed: dict[str, str]
 
-    def arrays(self, found: Found) -> dict[str, Planned]:
-        """The arrays of the whole sweep, as results of one chunk tell."""
+    def arrays(self, results: Found) -> dict[str, Planned]:
+        """The arrays of the whole sweep, which follow from the results of one chunk."""
         sizes = dict(zip(self.grid.dims, self.grid.shape, strict=True))
         taken = set(sizes) | set(self.coords)
         own: dict[str, int] = {}
         arrays = {}
-        for name, variable in found.items():
+        for name, variable in results.items():
             if name in taken:
                 raise ArgumentError(
                     f"axes: there is a dimension or coordinate {name!r}, which is the name of a result; name it otherwise"
@@ -123,13 +123,13 @@ def _plain(values: Array) -> Array:
     return values
 
 
-def along_dims(found: Found, chunk: Chunk) -> dict[str, Array]:
+def along_dims(results: Found, chunk: Chunk) -> dict[str, Array]:
     """The results of a chunk, its members along the dimensions of the sweep, which come first."""
-    made = {}
-    for name, variable in found.items():
+    arrays = {}
+    for name, variable in results.items():
         values = np.moveaxis(_plain(variable.values), -1, 0)
-        made[name] = np.ascontiguousarray(values.reshape(*chunk.shape, *values.shape[1:]))
-    return made
+        arrays[name] = np.ascontiguousarray(values.reshape(*chunk.shape, *values.shape[1:]))
+    return arrays
 
 
 def hash_of_chunk(arrays: Mapping[str, Array]) -> int:

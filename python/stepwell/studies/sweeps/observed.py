@@ -62,7 +62,7 @@ class Piece(NamedTuple):
 
 
 def name_of(what: Of | Callable[..., Any]) -> str:
-    """What it is called in names of variables."""
+    """The name of an observed quantity in the names of variables."""
     if isinstance(what, str):
         return what
     if isinstance(what, tuple):
@@ -72,7 +72,7 @@ def name_of(what: Of | Callable[..., Any]) -> str:
 
 
 def checked(what: Any) -> Of:
-    """What is asked for, if it can be meant.
+    """The observed quantity, if it is one.
 
     Raises:
         ArgumentError: if not.

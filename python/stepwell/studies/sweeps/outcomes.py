@@ -1,4 +1,4 @@
-"""What is kept of a member: its last state, extremes, means, the history at intervals, or what a function finds.
+"""What a sweep keeps of a member: its last state, extremes, means, the history at intervals, or the result of a function.
 
 Reductions see the states of a run piece by piece and keep a few numbers of each member. They do not depend on where pieces end.
 """
@@ -47,23 +47,23 @@ def together(parts: Iterable[Found]) -> Found:
     Raises:
         ArgumentError: if two have one name.
     """
-    found: Found = {}
+    results: Found = {}
     for part in parts:
-        if twice := sorted(set(found) & set(part)):
+        if twice := sorted(set(results) & set(part)):
             raise ArgumentError(f"outcomes: there are two results {twice[0]!r}; give one another name by name=, or leave it out")
-        found |= part
-    return found
+        results |= part
+    return results
 
 
 class Reduction(ABC):
-    """Sees pieces of a run, in their order, and keeps what it needs."""
+    """Sees the pieces of a run, in their order, and keeps what it needs."""
 
     @abstractmethod
     def see(self, piece: Piece) -> None:
         """Take the new states of a piece into account."""
 
     @abstractmethod
-    def found(self) -> Found:
+    def results(self) -> Found:
         """The results, by name."""
 
 
@@ -79,11 +79,15 @@ class Outcome(ValueEquality):
     numbers: int = 4
 
     def check(self, system: System) -> None:
-        """Raise if it cannot be found of a system, before any work."""
+        """Raise if it cannot be computed for a system, before any work."""
 
+
+class ReducedOutcome(Outcome, ABC):
+    """An outcome that a reduction computes piece by piece, so that the run is never in memory as a whole."""
+
+    @abstractmethod
     def begin(self) -> Reduction:
         """A new reduction."""
-        raise NotImplementedError
 
 
 def _blocks(system: System) -> tuple[str, ...]:
@@ -103,7 +107,7 @@ def _unit(what: Of) -> str | None:
     return block if isinstance(block, str) else None
 
 
-class Last(Outcome):
+class Last(ReducedOutcome):
     """The state at the end: ``v_last`` and ``y_last``.
 
     Example:
@@ -124,7 +128,7 @@ class _Last(Reduction):
     def see(self, piece: Piece) -> None:
         self.run = piece.run
 
-    def found(self) -> Found:
+    def results(self) -> Found:
         run = self.run
         return {
             f"{block}_last": Variable(
@@ -134,8 +138,8 @@ class _Last(Reduction):
         }
 
 
-class _Several(Outcome):
-    """Of v and y, or of what is asked for."""
+class _Several(ReducedOutcome):
+    """An outcome of v and of y, or of the quantity ``of``."""
 
     def __init__(self, of: Any = None, *, name: str | None = None) -> None:
         self.of = None if of is None else checked(of)
@@ -189,14 +193,14 @@ class _Extremes(Reduction):
             largest = list(map(np.maximum, largest, self.largest))
         self.least, self.largest = least, largest
 
-    def found(self) -> Found:
-        found = {}
+    def results(self) -> Found:
+        results = {}
         for what, least, largest in zip(self.outcome.whats(self.run), self.least, self.largest, strict=True):
             name, dims = self.outcome.name or name_of(what), _dims(self.run, what, least)
             # Which of −0 and +0 is the least depends on the order in which they are compared; adding +0 leaves +0 alone.
-            found[f"{name}_min"] = Variable(dims, least + 0.0, f"least {name} of the observed states", _unit(what))
-            found[f"{name}_max"] = Variable(dims, largest + 0.0, f"largest {name} of the observed states", _unit(what))
-        return found
+            results[f"{name}_min"] = Variable(dims, least + 0.0, f"least {name} of the observed states", _unit(what))
+            results[f"{name}_max"] = Variable(dims, largest + 0.0, f"largest {name} of the observed states", _unit(what))
+        return results
 
 
 class Mean(_Several):
@@ -255,14 +259,14 @@ class _Mean(Reduction):
             self.before[i] = now[-1].copy()
         self.t = float(t[-1])
 
-    def found(self) -> Found:
-        time, found = self.t - self.begin, {}
+    def results(self) -> Found:
+        time, results = self.t - self.begin, {}
         for what, total in zip(self.outcome.whats(self.run), self.sums, strict=True):
             name = self.outcome.name or name_of(what)
-            found[f"{name}_mean"] = Variable(
+            results[f"{name}_mean"] = Variable(
                 _dims(self.run, what, total), total / time, f"mean {name} over the time", _unit(what)
             )
-        return found
+        return results
 
 
 def called(name: Any, of: Of | None) -> str | None:
@@ -280,7 +284,7 @@ def called(name: Any, of: Of | None) -> str | None:
     return name
 
 
-class History(Outcome):
+class History(ReducedOutcome):
     """The states at intervals: ``v`` and ``y`` along the dimension ``t``; ``every`` of ``stepwell.sweep`` asks for it.
 
     With a tolerance, those at the times of ``at``.
@@ -308,7 +312,7 @@ class _History(Reduction):
     def see(self, piece: Piece) -> None:
         self.pieces.append(piece)
 
-    def found(self) -> Found:
+    def results(self) -> Found:
         system = self.pieces[0].run.system
         t = np.concatenate([piece.t for piece in self.pieces])
         return {
@@ -324,11 +328,11 @@ class _History(Reduction):
 
 
 class Function(Outcome):
-    """What a function finds in the run of a chunk of members.
+    """The results of a function of the run of a chunk of members.
 
     It is called with a ``Run`` whose batch is the chunk, one axis of members, with the states after the transient that ``every``
     asks for; without it, the last alone; with a tolerance, those at the times of ``at``. A member may be in a chunk with any
-    others, so what is found of one must not depend on the others.
+    others, so the result of one must not depend on the others.
 
     Args:
         function: returns an array whose last axis is that of the members, or a dictionary of them by name; in place of an array,
@@ -353,18 +357,18 @@ class Function(Outcome):
         self.function = function
 
     def of_run(self, run: Run) -> Found:
-        """What it finds."""
-        made = self.function(run)
-        named = made if isinstance(made, Mapping) else {name_of(self.function): made}
-        found = {}
-        for name, given in named.items():
+        """The variables that the function returns for this run."""
+        returned = self.function(run)
+        named = returned if isinstance(returned, Mapping) else {name_of(self.function): returned}
+        results = {}
+        for name, values in named.items():
             if not isinstance(name, str) or not name:
                 raise ArgumentError(f"outcomes: expected names of variables, got {checks.short(name)}")
             dims: Any = None
-            if isinstance(given, tuple):
-                dims, given = given
+            if isinstance(values, tuple):
+                dims, values = values
                 dims = (dims,) if isinstance(dims, str) else tuple(dims)
-            values = checks.as_array(f"outcomes: {name}", given)
+            values = checks.as_array(f"outcomes: {name}", values)
             if values.dtype.kind not in "biuf":
                 raise ArgumentError(f"outcomes: {name}: expected numbers, got an array of dtype {values.dtype}")
             if values.ndim == 0 or values.shape[-1] != run.status.size:
@@ -375,5 +379,5 @@ class Function(Outcome):
             dims = tuple(f"{name}_{i}" for i in range(values.ndim - 1)) if dims is None else dims
             if len(dims) != values.ndim - 1:
                 raise ShapeError(f"outcomes: {name}: expected {values.ndim - 1} names of axes before the last, got {dims}")
-            found[name] = Variable(dims, values, f"by the function {name_of(self.function)}")
-        return found
+            results[name] = Variable(dims, values, f"by the function {name_of(self.function)}")
+        return results

@@ -24,15 +24,15 @@ def packed(task: Task) -> bytes:
     """A task for other processes.
 
     Raises:
-        ArgumentError: if it holds what cannot travel.
+        ArgumentError: if a part of it cannot be pickled.
     """
     cloudpickle = need("cloudpickle")
 
     class Pickler(cloudpickle.Pickler):  # type: ignore[misc, name-defined]
         def reducer_override(self, obj: Any) -> Any:
             if isinstance(obj, Definition) and not _found_by_name(obj):
-                told = (obj.order, obj.blocks, obj.shape, obj.quick_sines, obj.scale)
-                return _defined, (obj.function, told, obj.__module__, obj.__qualname__, list(obj.invariants.values()))
+                options = (obj.order, obj.blocks, obj.shape, obj.quick_sines, obj.scale)
+                return _defined, (obj.function, options, obj.__module__, obj.__qualname__, list(obj.invariants.values()))
             return super().reducer_override(obj)
 
     file = io.BytesIO()
@@ -47,23 +47,23 @@ def packed(task: Task) -> bytes:
 
 
 def _found_by_name(definition: Definition) -> bool:
-    """Whether another process finds it in a module that it can import; the script that was started is none."""
+    """Whether another process can import the definition by name; it cannot import the script that was started."""
     if definition.__module__ == "__main__":
         return False
-    found: Any = sys.modules.get(definition.__module__)
+    value: Any = sys.modules.get(definition.__module__)
     for part in definition.__qualname__.split("."):
-        found = getattr(found, part, None)
-    return found is definition
+        value = getattr(value, part, None)
+    return value is definition
 
 
 def _defined(
-    function: Callable[..., Any], told: tuple[Any, ...], module: str, qualified: str, invariants: list[Invariant]
+    function: Callable[..., Any], options: tuple[Any, ...], module: str, qualified: str, invariants: list[Invariant]
 ) -> Definition:
-    """A definition, of its function."""
-    made = Definition(function, *told)
-    made.__module__, made.__qualname__ = module, qualified
-    made.invariants = {each.name: each for each in invariants}
-    return made
+    """A definition, made again in another process."""
+    definition = Definition(function, *options)
+    definition.__module__, definition.__qualname__ = module, qualified
+    definition.invariants = {each.name: each for each in invariants}
+    return definition
 
 
 @lru_cache(REMEMBERED_TASKS)

@@ -79,23 +79,23 @@ def _fits(count: int, ranges: dict[str, Any]) -> None:
     checks.fits("count: the samples", 4 * len(ranges), (count,), "take fewer")
 
 
-def _placed(dim: Any, unit: Array, ranges: dict[str, Any], how: str) -> dict[str, Any]:
+def _placed(dim: Any, unit: Array, ranges: dict[str, Any], sampling: str) -> dict[str, Any]:
     """Numbers between 0 and 1 as values of arguments."""
     if not isinstance(dim, str) or not dim:
         raise ArgumentError(f"dim: expected the name of a dimension, got {checks.short(dim)}")
     if not ranges:
         raise ArgumentError("ranges: expected arguments by name, such as mu=(0.5, 2.0), got none")
     axes = {}
-    for k, (name, given) in enumerate(ranges.items()):
-        if hasattr(given, "ppf"):
-            values = np.asarray(given.ppf(unit[:, k]), dtype=np.float64)
+    for k, (name, bounds) in enumerate(ranges.items()):
+        if hasattr(bounds, "ppf"):
+            values = np.asarray(bounds.ppf(unit[:, k]), dtype=np.float64)
         else:
-            ends = checks.numbers(name, given)
+            ends = checks.numbers(name, bounds)
             if ends.shape != (2,):
                 raise ShapeError(f"{name}: expected a pair (low, high) or a distribution of scipy.stats, got shape {ends.shape}")
             low, high = ends.tolist()
             if not low < high:
                 raise ArgumentError(f"{name}: expected (low, high) with low < high, got ({low:g}, {high:g})")
             values = low + (high - low) * unit[:, k]
-        axes[name] = (dim, values, {"sampling": how})
+        axes[name] = (dim, values, {"sampling": sampling})
     return axes

@@ -95,7 +95,7 @@ class Zarr:
         return group
 
     def _check(self, group: Any) -> None:
-        """Raise unless every array is there, of the shape that it was made with."""
+        """Raise unless the store has every array, in its original shape."""
         sizes, attrs = self.layout.grid.shape, dict(group.attrs)
         try:
             shapes = {PROGRESS: (), f"{PROGRESS}/{HASHES}": _counts(sizes, attrs[CHUNK_SHAPE])} | dict.fromkeys(
@@ -123,8 +123,8 @@ class Zarr:
         if self.group is None:
             return False
         try:
-            told = int(self.group[f"{PROGRESS}/{HASHES}"][chunk.place])
-            return told != 0 and hash_of_chunk(self._read(chunk)) == told
+            written = int(self.group[f"{PROGRESS}/{HASHES}"][chunk.place])
+            return written != 0 and hash_of_chunk(self._read(chunk)) == written
         except Exception:  # a torn file is an error of its codec, of which each has its own
             return False
 
@@ -143,7 +143,7 @@ class Zarr:
 
     @contextmanager
     def _disk(self) -> Iterator[None]:
-        """What a disk cannot take is told with the path; of a store that could not be made nothing is left."""
+        """Name the path in errors of the disk, and remove a store that could not be created."""
         try:
             yield
         except OSError as error:
@@ -166,11 +166,11 @@ class Zarr:
         if beside.exists():
             shutil.rmtree(beside)
         group = self._zarr.open_group(beside, mode="w", zarr_format=3)
-        told = {CHUNK_SHAPE: list(self.chunk_shape), RESULTS: list(arrays), COORDINATES: " ".join(self.layout.coords)}
-        group.attrs.update({**self.layout.attrs, **told})
+        attributes = {CHUNK_SHAPE: list(self.chunk_shape), RESULTS: list(arrays), COORDINATES: " ".join(self.layout.coords)}
+        group.attrs.update({**self.layout.attrs, **attributes})
         for name, (dims, values, attrs) in self.layout.coords.items():
-            made = group.create_array(name, shape=values.shape, dtype=values.dtype, dimension_names=dims, attributes=attrs)
-            made[...] = values
+            array = group.create_array(name, shape=values.shape, dtype=values.dtype, dimension_names=dims, attributes=attrs)
+            array[...] = values
         for name, each in arrays.items():
             own = each.shape[len(self.chunk_shape) :]
             group.create_array(
@@ -216,13 +216,13 @@ class NetCDF(Zarr):
         if self.whole:
             try:
                 with need("xarray").open_dataset(path, engine="h5netcdf") as there:
-                    told = json.loads(there.attrs[SWEEP])
+                    sweep = json.loads(there.attrs[SWEEP])
             except Exception as error:  # whatever is said of a file that is none
                 raise ArgumentError(
                     f"store: expected a new path or that of a sweep, got {checks.short(str(path), checks.PATH)}, which is "
                     f"something else ({type(error).__name__}: {error})"
                 ) from None
-            same_sweep(path, told, json.loads(layout.attrs[SWEEP]))
+            same_sweep(path, sweep, json.loads(layout.attrs[SWEEP]))
         else:
             _room(path, layout.grid.members * int(8 * LEAST_NUMBERS))
         unfinished = path.with_name(f"{path.name}.unfinished")
@@ -270,31 +270,32 @@ def opened(path: Path, chunks: Any = None) -> Any:
     return ordered
 
 
-def same_sweep(path: Path, there: dict[str, Any], asked: dict[str, Any]) -> None:
+def same_sweep(path: Path, there: dict[str, Any], wanted: dict[str, Any]) -> None:
     """Raise if a store is of another sweep than the one that is asked for."""
-    names = [name for name in {**there, **asked} if there.get(name) != asked.get(name)]
+    names = [name for name in {**there, **wanted} if there.get(name) != wanted.get(name)]
     if names:
-        told = "; ".join(
+        differences = "; ".join(
             "the equations are others: their first steps have other bits"
             if name == "first steps"
-            else f"{name}: {checks.short(there.get(name), 60)} there, {checks.short(asked.get(name), 60)} asked for"
+            else f"{name}: {checks.short(there.get(name), 60)} there, {checks.short(wanted.get(name), 60)} asked for"
             for name in names
             if name != "first steps" or len(names) == 1
         )
         raise ArgumentError(
-            f"store: {checks.short(str(path), checks.PATH)} is of another sweep and is not continued ({told}); give another path"
+            f"store: {checks.short(str(path), checks.PATH)} is of another sweep and is not continued ({differences}); "
+            f"give another path"
         )
 
 
-def store_of(given: Any) -> tuple[type[Zarr], Path] | None:
+def store_of(store: Any) -> tuple[type[Zarr], Path] | None:
     """The kind of store and its path, or None for memory."""
-    if given is None:
+    if store is None:
         return None
-    if isinstance(given, (str, os.PathLike)):
-        path = Path(os.fsdecode(given))
+    if isinstance(store, (str, os.PathLike)):
+        path = Path(os.fsdecode(store))
         kind = {".zarr": Zarr, ".nc": NetCDF}.get(path.suffix)
         if kind is not None:
             checks.folder("store", path.parent)
             path.parent.mkdir(parents=True, exist_ok=True)
             return kind, path
-    raise ArgumentError(f"store: expected a path that ends in .zarr or .nc, got {checks.short(given, checks.PATH)}")
+    raise ArgumentError(f"store: expected a path that ends in .zarr or .nc, got {checks.short(store, checks.PATH)}")

@@ -28,7 +28,7 @@ from .adaptive import NUMBERS_OF_A_CONTROLLER, lost
 from .axes import OF_THE_RUN
 from .exponents import Exponents
 from .observed import Piece
-from .outcomes import Found, Function, History, Outcome, Variable, together
+from .outcomes import Found, Function, History, Outcome, ReducedOutcome, Variable, together
 
 #: A piece of a run makes at most so many steps of members, after which a sweep may be stopped.
 MAX_STEPS_OF_MEMBERS = 50_000_000
@@ -83,9 +83,9 @@ class Task(NamedTuple):
         return dt.astype(np.float32).astype(np.float64) if self.single else dt
 
     @property
-    def reductions(self) -> list[Outcome]:
-        """The outcomes that are found piece by piece."""
-        return [each for each in self.outcomes if not isinstance(each, (Function, Exponents))]
+    def reductions(self) -> list[ReducedOutcome]:
+        """The outcomes that are computed piece by piece."""
+        return self.kinds(ReducedOutcome)
 
     @property
     def between(self) -> int | None:
@@ -208,7 +208,7 @@ def _reduced(
             for _, reduction in reductions:
                 reduction.see(Piece(last, 0))
         assert last is not None
-        return last, [reduction.found() for _, reduction in reductions]
+        return last, [reduction.results() for _, reduction in reductions]
     for each in _pieces(task, system, start, members, task.steps, between, stopped):
         since = 0 if at == 0 else 1
         steps = at + (each.t.size - 1 if between else 0)  # number of the last saved state
@@ -216,7 +216,7 @@ def _reduced(
             reduction.see(_thinned(task, outcome, each, at, since))
         at, last = steps + (0 if between else 1), each
     assert last is not None
-    return last, [reduction.found() for _, reduction in reductions]
+    return last, [reduction.results() for _, reduction in reductions]
 
 
 def _thinned(task: Task, outcome: Outcome, piece: Run, first: int, since: int) -> Piece:
@@ -351,7 +351,7 @@ def _names(task: Task, run: Run) -> set[str]:
         for outcome in task.reductions:
             reduction = outcome.begin()
             reduction.see(Piece(run, 0))
-            parts.append(reduction.found())
+            parts.append(reduction.results())
     return set(together([*parts, dict.fromkeys(("status", "first_bad_step"), Variable((), np.array(run.status), ""))]))
 
 
