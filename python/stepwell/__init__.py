@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from .views.explorer import Explorer, explore
 
 registry.register(
-    animate_run="stepwell.views.charts.animation:animate",
+    animate_run="stepwell.views.charts.runs_animation:animate",
     draw_advice="stepwell.views.charts.advice_picture:draw",
     draw_control="stepwell.views.charts.control_picture:draw",
     draw_curves="stepwell.views.charts.zplane_picture:curves",

@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...base.pictures import new_figure
 from ...errors import ArgumentError
 from .labels import Label, beside, title
-from .style import FONT, GREY, PALE, look
+from .style import GREY, PALE, Figure, look, page
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ...studies.advice.result import Advice, Row
 
 #: Room around the points, as a factor of cost, of error above what was asked for, and below the least.
@@ -30,14 +27,12 @@ def draw(advice: Advice) -> Figure:
     if not advice.ranked:
         why = " ".join(advice.summary())
         raise ArgumentError(f"plot: expected advice with a method that is good enough, got none to draw: {why}")
-    figure = new_figure(12.0, 7.2)
-    from matplotlib import rc_context
-    from matplotlib.ticker import FuncFormatter, LogLocator
-
     costs = np.array([cost(advice, row) for row in advice.ranked])
     errors = np.array([max(row.error, 1e-17) for row in advice.ranked])
     leading = on_front(costs, errors) | {0}
-    with rc_context(FONT):
+    with page(12.0, 7.2) as figure:
+        from matplotlib.ticker import FuncFormatter, LogLocator
+
         axes = figure.add_axes((0.09, 0.16, 0.89, 0.69))
         axes.set(xscale="log", yscale="log")
         axes.grid(which="major", color="#dddddd", linewidth=0.8)

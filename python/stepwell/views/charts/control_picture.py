@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...base.pictures import new_figure
 from ...errors import UnknownNameError
 from ...model.methods import Method
 from .control import ControlSweep
 from .control_runs import Held
 from .labels import at_ends, title
-from .style import FONT, GREY, apart
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import GREY, Axes, Figure, apart, page
 
 #: Lines of the two forms.
 FORMS: dict[str, dict[str, Any]] = {
@@ -44,10 +39,7 @@ LEAST_DRAWN, ROUNDING = 1e-17, 1e-12
 
 def draw(chart: ControlSweep) -> Figure:
     """Draw the chart on a new figure."""
-    figure = new_figure(16.0, 10.0)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(16.0, 10.0) as figure:
         kinds = ("energy_error", "state_error" if chart.exact else "largest")
         names = ("largest |E − E₀| / K₀", "error of the last state, relative" if chart.exact else "largest coordinate")
         for i, (what, name) in enumerate(zip(kinds, names, strict=True)):

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...analysis.stability.criterion import signed
 from ...base.arrays import Array
-from ...base.pictures import new_figure
 from .figures import HARMONIC_PERIODS, Figures, HarmonicCase, Samples
 from .labels import at_ends, title
-from .style import FAMILIES, FONT, GREY, family, look, named
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import FAMILIES, GREY, Axes, Figure, family, look, named, page
 
 #: Samples are shown up to here; what grows more leaves the picture.
 Y_LIMIT = 2.2
@@ -46,10 +40,7 @@ def overview(chart: Figures) -> Figure:
     across = min(COLUMNS, count)
     down = -(-count // across)
     width, height = 17.0, 2.9 * down + 2.3
-    figure = new_figure(width, height)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(width, height) as figure:
         places = {"left": 0.055, "right": 0.988, "bottom": 1.15 / height, "top": 1.0 - 1.5 / height, "wspace": 0.1}
         panels = figure.subplots(down, across, squeeze=False, gridspec_kw=places | {"hspace": 0.42})
         for i, axes in enumerate(panels.ravel()):
@@ -143,10 +134,7 @@ def _errors(axes: Axes, exact: list[Samples]) -> None:
 
 def one(chart: Figures, samples: Samples) -> Figure:
     """One method on a figure of its own."""
-    figure = new_figure(11.0, 5.6)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(11.0, 5.6) as figure:
         axes = figure.add_axes((0.075, 0.245, 0.91, 0.535))
         _samples(axes, chart, samples, FAMILIES[family(samples.method)])
         axes.set(xlabel="time in periods of the exact solution", ylabel="y")
@@ -161,10 +149,7 @@ def one(chart: Figures, samples: Samples) -> Figure:
 
 def harmonic(cases: tuple[HarmonicCase, ...]) -> Figure:
     """The harmonic cases of §4, one below the other."""
-    figure = new_figure(11.0, 8.6)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(11.0, 8.6) as figure:
         places = {"left": 0.065, "right": 0.985, "bottom": 0.145, "top": 0.845, "hspace": 0.55}
         panels = figure.subplots(len(cases), 1, sharex=True, gridspec_kw=places)
         for axes, case in zip(panels, cases, strict=True):

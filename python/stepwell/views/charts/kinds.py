@@ -24,24 +24,16 @@ class FixedPoint(NamedTuple):
 
     name: str
     place: tuple[float, ...]
-    #: The points that rods join to it.
-    joined: tuple[int, ...] = ()
+    joined: tuple[int, ...] = ()  # the points at the other ends of its rods
 
 
 class Kind(NamedTuple):
-    """How systems of a class are drawn.
+    """How systems of a class are drawn."""
 
-    Attributes:
-        picture: ``"orbits"`` of points, an aircraft's ``"attitude"``, a rigid ``"body"``, or ``"curves"`` over time.
-        fixed_points: what does not move, of a system.
-        links: the pairs of points that springs or rods join, of a system.
-        owner: what has the coordinates of curves.
-    """
-
-    picture: str
+    picture: str  # "orbits" of points, an aircraft's "attitude", a rigid "body", or "curves" over time
     fixed_points: Callable[[Any], list[FixedPoint]] = lambda _: []
-    links: Callable[[Any], Any] = lambda _: ()
-    owner: str = "coordinate"
+    links: Callable[[Any], Any] = lambda _: ()  # pairs of points that springs or rods join
+    owner: str = "coordinate"  # what has the coordinates of curves
 
 
 def _two_bodies(system: Any) -> list[FixedPoint]:

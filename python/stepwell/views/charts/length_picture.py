@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...base.pictures import new_figure
 from ...model.methods import Method
 from .control import ControlSweep
 from .control_runs import Held
-from .style import FONT, GREY, apart
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import GREY, Axes, Figure, apart, page
 
 #: What is exact has no place on a logarithmic axis.
 LEAST_DRAWN = 1e-17
@@ -37,10 +32,7 @@ LEGEND_COLUMNS, LEGEND_ROW, BOTTOM = 6, 0.027, 0.138
 def draw(chart: ControlSweep) -> Figure:
     """Draw the chart on a new figure."""
     count = len(chart.evaluations)
-    figure = new_figure(16.0, 10.0)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(16.0, 10.0) as figure:
         head = textwrap.wrap(chart.answer or f"{chart.title}: lengths under control", LINE, break_on_hyphens=False)
         strip = STRIP
         gap = strip + 0.02

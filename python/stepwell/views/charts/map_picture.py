@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...analysis.stability import stability_limit
 from ...base.arrays import Array
-from ...base.pictures import new_figure
 from ...model.systems import Oscillator
 from .labels import title
 from .maps import StabilityMap
-from .style import FONT, GREY
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import GREY, Axes, Figure, page
 
 #: Contour lines, besides that of 1.
 LEVELS = (0.5, 0.8, 0.9, 1.1, 1.5, 2.0)
@@ -31,11 +26,10 @@ LABEL_DISTANCE = 0.03
 
 def draw(chart: StabilityMap) -> Figure:
     """Draw the map on a new figure."""
-    figure = new_figure(10.0, 7.0)
-    from matplotlib import colormaps, rc_context
-    from matplotlib.colors import ListedColormap, TwoSlopeNorm
+    with page(10.0, 7.0, **{"hatch.color": "#444444", "hatch.linewidth": 0.5}) as figure:
+        from matplotlib import colormaps
+        from matplotlib.colors import ListedColormap, TwoSlopeNorm
 
-    with rc_context(FONT | {"hatch.color": "#444444", "hatch.linewidth": 0.5}):
         axes = figure.add_axes((0.085, 0.175, 0.80, 0.665))
         bar = figure.add_axes((0.905, 0.175, 0.022, 0.665))
         x, y, shown = chart.phi, chart.damping, _decided(chart)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...base.pictures import new_figure
 from .labels import title
 from .norm import NormSweep, Settled
-from .style import FONT, GREY, look
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import GREY, Axes, Figure, look, page
 
 #: The least and largest ratio that is drawn: a thirtieth is as good as none.
 LEAST_RATIO, LARGEST_RATIO = 0.03, 30.0
@@ -33,10 +28,7 @@ BETTER, WORSE = "#e8f2ea", "#f7ebe6"
 
 def draw(chart: NormSweep) -> Figure:
     """Draw the chart on a new figure."""
-    figure = new_figure(16.0, 8.2)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(16.0, 8.2) as figure:
         places = {"left": 0.065, "right": 0.985, "bottom": 0.145, "top": 0.8, "wspace": 0.17}
         left, right = figure.subplots(1, 2, gridspec_kw=places)
         _ratios(left, chart)

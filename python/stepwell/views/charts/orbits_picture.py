@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +11,7 @@ from ...base.arrays import Array
 from ...model.systems import NBody
 from .run_panels import Points, on_plane
 from .runs import LARGEST, RunPicture
-from .style import BOTTOM, EXACT, FAMILIES, GREY, LONG_CURVE, TOP
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import BOTTOM, EXACT, FAMILIES, GREY, LONG_CURVE, TOP, Axes, Figure
 
 #: Hues, lines and marks of bodies. The hues are those of ``FAMILIES``, told apart in grey, too. More bodies are drawn alike.
 BODIES: tuple[dict[str, Any], ...] = (

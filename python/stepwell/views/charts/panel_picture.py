@@ -5,16 +5,11 @@ from __future__ import annotations
 import math
 import textwrap
 from collections import Counter
-from typing import TYPE_CHECKING
 
-from ...base.pictures import new_figure
 from .labels import title as put_title
 from .panel import Panel
 from .picture import COUNTED, DIGITS_OF, ERRORS, draw_errors, family_of, known_to, name_curves, with_way
-from .style import FONT, GREY
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import GREY, Figure, page
 
 #: Subplots in a row, and the height of one, and of the title, in inches.
 ACROSS, EACH, HEAD = 3, 4.3, 1.35
@@ -42,10 +37,7 @@ def draw(panel: Panel, error: str) -> Figure:
     down = math.ceil(len(each) / across)
     foot = 0.75
     height = HEAD + EACH * down + foot
-    figure = new_figure(WIDTH, height)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(WIDTH, height) as figure:
         grid = figure.add_gridspec(
             down, across, left=0.065, right=0.985, top=1.0 - HEAD / height, bottom=(foot + 0.2) / height, hspace=0.32, wspace=0.2
         )

@@ -6,22 +6,17 @@ import itertools
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...base.pictures import new_figure
 from ...model.methods import Method
 from ...model.methods import methods as every_method
 from ...studies.measuring.data import Curve, WorkPrecision
 from ...studies.measuring.peers import Peer
 from .labels import Label, beside
 from .labels import title as put_title
-from .style import FONT, GREY, PALE, look, peer_look
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import GREY, PALE, Axes, Figure, look, page, peer_look
 
 #: Orders for which a slope is drawn.
 SLOPES = (1, 2, 4)
@@ -55,10 +50,7 @@ FRONT: dict[str, Any] = {"color": "#e4e4e4", "linewidth": 10.0, "solid_capstyle"
 
 def draw(chart: WorkPrecision, error: str, time: str) -> Figure:
     """Draw the chart on a new figure."""
-    figure = new_figure(16.0, 9.0)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page() as figure:
         unnamed = _panels(figure, chart, error, time)
         _text(figure, chart, error, time, unnamed)
     return figure

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...base.pictures import new_figure
 from .labels import title as put_title
 from .powers import Powers
-from .style import FAMILIES, FONT, GREY
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import FAMILIES, GREY, Figure, page
 
 LINE_STYLES: dict[str, Any] = {
     "direct": {"color": FAMILIES["Dormand-Prince"], "marker": "o", "linestyle": "-", "label": "direct: the method's own steps"},
@@ -24,10 +20,7 @@ LINE_STYLES: dict[str, Any] = {
 
 def draw(chart: Powers) -> Figure:
     """Draw the chart on a new figure."""
-    figure = new_figure(14.0, 6.4)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(14.0, 6.4) as figure:
         places = {"left": 0.075, "right": 0.985, "bottom": 0.2, "top": 0.78, "wspace": 0.2}
         time, error = figure.subplots(1, 2, gridspec_kw=places)
         for form, seconds in chart.seconds.items():

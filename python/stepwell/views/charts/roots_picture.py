@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...base.pictures import new_figure
 from .labels import title
-from .style import FAMILIES, FONT, GREY, family
+from .style import FAMILIES, GREY, Figure, family, page
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ...analysis.stability.analysis import Analysis
 
 #: The z-plane is shown up to this distance from 0, and no less of it than that.
@@ -25,10 +22,6 @@ EXACT_UP_TO = 200
 
 def draw(analysis: Analysis) -> Figure:
     """Draw the eigenvalues on a new figure: full where samples stay bounded, hollow where they grow."""
-    figure = new_figure(9.0, 8.2)
-    from matplotlib import rc_context
-    from matplotlib.patches import Circle
-
     colour = FAMILIES[family(analysis.method)]
     z = np.atleast_1d(analysis.eigenvalues).reshape(len(analysis.eigenvalues), -1)
     stable = np.broadcast_to(np.asarray(analysis.stable).reshape(1, -1), z.shape)
@@ -37,7 +30,9 @@ def draw(analysis: Analysis) -> Figure:
     known, single = np.isfinite(z), z.shape[1] == 1
     size = np.abs(z[known]).max(initial=0.0)
     reach = float(np.clip(1.12 * size, NEAREST, FARTHEST))
-    with rc_context(FONT):
+    with page(9.0, 8.2) as figure:
+        from matplotlib.patches import Circle
+
         axes = figure.add_axes((0.1, 0.135, 0.86, 0.735))
         axes.add_patch(Circle((0.0, 0.0), 1.0, facecolor="#f0f0f0", edgecolor="#888888", linewidth=1.2, zorder=0))
         axes.axhline(0.0, color="#cccccc", linewidth=0.8, zorder=0.5)

@@ -44,54 +44,30 @@ FALLING = viewed(-60.0, 15.0)
 
 
 class Line(NamedTuple):
-    """A curve over the times of the saved states.
-
-    Attributes:
-        values: its values; NaN where nothing is drawn.
-        width: in points.
-        colour: its colour.
-        dashes: its line style.
-        marker: the mark at each state.
-        name: what stands at its right end, or in a legend.
-        front: whether it lies above the others.
-    """
+    """A curve over the times of the saved states; NaN where nothing is drawn."""
 
     values: Array
     width: float = 1.5
     colour: str = "black"
     dashes: Any = "-"
     marker: str = ""
-    name: str = ""
-    front: bool = True
+    name: str = ""  # at its right end
+    front: bool = True  # above the others
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """A panel of curves over time.
-
-    Attributes:
-        title: above the panel.
-        lines: the curves of the run, the main one first; none if they are not known.
-        limits: the scale; None for that of the curves.
-        label: beside the scale.
-        exact: exact curves at the times of ``RunPicture.exact``.
-        log: whether the scale is one of powers.
-        angles: whether the main curve is an angle, which jumps at ±180°.
-        missing: what stands in place of curves that are not known.
-        not_finite: the first saved state that is not finite, or None.
-        known_until: the time up to which the curve is known, or None.
-        note: what the reader must know.
-    """
+    """A panel of curves over time."""
 
     title: str
-    lines: tuple[Line, ...]
-    limits: tuple[float, float] | None = None
-    label: str = ""
-    exact: tuple[Array, ...] = ()
+    lines: tuple[Line, ...]  # the main one first
+    limits: tuple[float, float] | None = None  # None for those of the curves
+    label: str = ""  # beside the scale
+    exact: tuple[Array, ...] = ()  # at the times of RunPicture.exact
     log: bool = False
-    angles: bool = False
-    missing: str = ""
-    not_finite: int | None = None
+    angles: bool = False  # the main curve jumps at ±180°
+    missing: str = ""  # in place of curves that are not known
+    not_finite: int | None = None  # the first such state
     known_until: float | None = None
     note: str = ""
 
@@ -203,23 +179,14 @@ def _error(chart: RunPicture, name: str, error: Array | None, before: Array | No
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of a plane at the saved states.
+    """Points on a plane, and the square of it that is seen."""
 
-    Attributes:
-        places: where they are, shape (saved, points, 2).
-        exact: the exact places at the times of ``RunPicture.exact``, or None.
-        fixed: what does not move, with places on the plane.
-        centre: the middle of the square that is seen.
-        half: half of its side.
-        name: from where it is seen; nothing of points in a plane.
-    """
-
-    places: Array
-    exact: Array | None
+    places: Array  # of the saved states, shape (saved, points, 2)
+    exact: Array | None  # at the times of RunPicture.exact
     fixed: list[FixedPoint]
     centre: Array
-    half: float
-    name: str = ""
+    half: float  # of the square's side
+    name: str = ""  # from where it is seen, in space
 
     def leave(self, half: float) -> bool:
         """Whether a point goes farther from the centre than that."""
@@ -265,10 +232,10 @@ def _in_square(points: Points, shown: Array) -> Points:
 
 
 class SideBySide(NamedTuple):
-    """The coordinates by their number, one state at a time: shape (saved, n), and the size up to which they are shown."""
+    """The coordinates by their number, one state at a time."""
 
-    values: Array
-    size: float
+    values: Array  # shape (saved, n)
+    size: float  # up to which they are shown
 
 
 def side_by_side(chart: RunPicture) -> SideBySide:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...base import checks
 from ...base.pictures import new_figure
 from ...errors import ArgumentError, UnsupportedError
+from . import page_animation
 from .orbits_picture import BODIES, body, exact, fixed, square
 from .run_panels import on_plane, side_by_side
 from .runs import RunPicture
@@ -18,11 +19,7 @@ from .runs_finding import steps_of
 from .runs_picture import draw_swings
 from .series_picture import draw_pale_errors
 from .solids_picture import animate_aircraft, animate_body
-from .style import EXACT, FONT, GREY
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import EXACT, FONT, GREY, Axes, Figure
 
 ENDINGS = (".gif", ".mp4", ".html")
 
@@ -58,6 +55,12 @@ def need(path: str | Path, seconds: float, fps: float) -> tuple[float, float]:
     if ending == ".mp4" and not FFMpegWriter.isAvailable():
         raise UnsupportedError("animate: an .mp4 needs the program ffmpeg, which is not found; .gif and .html do not")
     return seconds, fps
+
+
+def animate(chart: RunPicture, path: str | Path, seconds: float, fps: float) -> None:
+    """Write a page or frames, by the ending of the path."""
+    seconds, fps = need(path, seconds, fps)
+    (page_animation.write if Path(path).suffix.lower() == ".html" else write)(chart, path, seconds, fps)
 
 
 def write(chart: RunPicture, path: str | Path, seconds: float, fps: float) -> None:

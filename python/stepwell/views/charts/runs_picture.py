@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...base.pictures import new_figure
 from .kinds import kind_of
 from .labels import title
 from .orbits_picture import draw_orbits, radii, turning
@@ -16,11 +14,7 @@ from .runs import LARGEST, RunPicture
 from .runs_finding import broke_off, finding, steps_of
 from .series_picture import draw_column, draw_errors, over_time
 from .solids_picture import draw_aircraft, draw_body
-from .style import BOTTOM, EXACT, FONT, GREY, LONG_CURVE, RIGHT, TOP
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import BOTTOM, EXACT, GREY, LONG_CURVE, RIGHT, TOP, Axes, Figure, page
 
 #: Rows of a chain are drawn up to here; of more, these many evenly chosen ones.
 MOST_ROWS = 24
@@ -28,11 +22,8 @@ MOST_ROWS = 24
 
 def draw(chart: RunPicture) -> Figure:
     """Draw the run on a new figure."""
-    figure = new_figure(16.0, 9.0)
-    from matplotlib import rc_context
-
     motions = {"attitude": draw_aircraft, "body": draw_body, "orbits": _orbits, "swing": _curves, "rows": _curves}
-    with rc_context(FONT):
+    with page() as figure:
         notes = motions[chart.kind](figure, chart)
         _text(figure, chart, notes)
     return figure

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...base.arrays import Array
 from .run_panels import Series, errors
 from .runs import RunPicture
-from .style import EXACT, GREY, LONG_CURVE
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import EXACT, GREY, LONG_CURVE, Axes, Figure
 
 #: Labels at the end of lines are at least this share of a panel's height apart.
 LABEL_DISTANCE = 0.11

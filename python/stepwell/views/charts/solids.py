@@ -66,21 +66,13 @@ def viewed(azimuth: float = AZIMUTH, elevation: float = ELEVATION) -> Screen:
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A body at each saved state.
+    """A body at each saved state."""
 
-    Attributes:
-        parts: its faces, in its own axes.
-        matrices: the rotation from its axes to those of the picture, shape (3, 3, saved).
-        screen: from where it is seen.
-        axis: the number of the axis that is drawn, or None.
-        reach: where the body meets that axis, below zero on its other side.
-    """
-
-    parts: Parts
-    matrices: Array
+    parts: Parts  # in its own axes
+    matrices: Array  # rotations from its axes to those of the picture, shape (3, 3, saved)
     screen: Screen
-    axis: int | None = None
-    reach: float = 0.0
+    axis: int | None = None  # the one that is drawn
+    reach: float = 0.0  # where the body meets that axis, below zero on its other side
 
     @property
     def tips(self) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +12,7 @@ from .run_panels import angles, angular_velocity
 from .runs import RunPicture
 from .series_picture import Place, draw_column, draw_errors, draw_pale_errors, draw_series
 from .solids import BODY_TRAIL, HALF_SIDE, REACH, Screen, Solid, main_axis, solid_of, turns, upright, upright_by_momentum
-from .style import BOTTOM, EXACT, GREY, LONG_CURVE, RIGHT, TOP
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import BOTTOM, EXACT, GREY, LONG_CURVE, RIGHT, TOP, Axes, Figure
 
 #: How many attitudes of an aircraft are shown, how many side by side, and the height of a row as a share of the picture's.
 AIRCRAFT_ATTITUDES, COLUMNS, ROW = 6, 3, 0.225

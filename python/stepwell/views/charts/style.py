@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
+from ...base.pictures import new_figure
 from ...model.methods import Method
 from ...model.methods import methods as every_method
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.figure import Figure as Figure
+else:
+    Axes = Figure = Any  # matplotlib is imported when something is drawn
 
 MARKERS: tuple[Any, ...] = (*"osD^vPh*<>pdX8H", (4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0), (3, 1, 180))
 #: A colour for each family of methods, the same in every chart. No two are alike in grey, in print, or to an eye without green
@@ -40,6 +48,16 @@ BOTTOM, TOP, RIGHT = 0.165, 0.87, 0.978
 
 #: Sizes in points, for pictures of about 1600 pixels' width at 100 dots per inch.
 FONT: Any = {"font.size": 14.0, "axes.labelsize": 14.0, "legend.fontsize": 12.0}
+
+
+@contextmanager
+def page(width: float = 16.0, height: float = 9.0, **options: Any) -> Iterator[Figure]:
+    """A new figure, and what is drawn on it in the sizes of ``FONT``; options are matplotlib's."""
+    figure = new_figure(width, height)
+    from matplotlib import rc_context
+
+    with rc_context(FONT | options):
+        yield figure
 
 
 def look(method: Method) -> dict[str, Any]:

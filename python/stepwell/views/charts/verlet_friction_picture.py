@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...base.pictures import new_figure
-from .style import FAMILIES, FONT, GREY
+from .style import FAMILIES, GREY, Figure, page
 from .verlet_friction import VerletFriction
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LINES: dict[str, Any] = {
     "exact": {"color": "#c4c4c4", "linewidth": 4.0, "label": "exact"},
@@ -26,10 +22,7 @@ TITLES = ("y of a block that slides", "y of a block on a spring")
 
 def draw(chart: VerletFriction) -> Figure:
     """Draw the chart on a new figure."""
-    figure = new_figure(17.0, 6.0)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(17.0, 6.0) as figure:
         places = {"left": 0.05, "right": 0.988, "bottom": 0.2, "top": 0.74, "wspace": 0.19}
         *panels, limits = figure.subplots(1, 3, gridspec_kw=places)
         for axes, block, view, title in zip(panels, chart.blocks, VIEWS, TITLES, strict=True):

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import math
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...analysis.stability.eigen import Complex
 from ...base.arrays import Array
-from ...base.pictures import new_figure
-from .style import FAMILIES, FONT, GREY, family, named
+from .style import FAMILIES, GREY, Axes, Figure, family, named, page
 from .zplane import Locus, Stability
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Panels side by side at most, and the least width in inches, which the title and the notes need.
 COLUMNS, WIDTH = 4, 10.5
@@ -50,10 +45,7 @@ def loci(chart: Stability) -> Figure:
     shared = groups(chart)
     across, down = _grid(len(shared))
     width, height = max(WIDTH, 3.7 * across + 0.9), 4.15 * down + 2.2
-    figure = new_figure(width, height)
-    from matplotlib import rc_context
-
-    with rc_context(FONT):
+    with page(width, height) as figure:
         places = {
             "left": 0.8 / width,
             "right": 1.0 - 0.1 / width,
@@ -163,11 +155,9 @@ def curves(chart: Stability) -> Figure:
     shared = groups(chart)
     across, down = _grid(len(shared))
     width, height = max(WIDTH, 3.8 * across + 1.4), 4.6 * down + 2.2
-    figure = new_figure(width, height)
-    from matplotlib import rc_context
-    from matplotlib.ticker import MaxNLocator
+    with page(width, height) as figure:
+        from matplotlib.ticker import MaxNLocator
 
-    with rc_context(FONT):
         outer = figure.add_gridspec(
             down,
             across,

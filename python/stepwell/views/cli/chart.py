@@ -18,12 +18,7 @@ from . import options, show
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "scenes",
-        nargs="+",
-        metavar="SCENE",
-        help="a scene (see stepwell scenes), with arguments as in kepler:e=0.5, or a Python file that makes one",
-    )
+    options.scene(parser, "scenes", "kepler:e=0.5", nargs="+")
     options.folder(parser, here=True)
     options.methods(parser)
     parser.add_argument("--panel", action="store_true", help="one picture and one table of all scenes")

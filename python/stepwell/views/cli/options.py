@@ -12,28 +12,24 @@ from ...base.pictures import new_figure
 from ...model.methods import Method
 from ...model.methods import method as find_method
 
-PRINTED, ECCENTRIC = "energy_control:pair=printed", "kepler:e=0.5"
+PRINTED = "energy_control:pair=printed"
 
 
 def scene(parser: argparse.ArgumentParser, name: str = "scene", example: str = PRINTED, **options: Any) -> None:
-    """A scene, or several."""
     text = f"a scene (see stepwell scenes), with arguments as in {example}, or a Python file that makes one"
     parser.add_argument(name, metavar="SCENE", help=text, **options)
 
 
 def system(parser: argparse.ArgumentParser) -> None:
-    """A system, by a scene or by its class."""
     text = "a scene (see stepwell scenes), a Python file that makes one, or a system by its class, such as Pendulum"
     parser.add_argument("system", metavar="SYSTEM", help=text)
 
 
 def method_words(parser: argparse.ArgumentParser) -> None:
-    """Any number of methods as words of their own."""
     parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
 
 
 def methods(parser: argparse.ArgumentParser, default: str = "all") -> None:
-    """Methods as the value of an option."""
     parser.add_argument("--methods", metavar="A,B,…", help=f"which methods (default: {default})")
 
 
@@ -48,28 +44,23 @@ def chosen(args: argparse.Namespace) -> list[Method] | None:
 
 
 def numbers(parser: argparse.ArgumentParser) -> None:
-    """How numbers are computed: with fused multiply-adds, and in float32."""
     fused(parser)
     parser.add_argument("--float32", action="store_true", help="in float32, with half the digits")
 
 
 def fused(parser: argparse.ArgumentParser) -> None:
-    """Compute with fused multiply-adds."""
     parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
 
 
 def dtype(args: argparse.Namespace) -> Any:
-    """The type of numbers that ``numbers`` says."""
     return "float32" if args.float32 else "float64"
 
 
 def start(parser: argparse.ArgumentParser) -> None:
-    """The start of a method that has several."""
     parser.add_argument("--start", metavar="HOW", help="how a method with a choice starts; see stepwell methods NAME")
 
 
 def json(parser: argparse.ArgumentParser) -> None:
-    """JSON instead of a table."""
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
 
@@ -77,7 +68,6 @@ def json(parser: argparse.ArgumentParser) -> None:
 
 
 def file(parser: argparse.ArgumentParser, text: str) -> None:
-    """A file to write."""
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=text)
 
 

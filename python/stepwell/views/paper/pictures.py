@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ...base.arrays import Array
-from ...base.pictures import drawn, new_figure
-from ..charts.style import FONT, GREY
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ...base.pictures import drawn
+from ..charts.style import GREY, Figure, page
 
 #: Of three bodies: hues that differ in lightness, too, so that they survive grey.
 BODIES = ("#0072b2", "#e69f00", "#222222")
@@ -30,10 +26,7 @@ def paths(path: Path, title: str, about: str, panels: Sequence[tuple[str, Array]
 
     def draw() -> Figure:
         width, height = 6.2 * len(panels) + 0.6, 7.6
-        figure = new_figure(width, height)
-        from matplotlib import rc_context
-
-        with rc_context(FONT):
+        with page(width, height) as figure:
             places = {"left": 0.06, "right": 0.985, "bottom": 0.95 / height, "top": 1.0 - 1.7 / height, "wspace": 0.12}
             row = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False, gridspec_kw=places)[0]
             for axes, (title, y) in zip(row, panels, strict=True):
