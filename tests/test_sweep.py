@@ -15,13 +15,18 @@ import pytest
 import scipy.stats
 import stepwell as sw
 import xarray
-from stepwell.errors import ArgumentError, UnsupportedError
+from stepwell.errors import ArgumentError, DTypeError, UnsupportedError
 from stepwell.studies.sweeps import axes as of_axes
 from stepwell.studies.sweeps import crossings, observed, outcomes
 from stepwell.studies.sweeps.task import Stopped
-from support.sweeping import AXES, OUTCOMES, duffing, power, small, unlike
+from support.sweeping import AXES, OUTCOMES, duffing, ends, power, small, unlike
 
 Oscillator = sw.Oscillator
+F = np.float32
+#: Outcomes that go with float32.
+WITH_FLOAT32 = tuple(each for each in OUTCOMES if each != "lyapunov")
+
+each_type = pytest.mark.parametrize("dtype", ["float64", "float32"])
 
 
 # ---- axes
@@ -76,15 +81,17 @@ def test_blocks_with_axes_of_their_own() -> None:
     np.testing.assert_array_equal(found.v_start, np.moveaxis(scene.v[..., None] * factor, -1, 0))
 
 
+@each_type
 @pytest.mark.parametrize("method", ["leapfrog", "verlet", "merson"])
-def test_a_step_as_an_axis(method: str) -> None:
+def test_a_step_as_an_axis(method: str, dtype: Any) -> None:
     """A run has one step, so those of one step are computed together; its dimension comes first."""
     dt, omega = np.array([0.01, 0.02, 0.05]), np.array([1.0, 2.0])
     axes = {"omega": ("omega", omega), "dt": ("dt", dt)}
-    found = sw.sweep(Oscillator, axes, method, v=0.0, y=1.0, steps=40, transient=7, every=16)
+    found = sw.sweep(Oscillator, axes, method, v=0.0, y=1.0, steps=40, transient=7, every=16, dtype=dtype)
     assert found.y.dims == ("dt", "omega", "saved")
     for i, h in enumerate(dt):
-        run = sw.integrate(Oscillator(omega), method, v=0.0, y=1.0, dt=float(h), steps=47, every=1)
+        run = sw.integrate(Oscillator(omega), method, v=0.0, y=1.0, dt=float(h), steps=47, every=1, dtype=dtype)
+        assert (run.t[47] == 47 * h) == (dtype == "float64")  # a step of float32 is rounded
         np.testing.assert_array_equal(found.y[i], run.y[[7, 23, 39, 47]].T)
         np.testing.assert_array_equal(found.v[i], run.v[[7, 23, 39, 47]].T)
         np.testing.assert_array_equal(found.t[i], run.t[[7, 23, 39, 47]])
@@ -181,6 +188,32 @@ def test_means(observe: int) -> None:
         np.testing.assert_allclose(found[f"{name}_mean"], sums, atol=2 * 400 * 2**-53 * abs(values).max())
 
 
+def mean_of(t: Any, values: Any) -> Any:
+    """The trapezoidal rule, state after state."""
+    total = np.zeros(values.shape[1:], values.dtype)
+    for k in range(1, len(t)):
+        total += 0.5 * (t[k] - t[k - 1]) * (values[k - 1] + values[k])
+    return total / (t[-1] - t[0])
+
+
+def test_what_is_found_of_states_of_float32_is_computed_in_float64() -> None:
+    outcomes = ["mean", "extremes", sw.sweeps.Mean(power), sw.sweeps.Extremes("energy"), ends]
+    found = small(dtype="float32", outcomes=outcomes, transient=0)
+    gamma, y = (values for _, values in AXES.values())
+    system = duffing(delta=0.2, gamma=gamma[:, None])
+    run = sw.integrate(system, "rk4", v=0.0, y=y, dt=0.05, steps=80, every=1, dtype="float32")
+    y, v = run.y.astype(np.float64), run.v.astype(np.float64)
+    np.testing.assert_array_equal(found.y_mean, mean_of(run.t, y))
+    np.testing.assert_array_equal(found.power_mean, mean_of(run.t, v * y))
+    np.testing.assert_array_equal(found.energy_max, run.energy.max(axis=0))
+    np.testing.assert_array_equal(found.y_max, run.y.max(axis=0))
+    assert found.y_max.dtype == found.twice.dtype == F
+    assert found.y_mean.dtype == found.power_mean.dtype == found.energy_max.dtype == np.float64
+    # Sums and products of float32 are others.
+    assert (mean_of(run.t.astype(F), run.y) != found.y_mean).any()
+    assert (mean_of(run.t, (run.v * run.y).astype(np.float64)) != found.power_mean).any()
+
+
 def test_means_of_a_closed_form() -> None:
     """The mean of cos² over a period is 1/2; the trapezoidal rule over whole periods has no error but RK4's."""
     steps = 200
@@ -234,6 +267,22 @@ def test_crossings_of_other_quantities_are_linear() -> None:
     errors = abs(found.first_crossing.values - np.pi / 3 / omega)
     assert (errors < 1.01 * h**2 / 8 * omega**2 / (omega * np.sin(np.pi / 3))).all()
     assert (errors > 1e-7).any()
+
+
+def test_a_crossing_is_found_between_states_of_float32() -> None:
+    """A quarter of a period. Each step rounds y by 2^-25 a few times, ten at most, and where it passes 0 its slope is 1.
+
+    Between states the cubic is wrong by h⁴/384, 3e-7 with h = 0.1; in float32 numbers near 1.57 are 1.2e-7 apart.
+    """
+    steps, h = 20, 0.1
+    crossing = sw.sweeps.Crossing("y", direction="falling")
+    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": h, "steps": steps, "outcomes": crossing, "dtype": "float32"}
+    found = sw.sweep(sw.Oscillator, {"omega": [1.0, 1.0]}, "dop853", **given)
+    assert found.y_crossing.dtype == np.float64
+    assert abs(found.y_crossing.values - np.pi / 2).max() < 10 * steps * 2.0**-25 + h**4 / 384
+    run = sw.integrate(sw.Oscillator(1.0), "dop853", v=0.0, y=1.0, dt=h, steps=steps, every=1, dtype="float32")
+    after = int(np.argmax(run.y <= 0.0))
+    assert run.t[after - 1] < found.y_crossing.values[0] < run.t[after]
 
 
 def test_directions_and_what_never_passes() -> None:
@@ -315,11 +364,15 @@ def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
     np.testing.assert_allclose(found.lyapunov.sum("exponent"), -0.3, atol=1e-5)
 
 
+@each_type
 @pytest.mark.parametrize(("every", "steps"), [(1, 10), (4, 10), (5, 10), (20, 10)])
-def test_histories_are_those_of_integrate(every: int, steps: int) -> None:
+def test_histories_are_those_of_integrate(every: int, steps: int, dtype: Any) -> None:
     omega = np.array([1.0, 2.0, 3.0])
-    found = sw.sweep(Oscillator, {"omega": omega}, "verlet", v=0.3, y=1.0, dt=0.1, steps=steps, every=every, memory=1500, chunk=2)
-    run = sw.integrate(Oscillator(omega), "verlet", v=0.3, y=1.0, dt=0.1, steps=steps, every=every)
+    given: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": steps, "every": every, "dtype": dtype}
+    found = sw.sweep(Oscillator, {"omega": omega}, "verlet", **given, memory=1500, chunk=2)
+    run = sw.integrate(Oscillator(omega), "verlet", **given)
+    assert found.y.dtype == found.v.dtype == run.y.dtype == dtype
+    assert found.attrs.get("dtype", "float64") == dtype
     np.testing.assert_array_equal(found.y, run.y.T)
     np.testing.assert_array_equal(found.v, run.v.T)
     np.testing.assert_array_equal(found.t, run.t)
@@ -412,11 +465,14 @@ def test_rates_are_those_of_the_motion(name: str) -> None:
     ],
     ids=str,
 )
-def test_every_division_gives_the_same_bits(division: dict[str, Any]) -> None:
-    one, other = small(), small(**division)
+@each_type
+def test_every_division_gives_the_same_bits(division: dict[str, Any], dtype: Any) -> None:
+    given: dict[str, Any] = {} if dtype == "float64" else {"dtype": dtype, "outcomes": WITH_FLOAT32}
+    one, other = small(**given), small(**given, **division)
     assert unlike(one, other) == []
     assert one.attrs == other.attrs
     assert len(one.attrs["bits"]) == 32
+    assert given == {} or one.attrs["bits"] != small(outcomes=WITH_FLOAT32).attrs["bits"]
 
 
 def test_a_bit_that_differs_has_another_hash() -> None:
@@ -558,6 +614,40 @@ def test_what_is_refused(what: str) -> None:
     wrong, message = REFUSED[what]
     with pytest.raises((sw.StepwellError, TypeError), match=re.escape(message)):
         sw.sweep(**(GOOD | wrong))
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "said"),
+    [
+        ({"tolerance": 1e-3, "at": [1.0]}, UnsupportedError, "dtype: float32 goes with fixed steps only, and tolerance="),
+        ({"outcomes": "lyapunov"}, ArgumentError, "dtype: goes without Lyapunov exponents"),
+        ({"axes": {"omega": [1.0, 1e39, 1.0]}}, ArgumentError, "axes: omega: expected numbers up to 3.4e38"),
+        (
+            {"axes": {"dt": [0.1, 1e-50, 0.1]}, "dt": None},
+            ArgumentError,
+            "dt: expected a number of size 1.4e-45 to 3.4e38 units of time in float32",
+        ),
+        ({"y": 1e39}, ArgumentError, "y: expected numbers up to 3.4e38"),
+        ({"method": "taylor"}, UnsupportedError, "dtype: float32 does not go with taylor"),
+        ({"dtype": "float16"}, DTypeError, "dtype: expected 'float64' or 'float32', got 'float16'"),
+    ],
+)
+def test_what_does_not_go_with_float32_is_said_before_any_work(
+    options: dict[str, Any], error: type[Exception], said: str
+) -> None:
+    given = {
+        "axes": {"omega": [1.0, 2.0, 3.0]},
+        "method": "rk4",
+        "v": 0.0,
+        "y": 1.0,
+        "dt": 0.1,
+        "steps": 10,
+        "dtype": "float32",
+    } | options
+    if "tolerance" in given:
+        given |= {"dt": None, "steps": None}
+    with pytest.raises(error, match=said):
+        sw.sweep(sw.Oscillator(), **given) if "dt" in given["axes"] else sw.sweep(partial(sw.Oscillator), **given)  # type: ignore[arg-type]
 
 
 def test_a_component_must_be_given_where_there_are_several() -> None:

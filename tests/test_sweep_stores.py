@@ -173,6 +173,17 @@ def test_a_store_of_another_sweep_is_refused(tmp_path: Path) -> None:
             small(**({"outcomes": "last", "steps": 10, "store": path} | wrong))
 
 
+def test_a_store_holds_float32_and_goes_on_with_no_other(tmp_path: Any) -> None:
+    store = tmp_path / "sweep.zarr"
+    given: dict[str, Any] = {"outcomes": ("last", "extremes", "mean"), "chunk": 9}
+    found = small(dtype="float32", store=store, **given)
+    assert found.y_last.dtype == np.float32
+    assert unlike(found.compute(), small(dtype="float32", **given)) == []
+    assert unlike(small(dtype="float32", store=store, **given).compute(), found.compute()) == []
+    with pytest.raises(ArgumentError, match="is of another sweep and is not continued"):
+        small(store=store, **given)
+
+
 def test_other_equations_of_the_same_name_are_refused(tmp_path: Path) -> None:
     """The first steps of two members are compared to the bit."""
     path, given = tmp_path / "a.zarr", {"y": 1.0, "v": 0.0, "dt": 0.1, "steps": 10}
