@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import mpmath as mp
+import numpy as np
 
 mp.mp.dps = 70
 
@@ -34,7 +35,12 @@ FITS: dict[str, tuple[Callable[[Any], Any], Any, Any, int, int]] = {
 }
 
 
-def fit(f: Callable[[Any], Any], low: Any, high: Any, n: int, weight: int) -> tuple[list[float], float]:
+#: The same for float32 (``single_others.py``).
+SINGLE_FITS = {name: (*FITS[name][:3], n, FITS[name][4]) for name, n in {"SINH": 3, "COSH": 2, "ATAN": 5, "ASIN": 6}.items()}
+SINGLE_FITS |= {name: (*FITS[name][:3], n, FITS[name][4]) for name, n in {"EXP2": 5, "EXP": 5, "LOG_LONG": 4}.items()}
+
+
+def fit(f: Callable[[Any], Any], low: Any, high: Any, n: int, weight: int, rounded: Any = float) -> tuple[list[float], float]:
     """Coefficients from the lowest power up, and the largest error found at 300 points, times that power of the argument."""
     many = 4 * n
     points = [(low + high) / 2 + (high - low) / 2 * mp.cospi((mp.mpf(k) + 0.5) / many) for k in range(many)]
@@ -43,7 +49,7 @@ def fit(f: Callable[[Any], Any], low: Any, high: Any, n: int, weight: int) -> tu
     for k in range(n):
         powers = mp.matrix([[z ** (j + weight) for j in range(k, n)] for z in points])
         weighted = mp.matrix([value * z**weight for value, z in zip(rest, points, strict=True)])
-        c = float(mp.lu_solve(powers, weighted)[0])  # of more equations than unknowns it makes the least squares
+        c = float(rounded(mp.lu_solve(powers, weighted)[0]))  # of more equations than unknowns it makes the least squares
         rest = [value - c * z**k for value, z in zip(rest, points, strict=True)]
         coefficients.append(c)
     between = [low + (high - low) * (mp.mpf(k) + mp.mpf(1) / 3) / 300 for k in range(300)]
@@ -52,7 +58,8 @@ def fit(f: Callable[[Any], Any], low: Any, high: Any, n: int, weight: int) -> tu
 
 
 if __name__ == "__main__":
-    for name, given in FITS.items():
-        coefficients, error = fit(*given)
+    fits = [(name, *fit(*arguments)) for name, arguments in FITS.items()]
+    fits += [(f"float32: {name}", *fit(*arguments, np.float32)) for name, arguments in SINGLE_FITS.items()]
+    for name, coefficients, error in fits:
         print(f"{name} = (  # error {error:.2g}")
         print("".join(f"    {c!r},\n" for c in coefficients) + ")")

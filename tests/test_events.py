@@ -26,24 +26,54 @@ def nearly_first(case: Case) -> Any:
 
 
 DIRECT = [case for case in cases() if case.form == "direct"]
+DTYPES = pytest.mark.parametrize("dtype", ["float64", "float32"])
 
 
+@DTYPES
 @pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 1}, "events"))
 @pytest.mark.filterwarnings("ignore")
-def test_steps_are_those_of_a_run_without_and_both_backends_agree(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_are_those_of_a_run_without_and_both_backends_agree(
+    case: Case, dtype: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     event = nearly_first(case)
-    plain, run = case.run(5), case.run(5, events=event)
+    if dtype == "float32" and case.refused_in_float32():
+        return
+    plain, run = case.run(5, dtype=dtype), case.run(5, events=event, dtype=dtype)
     assert_same(plain, run)
-    reference = case.run(5, events=event, backend="numpy")
+    reference = case.run(5, events=event, backend="numpy", dtype=dtype)
     assert_same(reference, run)
     assert_same_events(reference, run)
     # Where few states are saved the core notices changes of sign, and only the steps of such members are looked at.
     monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
     monkeypatch.setattr(driver, "WATCHED_STEPS", 8)
-    noticed = case.run(5, every=None, events=event)
+    noticed = case.run(5, every=None, events=event, dtype=dtype)
     assert_same_events(reference, noticed)
     np.testing.assert_array_equal(noticed.y[-1], plain.y[-1])
     np.testing.assert_array_equal(noticed.v[-1], plain.v[-1])
+
+
+@pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 1}, "events"))
+@pytest.mark.filterwarnings("ignore")
+def test_a_trial_of_float32_of_the_whole_length_is_the_step(case: Case) -> None:
+    if case.refused_in_float32():
+        return
+    system, arguments = case.make(5)
+    method, dt = sw.method(case.method), float(np.float32(0.1))
+    plan = engine.Plan(
+        system.stepped_by(method),
+        method,
+        (5,),
+        dt,
+        choice=method.start_choice(case.start),
+        single=True,
+        force=arguments.get("force"),
+    )
+    index = np.array([3, 0, 0, 4])
+    v, y = (arguments[name].astype(np.float32).astype(np.float64) for name in ("v", "y"))
+    made = Trials(plan, Members(plan)).step(index, np.zeros(4), np.full(4, dt), v[..., index], y[..., index])
+    out = engine.advance(plan, v, y)
+    for trial, step in zip(made, (out.v[-1], out.y[-1]), strict=True):
+        np.testing.assert_array_equal(trial, step[..., index])
 
 
 @pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 1}, "events"))
@@ -97,11 +127,12 @@ def test_the_sweep_has_something_of_everything() -> None:
     np.testing.assert_array_equal(run.status == sw.Status.EVENT, stopped)
 
 
+@DTYPES
 @pytest.mark.parametrize("method", ["rk4", "verlet", "false_euler"])
-def test_a_member_alone_is_the_same_as_in_a_batch(method: str) -> None:
-    run = sweep(method=method)
+def test_a_member_alone_is_the_same_as_in_a_batch(method: str, dtype: str) -> None:
+    run = sweep(method=method, dtype=dtype)
     for i in (0, 1, 17, 39):
-        alone = sweep(slice(i, i + 1), method=method)
+        alone = sweep(slice(i, i + 1), method=method, dtype=dtype)
         np.testing.assert_array_equal(alone.y[:, 0], run.y[:, i])
         assert alone.stopped_at is not None
         np.testing.assert_array_equal(alone.stopped_at[0], run.stopped_at[i])
@@ -112,14 +143,15 @@ def test_a_member_alone_is_the_same_as_in_a_batch(method: str) -> None:
                 np.testing.assert_array_equal(a, b)
 
 
+@DTYPES
 @pytest.mark.parametrize("method", ["rk4", "verlet"])
-def test_how_many_are_looked_at_together_does_not_matter(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = sweep(method=method)
+def test_how_many_are_looked_at_together_does_not_matter(method: str, dtype: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = sweep(method=method, dtype=dtype)
     for numbers, longest, located in ((1 << 8, 5, 1), (1 << 6, 1, 7), (1 << 20, 100_000, 1 << 20)):
         monkeypatch.setattr(driver, "NUMBERS_AT_ONCE", numbers)
         monkeypatch.setattr(driver, "MOST_STEPS", longest)
         monkeypatch.setattr(collected, "LOCATED_AT_ONCE", located)
-        other = sweep(method=method)
+        other = sweep(method=method, dtype=dtype)
         assert_same(run, other)
         assert_same_events(run, other)
 
@@ -168,8 +200,9 @@ def test_a_system_whose_step_is_too_long_for_one_tape(monkeypatch: pytest.Monkey
     assert_same_events(*runs)
 
 
-def test_threads_do_not_matter() -> None:
-    one, two = sweep(threads=1), sweep(threads=2)
+@DTYPES
+def test_threads_do_not_matter(dtype: str) -> None:
+    one, two = sweep(threads=1, dtype=dtype), sweep(threads=2, dtype=dtype)
     assert_same(one, two)
     assert_same_events(one, two)
 
@@ -204,11 +237,12 @@ def test_batch_axes_and_parameters_of_all_shapes() -> None:
         found.of((0, 2))
 
 
+@DTYPES
 @pytest.mark.parametrize("method", ["rk4", "verlet", "leapfrog"])
-def test_pieces_find_what_the_whole_finds(method: str) -> None:
+def test_pieces_find_what_the_whole_finds(method: str, dtype: str) -> None:
     arguments: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1}
-    whole = sw.integrate(sw.Oscillator(), method, **arguments, steps=200, events=crossing)
-    head = sw.integrate(sw.Oscillator(), method, **arguments, steps=77, events=crossing)
+    whole = sw.integrate(sw.Oscillator(), method, **arguments, steps=200, events=crossing, dtype=dtype)
+    head = sw.integrate(sw.Oscillator(), method, **arguments, steps=77, events=crossing, dtype=dtype)
     tail = sw.integrate(sw.Oscillator(), method, resume=head, steps=123, events=crossing)
     np.testing.assert_array_equal(tail.y[-1], whole.y[-1])
     for name in ("t", "v", "y", "step"):

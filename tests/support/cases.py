@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell._core import Tape
+from stepwell.errors import ArgumentError, TraceError, UnsupportedError
 from stepwell.reference.series import expanded
 from stepwell.reference.traced import Tracer
 
@@ -279,6 +280,14 @@ class Case:
         if system.constraint == "length" or (sw.method(self.method).has_series and self.system.startswith("springs")):
             v, y = 0.02 * v, 0.15 * y + _apart(system)  # v along a rod would shorten it until it has no direction
         return system, {"method": self.method, "v": v, "y": y, "dt": 0.1, "form": self.form, "start": self.start}
+
+    def refused_in_float32(self) -> str:
+        """Why float32 does not go with it, or nothing."""
+        try:
+            self.run(1, steps=1, every=None, dtype="float32")
+        except (UnsupportedError, ArgumentError, TraceError) as error:
+            return str(error)
+        return ""
 
     def run(self, b: int, seed: int = 0, **options: Any) -> sw.Run:
         """A run of b members."""

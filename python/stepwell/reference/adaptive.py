@@ -30,6 +30,8 @@ TINY, CALM_ROOTS = 1e-10, (0.5623413251903491, 0.7498942093324558)
 #: margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 #: rounding.
 ROUNDING = 1.0 / (1 << 40)
+#: The same of states of float32, whose roundings are 2²⁹ times as large.
+SINGLE_ROUNDING = 1.0 / (1 << 11)
 #: A component that has been zero so far counts as this part of the largest in its block. A cascade or a wave reaches one
 #: component after the other, each at first with a power of the time that is beyond the order of the method: relative to itself
 #: its first step would always be all wrong, however short.
@@ -192,12 +194,18 @@ class Jumps(NamedTuple):
     after: Array
 
     @classmethod
-    def around(cls, times: Array, t0: Any) -> Self:
+    def around(cls, times: Array, t0: Any, in_single: Any = None) -> Self:
         """Some roundings before and after each; t0 is the start, before which no jump counts. An infinite one is none.
 
-        Times of stages are rounded to the larger of the times at both ends of a step, so they stay on their side.
+        Times of stages are rounded to the larger of the times at both ends of a step, so they stay on their side. ``in_single``
+        are the jumps that rates compare with times of float32.
         """
-        margin = np.where(np.isfinite(times), 4.0 * np.spacing(np.maximum(np.abs(times), np.abs(t0))), 0.0)
+        size = np.maximum(np.abs(times), np.abs(t0))
+        rounding = np.spacing(size)
+        if in_single is not None:
+            with np.errstate(over="ignore", invalid="ignore"):
+                rounding = np.where(in_single, np.spacing(size.astype(np.float32)), rounding)
+        margin = np.where(np.isfinite(times), 4.0 * rounding, 0.0)
         before, after = times - margin, times + margin
         gone = after < t0
         return cls(np.where(gone, -np.inf, before), np.where(gone, -np.inf, after))
@@ -467,18 +475,61 @@ def attempt(
     An extra step that is accepted leaves the pace as it is. ``order`` is the one in which the error is estimated.
     """
     outlook = pace.outlook(budget)
-    step, groups = outlook.step, acceptance.groups
+    made = tried(pair, system, pace.t, outlook.step, v, y)
+    return judged(pace, outlook, order, block_axes, acceptance, v, y, made)
+
+
+class Tried(NamedTuple):
+    """What an attempt makes before it is decided whether it counts.
+
+    Attributes:
+        v: velocities after the step.
+        y: coordinates after the step.
+        errors: one or two estimates of their error.
+        projected: the state after the step as a projection leaves it.
+        work: the energy that a control or projection added, or None.
+    """
+
+    v: Array
+    y: Array
+    errors: list[tuple[Array, Array]]
+    projected: tuple[Array, Array]
+    work: Any
+
+
+def tried(pair: Pair, system: Attempted, t: Any, step: Any, v: Array, y: Array) -> Tried:
+    """The stages of an attempt, and what follows from them by their weights."""
     s = system.rates(step)
-    increments = pair.stages(s, pace.t, step, v, y)
+    increments = pair.stages(s, t, step, v, y)
     v1, y1 = tableau.plus(v, y, pair.WEIGHTS, increments)
+    weights = [pair.ERROR, *([coarse] if (coarse := getattr(pair, "COARSE", None)) else [])]
+    errors = [tableau.combined(each, increments) for each in weights]
+    v2, y2, work = system.project(v1, y1)
+    return Tried(v1, y1, errors, (v2, y2), s.work / step if hasattr(s, "work") else work)
+
+
+def judged(
+    pace: Pace,
+    outlook: Outlook,
+    order: int,
+    block_axes: tuple[int, int],
+    acceptance: Acceptance,
+    v: Array,
+    y: Array,
+    made: Tried,
+    *,
+    rounding: float = ROUNDING,
+) -> tuple[Pace, Array, Array]:
+    """The pace after an attempt, and the state: the new one if the error is tolerated, and if there was a step to try."""
+    step, groups, v1, y1 = outlook.step, acceptance.groups, made.v, made.y
     old, new = sizes(v, y, block_axes, groups), sizes(v1, y1, block_axes, groups)
-    least, bound = tolerated(pace, step, acceptance.counts(*numbers_in(v, y, block_axes)), old, new)
-    error = sizes(*tableau.combined(pair.ERROR, increments), block_axes, groups)
+    least, bound = tolerated(pace, step, acceptance.counts(*numbers_in(v, y, block_axes)), old, new, rounding)
+    error = sizes(*made.errors[0], block_axes, groups)
     r = over(error, bound)
     # Of a coarse estimate e₃ of third order and one of fifth, the corrected one is e₅²/√(e₅² + 0.01·e₃²). Where rates jump, e₅
     # may be next to nothing by chance, so it is corrected only where the two are as of smooth rates: e₅ falls as e₃^(3/2).
-    if coarse := getattr(pair, "COARSE", None):
-        second = sizes(*tableau.combined(coarse, increments), block_axes, groups)
+    for coarse in made.errors[1:]:
+        second = sizes(*coarse, block_axes, groups)
         of_second, share = over(second, bound), over(second, longer(pace.longest, new))
         other = of_second / r
         by_chance = less(CHANCE, other) & less(WILD, share)
@@ -492,11 +543,9 @@ def attempt(
         r = where(less(component(v1, y1, block_axes, row), 0.0), longer(r, OUTSIDE), r)
     rests = at_most(total(error) + total(absolute(new - old)), 0.0)
     following, goes_on = decided(pace, order > LOW, r, rests, least, outlook)
-    v1, y1, work = system.project(v1, y1)
-    done = s.work / step if hasattr(s, "work") else work
-    if done is not None:
-        following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + done, pace.work))
-    return following, where(goes_on, v1, v), where(goes_on, y1, y)
+    if made.work is not None:
+        following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + made.work, pace.work))
+    return following, *(where(goes_on, new, now) for new, now in zip(made.projected, (v, y), strict=True))
 
 
 def decided(pace: Pace, high: bool, r: Any, rests: Any, new: Any, outlook: Outlook) -> tuple[Pace, Any]:
@@ -542,10 +591,11 @@ def decided(pace: Pace, high: bool, r: Any, rests: Any, new: Any, outlook: Outlo
     return following, takes | (is_extra & good)
 
 
-def tolerated(pace: Pace, step: Any, counts: tuple[int, int], old: Any, new: Any) -> tuple[Any, Any]:
+def tolerated(pace: Pace, step: Any, counts: tuple[int, int], old: Any, new: Any, rounding: float) -> tuple[Any, Any]:
     """Of each group the size that it has at least after the step, and the error that is tolerated.
 
-    ``counts`` are how many groups v and y have; ``old`` and ``new`` are their sizes before and after the step.
+    ``counts`` are how many groups v and y have; ``old`` and ``new`` are their sizes before and after the step. ``rounding`` is
+    ``ROUNDING``, or that of float32.
     """
     # A state at zero so far on which a force sets in counts as long as that force would have made it in a part of the time since.
     since = longer(1.0, PUSHED * ((pace.t + step - pace.begin) / step))
@@ -564,7 +614,7 @@ def tolerated(pace: Pace, step: Any, counts: tuple[int, int], old: Any, new: Any
                 lasting.append(where(been, size, where(rested, now * since, onset)))
                 least.append(where(been | rested, now, longer(now, onset)))
     if all(counts):
-        lost = ROUNDING / step
+        lost = rounding / step
         lasting[:of_v] = [
             longer(size, of_y * lost) for size, of_y in zip(lasting[:of_v], paired(pace.longest[of_v:], of_v), strict=True)
         ]

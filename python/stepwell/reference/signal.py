@@ -94,6 +94,8 @@ class Held:
     """``values[i]`` from start + i·interval until the next sample; the first before, the last after."""
 
     factor: Array | None = None
+    #: Whether its values are the times at which the samples of another begin.
+    is_times = False
 
     def __init__(self, values: Array, interval: float, start: float) -> None:
         self.values, self.interval, self.start = values, interval, start
@@ -137,6 +139,7 @@ class Stepped:
 
     def __init__(self, samples: Held, times: Held, origin: Held | None = None) -> None:
         self.samples, self.times, self.origin = samples, times, origin
+        times.is_times = True
 
     def parts(self) -> dict[str, Held]:
         """Its tables, by what is put behind its name."""
@@ -183,6 +186,7 @@ class Curve:
 
     def __init__(self, *tables: Held) -> None:
         *self.coefficients, self.times = tables
+        self.times.is_times = True
 
     def parts(self) -> dict[str, Held]:
         """Its tables, by what is put behind its name."""

@@ -6,7 +6,7 @@ Any tape will do that gives symbols for ``number``, ``state``, ``param``, ``step
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import count
+from itertools import count, tee
 from math import prod
 from typing import Any
 
@@ -38,12 +38,24 @@ class Sampled(Held):
         return self.tape.sample(self.table, np.asarray(t)[()])
 
 
+class HeldAll(Held):
+    """A sampled input whose value is known: a symbol."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def sample(self, t: Any) -> Any:
+        """The same at all times."""
+        return self.value
+
+
 class Tracer:
     """A system of symbols, for one member, and what can be traced of it; a force from outside is of shape (*block, *batch).
 
     Attributes:
         numbers: what stands behind the parameters: of each symbol its number for every member.
         tables: what stands behind the sampled inputs.
+        times: the numbers of those whose values are the times at which samples begin.
     """
 
     def __init__(self, system: Any, tape: Any, force: Any = None) -> None:
@@ -51,6 +63,9 @@ class Tracer:
         self._params, self._tables = map(tape.param, count()), count()
         self.numbers: list[Any] = []
         self.tables: list[Held] = []
+        self.times: set[int] = set()
+        #: The values of sampled inputs, where these are known and no time is asked for.
+        self._values: Iterator[Any] | None = None
 
     def state(self) -> tuple[Any, Any, Any]:
         """Both blocks, and the symbols of the state that come after them."""
@@ -66,8 +81,12 @@ class Tracer:
         self.numbers += [numbers[index] for index in np.ndindex(shape)]
         return _array(shape, self._params)
 
-    def _table(self, table: Held) -> Sampled:
+    def _table(self, table: Held) -> Held:
+        if table.is_times:
+            self.times.add(len(self.tables))
         self.tables.append(table)
+        if self._values is not None:
+            return HeldAll(next(self._values))
         return Sampled(self.tape, next(self._tables))
 
     def _own(self) -> dict[str, Any]:
@@ -130,6 +149,18 @@ class Tracer:
             order = method.error_order
             following, v, y = adaptive.attempt(steps, system, order, axes, acceptance, pace, self.tape.budget(), v, y)
         return self.flat(v, y, *following.numbers)
+
+    def tried(self, method: Any, *, backward: bool = False) -> list[Any]:
+        """The first part of an attempt of float32, before the decision: see ``adaptive.Tried``.
+
+        Its state is v, y, the time, the step, and the value of each sampled input in the step; the results stand behind these.
+        """
+        v, y, more = self.state()
+        t, step, (self._values, more) = next(more), next(more), tee(more)
+        made = adaptive.tried(method.steps, self.attempted(backward=backward), t, step, v, y)
+        values = [next(more) for _ in self.tables]
+        results = [block for pair in ((made.v, made.y), *made.errors, made.projected) for block in pair]
+        return self.flat(v, y, t, step, *values, *results, 0.0 if made.work is None else made.work)
 
     def begin(self, method: Any, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state, and the pace at the start of a run with a tolerance."""

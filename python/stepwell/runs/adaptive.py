@@ -38,8 +38,8 @@ def adaptive_run(request: Request) -> Run:
     control = request.system.control
     run = Run(
         t=times,
-        v=out.v,
-        y=out.y,
+        v=out.v.astype(plan.dtype, copy=False),
+        y=out.y.astype(plan.dtype, copy=False),
         status=out.status.astype(np.int8),
         first_bad_step=np.where(out.status == 0, -1, accepted + 1) if stopped else np.full(plan.batch, -1),
         carry=None,

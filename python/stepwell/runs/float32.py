@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.checks import LARGEST_SINGLE
+from ..base.arrays import Array
+from ..base.checks import LARGEST_SINGLE, fits_single
 from ..errors import ArgumentError, UnsupportedError
 from ..model.inputs import LAST_SINGLE_ANGLE
 from ..model.systems import Sampled, Sinusoid
@@ -16,26 +17,57 @@ if TYPE_CHECKING:
     from ..model.systems import System
 
 
-def step(system: System, how: Method, form: str, dt: float, *, events: bool = False) -> float:
-    """The step in float32; raise if there is none, or nothing of float32 goes with what is asked for."""
-    if form != "direct":
+def check(system: System, method: Method, form: str = "direct") -> None:
+    """Raise if nothing of float32 goes with what is asked for."""
+    if form == "matrix":
         raise UnsupportedError(f"dtype: float32 goes with form='direct' only, got form={form!r}")
-    if how.has_series:
+    if form == "power":
         raise UnsupportedError(
-            f"dtype: float32 does not go with {how.name}, whose series are computed in float64 only; use float64, or a "
-            f"Runge-Kutta method such as rk4"
+            "dtype: float32 does not go with form='power': each squaring of a matrix doubles the error of the power, which is "
+            "2⁻²⁴ times the steps in the end; use form='matrix', or round the states of float64"
         )
-    if events:
+    if method.has_series:
         raise UnsupportedError(
-            "dtype: float32 does not go with events=, which are located in float64 only; use float64, or look for them in the "
-            "saved states"
+            f"dtype: float32 does not go with {method.name}, whose series are computed in float64 only; use float64, or a "
+            f"Runge-Kutta method such as rk4"
         )
     if system.contacts and _is_of_rods(system):
         raise UnsupportedError(
             f"dtype: float32 does not go with rods that meet surfaces, whose joints are decided by more digits than it has, got "
             f"{system!r}; use float64"
         )
+
+
+def step(system: System, method: Method, form: str, dt: float) -> float:
+    """The step in float32; raise if there is none, or nothing of float32 goes with what is asked for."""
+    check(system, method, form)
     return rounded_step(dt)
+
+
+#: The least error of a step relative to the state that float32 can tell from rounding: the state is rounded by up to 2⁻²⁴ of its
+#: size, and the sum of what is added to it by up to as much again.
+LEAST_TOLERANCE = 2.0**-23
+
+
+def check_tolerance(relative: Array, absolute: Array | None, sizes: Array) -> None:
+    """Raise if a step tolerates an error that is less than its roundings.
+
+    Args:
+        relative: of all groups of components of the state, or of each along the first axis.
+        absolute: likewise; None if there is none.
+        sizes: of each group along the first axis, at the start.
+    """
+    allowed = np.asarray(relative) * np.ones(sizes.shape)
+    if absolute is not None:
+        with np.errstate(all="ignore"):
+            allowed = allowed + np.where(sizes > 0.0, absolute / sizes, np.inf)
+    allowed = np.where((sizes > 0.0) & np.isfinite(sizes), allowed, np.inf)
+    if not allowed.size or (least := float(allowed.min())) >= LEAST_TOLERANCE:
+        return
+    raise ArgumentError(
+        f"tolerance: in float32 a step rounds the state by up to 2⁻²³ = {LEAST_TOLERANCE:.3g} of its size, whatever its length, "
+        f"so no less can be asked for, got {least:.3g} of the size at the start; use {LEAST_TOLERANCE:.3g} or more, or float64"
+    )
 
 
 def _is_of_rods(system: System) -> bool:
@@ -52,28 +84,25 @@ def rounded_step(dt: float) -> float:
     return rounded
 
 
+def rounded_state(*blocks: Array) -> tuple[Array, ...]:
+    """The numbers of float32 that are nearest to those of a start; raise if some are beyond its range."""
+    for name, block in zip("vy", blocks, strict=True):
+        fits_single(name, block)
+    return tuple(block.astype(np.float32).astype(np.float64) for block in blocks)
+
+
 def check_inputs(system: System, last: float) -> None:
     """Raise if an input is not defined in float32 up to a time."""
-    for name, given in system.all_inputs().items():
-        if isinstance(given, Sampled) and not given.constant:
+    for name, each in system.all_inputs().items():
+        if isinstance(each, Sampled) and not each.constant:
             raise UnsupportedError(
                 f"dtype: float32 does not go with samples, whose times take more digits than it has, and {name} has some; use "
                 f"float64, or a force that is constant over each of several runs"
             )
-        if isinstance(given, Sinusoid):
-            angle = float(np.abs(given.omega).max() * abs(last) + np.abs(given.phase).max())
+        if isinstance(each, Sinusoid):
+            angle = float(np.abs(each.omega).max() * abs(last) + np.abs(each.phase).max())
             if angle > LAST_SINGLE_ANGLE:
                 raise ArgumentError(
                     f"{name}: in float32 a sinusoid's angle may grow to {LAST_SINGLE_ANGLE:.3g} rad, but reaches {angle:.3g} rad "
                     f"by t = {last:g}"
                 )
-
-
-def check_control(system: Any) -> None:
-    """Raise if a control does not go with float32."""
-    from ..model.systems.own import OwnSystem
-
-    if isinstance(system, OwnSystem) and system.keeper is not None:
-        raise UnsupportedError(
-            f"dtype: float32 does not go with a control of your own equations, got {system.keeper!r}; use float64"
-        )

@@ -175,7 +175,7 @@ class Request(NamedTuple):
         if single:
             from . import float32  # only such runs need it
 
-            dt = float32.step(system, how, form, dt, events=watched is not None)
+            dt = float32.step(system, how, form, dt)
         if before is not None:
             continuation.goes_on_alike(before, how, dt)
         t0 = 0.0 if t0 is None else checks.beginning(t0)
@@ -231,7 +231,7 @@ class Request(NamedTuple):
                 v, y = (np.asarray(block, np.float32).astype(np.float64) for block in (v, y))
         v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)
         if control is not None:
-            system = _controlled(system, how, control, v, y, dt, single)
+            system = _controlled(system, how, control, v, y, dt)
         system = system.stepped_by(how)
         stepped = system.over_steps(how, checks.once_of(t0) if isinstance(t0, np.ndarray) else t0, dt)
         carried = False
@@ -392,7 +392,7 @@ class Request(NamedTuple):
         if single:
             from . import float32  # only such worlds need it
 
-            dt = float32.step(system, how, "direct", dt, events=events is not None)
+            dt = float32.step(system, how, "direct", dt)
         if before is not None:
             continuation.goes_on_alike(before, how, dt)
         t0 = 0.0 if options.t0 is None else checks.number("t0", options.t0, unit="units of time")
@@ -418,9 +418,7 @@ class Request(NamedTuple):
         if control is not None:
             if checks.batch_shape({"control": control.batch, "v and y": batch}) != batch:
                 raise ShapeError(f"control: its batch {control.batch} does not broadcast to that of v and y, {batch}")
-            stepped = _controlled(
-                system, how, control, np.asarray(v, np.float64), np.asarray(y, np.float64), dt, single
-            ).stepped_by(how)
+            stepped = _controlled(system, how, control, np.asarray(v, np.float64), np.asarray(y, np.float64), dt).stepped_by(how)
         slot = None
         if before is not None and before.carry is not None and before.holds(stepped, batch, v, y):
             slot = np.array(before.carry, dtype=kind).reshape(-1)
@@ -463,14 +461,10 @@ def _arithmetic(fused: Any, dtype: Any) -> tuple[bool, bool]:
     return fused is not None and checks.flag("fused", fused), dtype is not None and checks.is_single(dtype)
 
 
-def _controlled(system: System, how: Method, control: Any, v: Array, y: Array, dt: float, single: bool) -> System:
+def _controlled(system: System, how: Method, control: Any, v: Array, y: Array, dt: float) -> System:
     """The system under control, the target that of the state if the control has none."""
     system = system.controlled(control, v, y, dt)
     fits_together(system, how)
-    if single:
-        from . import float32
-
-        float32.check_control(system)
     return system
 
 

@@ -69,17 +69,18 @@ class Traced:
     Args:
         invariant: what it is.
         equations: the system.
+        single: whether the operations are those of float32.
     """
 
-    def __init__(self, invariant: Invariant, equations: Equations) -> None:
-        self.invariant, self.equations = invariant, equations
+    def __init__(self, invariant: Invariant, equations: Equations, *, single: bool = False) -> None:
+        self.invariant, self.equations, self._single = invariant, equations, single
         shapes = equations.own_shapes
         if changing := [each for each in invariant.parameters if shapes[each] is None]:
             raise ArgumentError(
                 f"{equations.name}: {invariant.name}: {', '.join(changing)} changes with the time, so nothing made of it is "
                 f"constant"
             )
-        self._tape = _core.Tape()
+        self._tape = _core.Tape(single=single)
         numbers = map(self._tape.param, count())
         parameters = {each: _symbols(shapes[each], numbers) for each in invariant.parameters}
         state = map(self._tape.state, count())
@@ -88,7 +89,7 @@ class Traced:
             made = equations.of_state(invariant, self._tape.time(), v, y, parameters)
         self._value = made if isinstance(made, _core.Symbol) else self._tape.number(float(made))
         self._state = [*v.flat, *y.flat]
-        self._of_value = Operations(*self._tape.operations([self._value]))
+        self._of_value = Operations(*self._tape.operations([self._value]), single=single)
         if any(name == "time" for name, *_ in self._of_value.lines):
             raise ArgumentError(
                 f"{equations.name}: {invariant.name}: expected a quantity of the state and the parameters, got one that depends "
@@ -103,15 +104,21 @@ class Traced:
         square = along[0] * along[0]
         for each in along[1:]:
             square = square + each * each
-        return Operations(*self._tape.operations([*along, square]))
+        return Operations(*self._tape.operations([*along, square]), single=self._single)
+
+    @cached_property
+    def _in_single(self) -> Traced:
+        return Traced(self.invariant, self.equations, single=True)
 
     def value(self, v: Any, y: Any, given: dict[str, Any]) -> Any:
         """The invariant of a state."""
-        return self._made(self._of_value, v, y, given)[0]
+        of = self._in_single if _are_single(v, y) else self
+        return of._made(of._of_value, v, y, given)[0]
 
     def gradient(self, v: Any, y: Any, given: dict[str, Any]) -> tuple[list[Any], list[Any], Any]:
         """Its derivatives by the numbers of v and of y, and the square of their length."""
-        *along, square = self._made(self._of_gradient, v, y, given)
+        of = self._in_single if _are_single(v, y) else self
+        *along, square = of._made(of._of_gradient, v, y, given)
         n_v = prod(self.equations.v_shape)
         return along[:n_v], along[n_v:], square
 
@@ -124,6 +131,12 @@ class Traced:
             numbers += _numbers(value, value.shape[: equations.own_axes(name)])
         with np.errstate(all="ignore"):
             return operations(state, numbers)
+
+
+def _are_single(*blocks: Any) -> bool:
+    """Whether a state is one of symbols of float32."""
+    of_symbols = (np.asarray(block) for block in blocks)
+    return any(getattr(each, "single", False) for block in of_symbols if block.dtype == object for each in block.flat)
 
 
 def _symbols(shape: Any, symbols: Any) -> Any:

@@ -241,27 +241,30 @@ class OwnSystem(System):
         self._core = self._rates()
         complete(self, velocity_term="forces that do" if self._core.reads_v else None)
 
-    def _rates(self, marks: Marks | None = None) -> Any:
-        """The rates as operations; with marks also the derivatives of the functions among them."""
+    def _rates(self, marks: Marks | None = None, *, single: bool = False) -> Any:
+        """The rates as operations; with marks also the derivatives of the functions among them.
+
+        Those of float32 are without the invariants that are recorded, which are computed in float64.
+        """
         equations, definition = self.equations, self.definition
         assert equations is not None
         plain = changed(self, around=())  # what is around the equations is the core's
-        tape = _core.Tape()
+        tape = _core.Tape(single=single)
         traced = []
-        for _ in range(2):
+        for _ in range(1 if single else 2):
             tracer = Tracer(plain, tape)
             v, y, _more = tracer.state()
             with nullcontext() if marks is None else recording(marks):
                 s = tracer.scaled(tape.step())
                 dv, dy = s.rates(tape.time(), v, y)
             traced.append((tracer.flat(dv), tracer.flat(dy)))
-        if [each.id for block in traced[0] for each in block] != [each.id for block in traced[1] for each in block]:
+        if [each.id for block in traced[0] for each in block] != [each.id for block in traced[-1] for each in block]:
             raise TraceError(
                 f"{definition.name}: expected the same operations at every call, got others: a function of a step may not draw "
                 f"random numbers or count its calls"
             )
         dv, dy = traced[0]
-        quantities = [(name, *tracer.flat(s.record(name, v, y))) for name in self.quantities]
+        quantities = [(name, *tracer.flat(s.record(name, v, y))) for name in self.quantities if not single]
         kept = None
         if equations.kept is not None and not equations.pushed:
             value = equations.invariants[equations.kept].value(v, y, s.given)
@@ -310,15 +313,9 @@ class OwnSystem(System):
         return [(RATES, rates), *flat(own, batch)]
 
     def _in_single(self) -> Any:
-        """The operations of the function in float32. Invariants are not among them."""
+        """The operations of the function in float32."""
         if self._single is None:
-            equations = self.equations
-            assert equations is not None
-            tape = _core.Tape(single=True)
-            tracer = Tracer(changed(self, around=()), tape)
-            v, y, _ = tracer.state()
-            dv, dy = (tracer.flat(rate) for rate in tracer.scaled(tape.step()).rates(tape.time(), v, y))
-            self._single = tape.equations(dv if equations.v_shape != (0,) else [], None if equations.second_order else dy)
+            self._single = self._rates(single=True)
         return self._single
 
     @property

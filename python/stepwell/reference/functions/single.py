@@ -1,16 +1,14 @@
 """Elementary functions of float32, of symbols only: for numbers of 32 bits steps exist as tapes alone.
 
-They go the ways of the functions of float64 with shorter polynomials. ``docs/numerics.md`` says how accurate each is.
+They go the ways of the functions of float64 with shorter polynomials. ``docs/theory/numerics.md`` says how accurate each is. The
+functions that need parts of others are in ``single_others.py``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
-from ...errors import UnsupportedError
 from .operations import (
-    SINGLE,
     add_bits,
     and_bits,
     either_bits,
@@ -60,8 +58,28 @@ LEAST_NORMAL = 2.0**-126
 INFINITY, NAN = float("inf"), float("nan")
 
 
-def _reduced(x: Any) -> tuple[Any, Any, Any, Any]:
-    """Of |x| = n·π/2 + r: a number in whose low bits n stands, whether n is odd, sin r and cos r; NaN if |x| is too large."""
+class Angle(NamedTuple):
+    """|x| − n·π/2, and sine and cosine of it, each as a sum of two numbers.
+
+    Attributes:
+        turn: a number in whose low bits n stands.
+        odd: whether n is odd.
+        sine, sine_rest: sin r is their sum, of which the first is r.
+        cosine, cosine_rest: cos r is their sum, of which the first is 1 − r²/2, rounded.
+        z: r², rounded.
+    """
+
+    turn: Any
+    odd: Any
+    sine: Any
+    sine_rest: Any
+    cosine: Any
+    cosine_rest: Any
+    z: Any
+
+
+def angle_of(x: Any) -> Angle:
+    """Both functions of what remains of |x|; NaN if |x| is too large."""
     x = magnitude(x)
     x = where(x <= LARGEST_ANGLE, x, x.number(NAN))
     turn = x * TWO_OVER_PI + MAGIC
@@ -74,80 +92,109 @@ def _reduced(x: Any) -> tuple[Any, Any, Any, Any]:
     z = r * r
     half = 0.5 * z
     cosine = 1.0 - half
-    sine = r + ((z * r) * polynomial(z, SIN) + tail * cosine)
-    cosine = cosine + (((1.0 - cosine) - half) + ((z * z) * polynomial(z, COS) - r * tail))
-    return turn, equal(and_bits(turn, 1), ODD), sine, cosine
+    sine_rest = (z * r) * polynomial(z, SIN) + tail * cosine
+    cosine_rest = ((1.0 - cosine) - half) + ((z * z) * polynomial(z, COS) - r * tail)
+    return Angle(turn, equal(and_bits(turn, 1), ODD), r, sine_rest, cosine, cosine_rest, z)
 
 
 def sin(x: Any) -> Any:
     """Sin x; NaN beyond 2²¹."""
-    turn, odd, sine, cosine = _reduced(x)
-    return turn_bits(where(odd, cosine, sine), sign_of(turn_bits(shift_up(turn, 30), x)))
+    p = angle_of(x)
+    value = where(p.odd, p.cosine + p.cosine_rest, p.sine + p.sine_rest)
+    return turn_bits(value, sign_of(turn_bits(shift_up(p.turn, 30), x)))
 
 
 def cos(x: Any) -> Any:
     """Cos x; NaN beyond 2²¹."""
-    turn, odd, sine, cosine = _reduced(x)
-    return turn_bits(where(odd, sine, cosine), sign_of(shift_up(add_bits(turn, 1), 30)))
+    p = angle_of(x)
+    value = where(p.odd, p.sine + p.sine_rest, p.cosine + p.cosine_rest)
+    return turn_bits(value, sign_of(shift_up(add_bits(p.turn, 1), 30)))
+
+
+class Exponent(NamedTuple):
+    """x = n·ln 2 + upper − lower, and eʳ = 1 + upper + rest."""
+
+    n: Any
+    upper: Any
+    lower: Any
+    r: Any
+    rest: Any
+
+
+def exponent_of(x: Any) -> Exponent:
+    """Of a number for which n is far below 2¹¹."""
+    n = (x * LOG2_E + MAGIC) - MAGIC
+    upper, lower = x - n * LN2[0], n * LN2[1]
+    r = upper - lower
+    return Exponent(n, upper, lower, r, (r * r) * polynomial(r, EXP) - lower)
+
+
+def held(x: Any, least: float, most: float) -> Any:
+    """X limited to two constants; a NaN remains one."""
+    x = where(x < least, x.number(least), x)
+    return where(x > most, x.number(most), x)
+
+
+def scaled(value: Any, n: Any, low: Any) -> Any:
+    """value·2ⁿ, rounded once, for |value| near 1; ``low`` is true where n < 0, perhaps also where n = 0.
+
+    No single number of normal size is 2ⁿ for all n, so there are two factors.
+    """
+    first = shift_up(n + where(low, n.number(MAGIC + BIAS + 64.0), n.number(MAGIC + BIAS - 1.0)), 23)
+    return (value * first) * where(low, n.number(2.0**-64), n.number(2.0))
 
 
 def exp(x: Any) -> Any:
     """Exponential of x, subnormal results included."""
-    x = where(x < UNDERFLOW_UNTIL, x.number(UNDERFLOW_UNTIL), x)
-    x = where(x > OVERFLOW_FROM, x.number(OVERFLOW_FROM), x)
-    n = (x * LOG2_E + MAGIC) - MAGIC
-    upper, lower = x - n * LN2[0], n * LN2[1]
-    r = upper - lower
-    s, lost = fast_sum(1.0, upper)
-    value = s + (lost + ((r * r) * polynomial(r, EXP) - lower))
-    # No single number of normal size is 2ⁿ for all n, so there are two factors.
-    low = x < 0.0
-    first = shift_up(n + where(low, x.number(MAGIC + BIAS + 64.0), x.number(MAGIC + BIAS - 1.0)), 23)
-    return (value * first) * where(low, x.number(2.0**-64), x.number(2.0))
+    x = held(x, UNDERFLOW_UNTIL, OVERFLOW_FROM)
+    p = exponent_of(x)
+    s, lost = fast_sum(1.0, p.upper)
+    return scaled(s + (lost + p.rest), p.n, x < 0.0)
+
+
+def exponent_and_rest(x: Any, *, normal: bool = False) -> tuple[Any, Any]:
+    """K and m of x = 2ᵏ·m with m from √½ to √2, of a positive number, which is not subnormal if ``normal``."""
+    offset: Any = TWO_23 + BIAS
+    if not normal:
+        tiny = x < LEAST_NORMAL
+        x, offset = where(tiny, x * 2.0**25, x), where(tiny, x.number(offset + 25.0), x.number(offset))
+    u = add_bits(x, TO_ONE)
+    return or_bits(shift_down(u, 23), TWO_23_BITS) - offset, add_bits(and_bits(u, MANTISSA), HALF_ROOT)
+
+
+class Logarithm(NamedTuple):
+    """ln x = k·ln 2 + f − half + rest, with half = f²/2 and s = f/(2 + f)."""
+
+    k: Any
+    f: Any
+    half: Any
+    s: Any
+    rest: Any
+
+
+def logarithm_of(x: Any, *, normal: bool = False) -> Logarithm:
+    """Of a positive number."""
+    k, m = exponent_and_rest(x, normal=normal)
+    f = m - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    half = (0.5 * f) * f
+    return Logarithm(k, f, half, s, s * (half + z * polynomial(z, LOG)))
+
+
+def at_the_ends(x: Any, value: Any) -> Any:
+    """A logarithm where x is positive and finite; −∞ of 0, NaN of negative numbers."""
+    value = where(x < INFINITY, value, x)  # infinity and NaN
+    return where(equal(x, 0.0), x.number(-INFINITY), where(x < 0.0, x.number(NAN), value))
 
 
 def log(x: Any) -> Any:
     """Ln x, subnormal numbers included; −∞ of 0, NaN of negative numbers."""
-    tiny = x < LEAST_NORMAL
-    normal, offset = where(tiny, x * 2.0**25, x), where(tiny, x.number(TWO_23 + BIAS + 25.0), x.number(TWO_23 + BIAS))
-    u = add_bits(normal, TO_ONE)
-    k = or_bits(shift_down(u, 23), TWO_23_BITS) - offset
-    f = add_bits(and_bits(u, MANTISSA), HALF_ROOT) - 1.0
-    s = f / (2.0 + f)
-    z = s * s
-    half = (0.5 * f) * f
-    rest = s * (half + z * polynomial(z, LOG))
-    value = k * LN2[0] - ((half - (rest + k * LN2[1])) - f)
-    value = where(x < INFINITY, value, x)  # infinity and NaN
-    return where(equal(x, 0.0), x.number(-INFINITY), where(x < 0.0, x.number(NAN), value))
+    p = logarithm_of(x)
+    return at_the_ends(x, p.k * LN2[0] - ((p.half - (p.rest + p.k * LN2[1])) - p.f))
 
 
 def round(x: Any) -> Any:
     """The whole number nearest to x; the even one if two are equally near."""
     y = magnitude(x)
     return either_bits(where(y < TWO_23, (y + TWO_23) - TWO_23, y), sign_of(x))
-
-
-#: The functions of float32 by name.
-FUNCTIONS: dict[str, Callable[..., Any]] = {"cos": cos, "exp": exp, "log": log, "round": round, "sin": sin}
-#: Those whose text is right for numbers of any precision: comparisons, choices, signs, single operations and products.
-OF_ANY = {"abs", "ceil", "copysign", "deg2rad", "equal", "floor", "greater", "greater_equal", "less", "less_equal", "maximum"}
-OF_ANY |= {"minimum", "not_equal", "of", "rad2deg", "sign", "sqrt", "square", "trunc"}
-#: Names by which users know functions that are called otherwise here.
-NAMES = {"any_power": "power, but with exponents that are multiples of ½ from −16 to 16,"}
-
-
-def version(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function of that name for float32; raise if there is none."""
-    if name in OF_ANY:
-        return function
-    if name in FUNCTIONS:
-        return FUNCTIONS[name]
-    known = ", ".join(sorted((OF_ANY | set(FUNCTIONS)) - {"of"}))
-    raise UnsupportedError(
-        f"dtype: {NAMES.get(name, name)} has no version of float32; there are {known}, and powers by products; write it with "
-        f"these, or use dtype='float64'"
-    )
-
-
-SINGLE.append(version)

@@ -9,7 +9,7 @@ from ..._core import Symbol, Tape
 from ...errors import UnsupportedError
 from ..marks import Mark, Marks
 from .operations import Operation
-from .rules import MIN_ROUNDING_CONSTANT, NO_RULE, no_derivative, number
+from .rules import MIN_ROUNDING_CONSTANT, MIN_SINGLE_ROUNDING_CONSTANT, NO_RULE, no_derivative, number
 
 #: How to write each operation again. Equal operations are on a tape only once, so the result is the symbol that was there.
 AGAIN: dict[str, Callable[..., Any]] = {
@@ -45,7 +45,7 @@ class Listing:
     """
 
     def __init__(self, tape: Tape, roots: Sequence[Symbol], marks: Marks) -> None:
-        self.tape = tape
+        self.tape, self._single = tape, any(root.single for root in roots)
         asked = list(roots)
         while True:  # the argument of a function may be on the tape without being needed for its value
             operations, places = tape.operations(asked)
@@ -91,7 +91,7 @@ class Listing:
             case "time":
                 made = self.tape.time()
             case "constant":
-                made = self.tape.number(number(given))
+                made = self.tape.number(number(given, single=self._single))
             case "sample":
                 made = self.tape.sample(given, *operands)
             case "add bits":
@@ -123,7 +123,7 @@ class Listing:
         if name in NO_RULE:
             raise no_derivative(name)
         added = self._offset(line)
-        if added is None or abs(added[1]) < MIN_ROUNDING_CONSTANT:
+        if added is None or abs(added[1]) < (MIN_SINGLE_ROUNDING_CONSTANT if self._single else MIN_ROUNDING_CONSTANT):
             return
         before = self._offset(added[0])
         if before is not None and added[1] == -before[1]:
@@ -139,8 +139,8 @@ class Listing:
             return None
         a, b = of
         if self.operations[b].name == "constant":
-            constant = number(self.operations[b].given)
+            constant = number(self.operations[b].given, single=self._single)
             return a, constant if name == "add" else -constant
         if name == "add" and self.operations[a].name == "constant":
-            return b, number(self.operations[a].given)
+            return b, number(self.operations[a].given, single=self._single)
         return None

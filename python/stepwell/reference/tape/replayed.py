@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..functions.operations import is_symbol
 from .fused import MEANING
+from .rules import number
 
 #: The operations of symbols; a constant of an operation on bits is given by its bits.
 OF_SYMBOLS: dict[str, Callable[..., Any]] = {
@@ -42,10 +42,13 @@ class Operations:
         operations: for each line its name, the lines that it reads, and its other arguments; as ``_core.Tape.operations`` gives
             them.
         places: the lines of the values.
+        single: whether they are of float32; then they are for symbols alone.
     """
 
-    def __init__(self, operations: Sequence[tuple[str, Sequence[int], int]], places: Sequence[int]) -> None:
-        self.lines, self.places = list(operations), list(places)
+    def __init__(
+        self, operations: Sequence[tuple[str, Sequence[int], int]], places: Sequence[int], *, single: bool = False
+    ) -> None:
+        self.lines, self.places, self._single = list(operations), list(places), single
         #: For each line the lines that no later one reads: their memory is used again, which is still in the cache.
         self._done: list[list[int]] = [[] for _ in self.lines]
         seen = set(self.places)
@@ -73,7 +76,7 @@ class Operations:
     def _symbol(self, line: int, made: list[Any], symbol: Any) -> Any:
         name, of, given = self.lines[line]
         if name == "constant":
-            return symbol.number(*struct.unpack("<d", struct.pack("<Q", given)))
+            return symbol.number(number(given, single=self._single))
         if name.startswith("shift"):
             return WITH_BITS[name](made[of[0]], given)
         constant = next((each for each in reversed(of) if self.lines[each][0] == "constant"), None)

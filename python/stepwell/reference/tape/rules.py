@@ -18,8 +18,9 @@ from .. import marks
 
 LN2, LN10 = 0.6931471805599453, 2.302585092994046
 
-#: Adding a constant of at least this size and subtracting it again rounds: x + 1.5·2⁵² − 1.5·2⁵² is x as a whole number.
-MIN_ROUNDING_CONSTANT = 2.0**32
+#: Adding a constant of at least this size and subtracting it again rounds: x + 1.5·2⁵² − 1.5·2⁵² is x as a whole number. Then the
+#: same in float32.
+MIN_ROUNDING_CONSTANT, MIN_SINGLE_ROUNDING_CONSTANT = 2.0**32, 2.0**20
 
 #: Comparisons: their results are constant except at jumps.
 COMPARISONS = ("less", "at most", "equal")
@@ -82,9 +83,9 @@ def no_derivative(name: str) -> UnsupportedError:
     )
 
 
-def number(bits: int) -> float:
-    """The number that has these bits."""
-    value: float = struct.unpack("<d", struct.pack("<Q", bits))[0]
+def number(bits: int, *, single: bool = False) -> float:
+    """The number of float64, or of float32, that has these bits."""
+    value: float = struct.unpack(*(("<f", struct.pack("<I", bits)) if single else ("<d", struct.pack("<Q", bits))))[0]
     return value
 
 

@@ -13,7 +13,7 @@ from ...base.arrays import Array, Whole
 from ...model.methods import Method
 from ...model.parameters import rows
 from ...model.systems import System
-from .by_tape import blocks_of, evaluated, rows_of
+from .by_tape import blocks_of, evaluated, rows_of, tried_attempt
 from .plan import Plan, model
 
 if TYPE_CHECKING:
@@ -69,7 +69,13 @@ def jumps_of(plan: Plan, pacing: Pacing) -> Jumps | None:
     """The times that no step crosses."""
     from ...reference import adaptive
 
-    return None if pacing.jumps is None or not len(pacing.jumps) else adaptive.Jumps.around(pacing.jumps, plan.t0)
+    if pacing.jumps is None or not len(pacing.jumps):
+        return None
+    read = None
+    if plan.single:  # samples are looked up at times of float64
+        of_samples = plan.system.jumps(-np.inf, np.inf) if plan.system.all_inputs() else np.empty(0)
+        read = ~np.isin(pacing.jumps, -of_samples if plan.backward else of_samples)
+    return adaptive.Jumps.around(pacing.jumps, plan.t0, read)
 
 
 def pacing_of_core(plan: Plan, pacing: Pacing) -> CorePacing:
@@ -253,6 +259,8 @@ def evaluated_attempt(plan: Plan, budget: int) -> Any:
 
 def attempt_by_numpy(plan: Plan, budget: int) -> Any:
     """The same, by the tape if it has to be."""
+    if plan.single:
+        return tried_attempt(plan)
     if plan.by_tape:
         return evaluated_attempt(plan, budget)
     return attempts(plan, attempted_system(plan))

@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from math import prod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ... import _core
 from ...base.arrays import Array, Blocks
 from ...reference import run as reference
+from ...reference.signal import Held
 from .plan import Plan, model
 
-
-def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
-    """A method's "step" or "attempt", or how it goes from v to what it carries and back, by the tape of the reference.
-
-    It is evaluated line by line, for all members at once: from the rows of a state, and the time, to the next ones.
-    """
-    from ...reference.tape import single  # only such runs need it
-    from ...reference.tape.fused import Evaluated
+if TYPE_CHECKING:
+    from ...reference import adaptive
+    from ...reference.tape.single import Steps
     from ...reference.traced import Tracer
+
+#: Parameters by their numbers on a tape, and sampled inputs, of some members.
+Some = tuple[Mapping[int, Any], Sequence[Any]]
+
+
+def traced(plan: Plan, what: str) -> tuple[Tracer, Any, list[Any]]:
+    """A method's "step", "attempt", "tried" part of one, or how it goes from v to what it carries and back, on a tape.
+
+    Returns the tracer, the tape, and the symbols of the next state.
+    """
+    from ...reference.traced import Tracer  # only such runs need it
 
     _core.check(model(plan.of_core()))
     tape = _core.Tape(single=plan.single)
@@ -30,23 +38,90 @@ def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], 
             symbols = tracer.step(plan.method, plan.choice)
         case "attempt":
             symbols = tracer.attempt(plan.method, plan.order, plan.acceptance, backward=plan.backward)
+        case "tried":
+            symbols = tracer.tried(plan.method, backward=plan.backward)
         case _:
             symbols = tracer.slot(plan.method, what, plan.choice)
-    numbers = dict(enumerate(tracer.numbers))
-    [(_, _, number_of_budget)], _ = tape.operations([tape.budget()])
-    evaluated: Callable[..., list[Any]]
+    return tracer, tape, symbols
+
+
+def steps_of_single(plan: Plan, what: str) -> Steps:
+    """The same in float32, to be evaluated for all members at once."""
+    from ...reference.tape.single import Steps
+
+    tracer, tape, symbols = traced(plan, what)
+    return Steps(tape, symbols, dict(enumerate(tracer.numbers)), plan.fused, tracer.tables, tracer.times)
+
+
+def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
+    """From the rows of a state, and the time, to the next ones: line by line, for all members at once."""
+    from ...reference.tape.fused import Evaluated
+
+    steps: Callable[..., list[Any]]
     if plan.single:
-        evaluated = single.evaluated(tape, symbols, numbers, plan.fused)
+        steps = steps_of_single(plan, what)
     else:
-        evaluated = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fused)
+        tracer, tape, symbols = traced(plan, what)
+        numbers, [(_, _, number_of_budget)] = dict(enumerate(tracer.numbers)), tape.operations([tape.budget()])[0]
+        steps = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fused)
 
     def made(state: list[Array], t: Any) -> Array:
-        out = np.empty((len(symbols), *plan.batch), dtype=plan.dtype)
-        for i, each in enumerate(evaluated(state, t, plan.dt)):
-            out[i] = each
+        rows = steps(state, t, plan.dt)
+        out = np.empty((len(rows), *plan.batch), dtype=plan.dtype)
+        for i, row in enumerate(rows):
+            out[i] = row
         return out
 
     return made
+
+
+def some_of(steps: Steps, index: Any) -> Some:
+    """Of these members, along one axis, what they step with."""
+
+    def some(numbers: Any) -> Any:
+        return numbers[..., index] if numbers.ndim and numbers.shape[-1] > 1 else numbers
+
+    tables = [
+        Held(some(table.values) if table.values.ndim > 1 else table.values, table.interval, table.start) for table in steps.tables
+    ]
+    return {i: some(numbers) for i, numbers in steps.numbers.items()}, tables
+
+
+def tried(plan: Plan, steps: Steps, t: Any, step: Any, v: Array, y: Array, some: Some | None = None) -> adaptive.Tried:
+    """The part of an attempt of float32 before its decision, in numbers of float64; of other members if these are given."""
+    from ...reference import adaptive
+
+    numbers, tables = (None, steps.tables) if some is None else some
+    sign = -1.0 if plan.backward else 1.0
+    # No step crosses the time of a sample, so that one holds all over it: that of its middle.
+    samples = [table.sample(sign * (t + 0.5 * step)) for table in tables]
+    n_v, n_y, batch = prod(plan.system.v_shape), prod(plan.system.y_shape), v.shape[len(plan.system.v_shape) :]
+    n = n_v + n_y
+    rows = steps([*v.reshape(n_v, *batch), *y.reshape(n_y, *batch), t, step, *samples], 0.0, 1.0, numbers, tables)[
+        n + 2 + len(tables) :
+    ]
+    wide = np.empty((len(rows), *batch))
+    for i, row in enumerate(rows):
+        wide[i] = row
+    pairs = [(wide[i : i + n_v].reshape(v.shape), wide[i + n_v : i + n].reshape(y.shape)) for i in range(0, len(rows) - 1, n)]
+    return adaptive.Tried(*pairs[0], pairs[1:-1], pairs[-1], wide[-1])
+
+
+def tried_attempt(plan: Plan) -> Any:
+    """An attempt at an adaptive step of float32, whose decision is float64."""
+    from ...reference import adaptive
+
+    steps, order = steps_of_single(plan, "tried"), plan.method.error_order
+    assert order is not None
+
+    def attempt(pace: adaptive.Pace, budget: int, v: Array, y: Array) -> tuple[adaptive.Pace, Array, Array]:
+        outlook = pace.outlook(budget)
+        made = tried(plan, steps, pace.t, outlook.step, v, y)
+        return adaptive.judged(
+            pace, outlook, order, plan.block_axes, plan.acceptance, v, y, made, rounding=adaptive.SINGLE_ROUNDING
+        )
+
+    return attempt
 
 
 def rows_of(plan: Plan, v: Array, y: Array) -> list[Array]:

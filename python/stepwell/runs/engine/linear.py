@@ -36,11 +36,12 @@ def _fits(plan: Plan, numbers: int) -> None:
 def transition(plan: Plan) -> Array:
     """P of shape (n, n, *batch), from one step of each unit vector of the slots (v slot first).
 
-    Each vector of a member takes the member's parameters with it, as many as a matrix has, so some vectors go at once.
+    Each vector of a member takes the member's parameters with it, as many as a matrix has, so some vectors go at once. Of a step
+    of float32 it is a parameter: found in float64, then rounded.
     """
     n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
     n = n_v + n_y
-    free = plan._replace(system=plan.system.without_inputs())
+    free = plan._replace(system=plan.system.without_inputs(), single=False)
     at_once = max(1, NUMBERS_AT_ONCE // (n * n * prod(plan.batch))) if plan.system.batch else n
     made: Array = np.empty((n, n, *plan.batch))
     for k in range(0, n, at_once):
@@ -49,7 +50,15 @@ def transition(plan: Plan) -> Array:
         unit = np.broadcast_to(along, (n, *batch))
         v, y = unit[:n_v].reshape(*plan.system.v_shape, *batch), unit[n_v:].reshape(*plan.system.y_shape, *batch)
         made[:, k : k + at_once] = one_step(free._replace(batch=batch), v, y)
-    return made
+    return _rounded(plan, "the transition matrix", made)
+
+
+def _rounded(plan: Plan, name: str, matrix: Array) -> Array:
+    """A matrix as a step of this precision has it."""
+    if not plan.single:
+        return matrix
+    checks.fits_single(name, matrix)
+    return matrix.astype(np.float32).astype(np.float64)
 
 
 def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
@@ -65,8 +74,8 @@ def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
         pulse[grid - _bin(node, grid) if back else _bin(node, grid)] = 1.0
         start = -(grid + _LATE) * part if back else 0.0
         for j, name in enumerate(inputs):
-            q[i, j] = one_step(plan._replace(system=plan.system.with_pulse(name, pulse, part, start)))
-    return q
+            q[i, j] = one_step(plan._replace(system=plan.system.with_pulse(name, pulse, part, start), single=False))
+    return _rounded(plan, "what inputs add in a step", q)
 
 
 #: Nodes are less than 0.9 of a part behind its beginning: so much more of it lies behind all of them.
@@ -105,7 +114,24 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
     linear_map: dict[str, Any] = {"n": n_v + n_y, "n_v": n_v, "carries": carries, "p": P, "q": q, "inputs": inputs}
     if isinstance(plan.t0, np.ndarray) and inputs:
         linear_map[BEGINS] = plan.t0
-    return _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(list(plan.method.nodes), n_v))
+    given = flat(linear_map, plan.batch)
+    return _core.ModelSpec("matrix", plan.method.name, given, matrix=(list(plan.method.nodes), n_v), single=plan.single)
+
+
+def _matrix_step(plan: Plan, P: Array, Q: Array) -> Callable[[float, Array], Array]:
+    """The same by the reference, from a time and the rows of a state to the next ones."""
+    inputs, carries = [each.signal() for each in plan.system.given_inputs().values()], plan.method.carry is not None
+    if not plan.single:
+        return reference.linear_step(P, Q, inputs, plan.method.nodes, plan.dt, carries)
+    from ...reference.tape import single  # only such runs need it
+    from ...reference.traced import Tracer
+
+    tape = _core.Tape(single=True)
+    tracer = Tracer(plan.system, tape)
+    symbols = tracer.matrix(plan.method.nodes, len(P), inputs, carries)
+    numbers = [*P.reshape(-1, *plan.batch), *Q.reshape(-1, *plan.batch), *tracer.numbers]
+    lines = single.Steps(tape, symbols, dict(enumerate(numbers)), False, tracer.tables, tracer.times)
+    return lambda t, s: np.stack(np.broadcast_arrays(*lines(list(s), t, plan.dt)))
 
 
 def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
@@ -118,10 +144,7 @@ def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> O
     n_v, n_y = v.size // max(1, prod(plan.batch)), y.size // max(1, prod(plan.batch))
     blocks = (*plan.system.v_shape, *plan.batch), (*plan.system.y_shape, *plan.batch)
     flat_v, flat_y = slot.reshape(n_v, *plan.batch), y.reshape(n_y, *plan.batch)
-
-    linear = reference.linear_step(
-        p, q, [i.signal() for i in given.values()], plan.method.nodes, plan.dt, plan.method.carry is not None
-    )
+    linear = _matrix_step(plan, p, q)
     finish = to_velocity(plan)
 
     def step(t: float, v: Array, y: Array) -> Blocks:
@@ -135,6 +158,7 @@ def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> O
         return looped(plan, step, v, y, before, (1, 1), None if finish is None else velocity)
 
     if plan.backend == "numpy":
+        flat_v, flat_y = flat_v.astype(plan.dtype, copy=False), flat_y.astype(plan.dtype, copy=False)
         flat_v, _, kept, first_bad = by_reference(plan, flat_v, flat_y, before)
     else:
         spec = matrix_model(plan, p, q)
@@ -149,8 +173,8 @@ def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> O
     return finished(plan, flat_v.reshape(blocks[0]), (v, y), first_bad)
 
 
-#: As the core's ``HUGE``.
-_HUGE = 2.0**960
+#: As the core's ``HUGE``, and that of float32.
+_HUGE, _HUGE_SINGLE = 2.0**960, 2.0**64
 
 #: Steps between two checks of whether a velocity may have overflowed.
 _PIECE = 1024
@@ -169,7 +193,7 @@ def _seen(
 
     Members that come near the end of the number range are stepped again by the reference, from the last check before that.
     """
-    most = _HUGE * min(abs(plan.dt), 1.0)
+    most = (_HUGE_SINGLE if plan.single else _HUGE) * min(abs(plan.dt), 1.0)
 
     def is_near(v: Array, y: Array) -> Any:
         return (before < 0) & ~((np.abs(v) < most).all(axis=-1 - before.ndim) & (np.abs(y) < most).all(axis=-1 - before.ndim))
@@ -183,7 +207,7 @@ def _seen(
         piece = plan._replace(first=plan.first + done, steps=min(_PIECE, last - done), every=None, progress=None)
         ahead = by_core(piece, v, y, before)
         if is_near(ahead.v[-1], ahead.y[-1]).any():
-            before = by_reference(piece, v, y, before)[3]
+            before = by_reference(piece, v.astype(plan.dtype, copy=False), y.astype(plan.dtype, copy=False), before)[3]
         v, y = ahead.slot, ahead.y[-1]
     return np.asarray(before)
 

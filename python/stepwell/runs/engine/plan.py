@@ -167,9 +167,11 @@ def model(plan: Plan) -> _core.ModelSpec:
         options |= {"order": plan.order, "acceptance": tuple(plan.acceptance), "backward": plan.backward}
     if plan.single:
         for name, value in parameters:
+            if isinstance(value, tuple) and not name.endswith(".times"):
+                checks.fits_single(f"samples of {name}", value[2])
             if isinstance(value, np.ndarray):
                 checks.fits_single(name, value)
-        options = {"fused": plan.fused, "single": True}
+        options["single"] = True
     return _core.ModelSpec(plan.system.kernel, plan.method.name, parameters, **options)
 
 

@@ -36,6 +36,12 @@ FEW_MEMBERS = 64
 LEAST_BETWEEN_SAVES = 32
 
 
+def advanced(plan: engine.Plan, at: At) -> engine.Outcome:
+    """Steps of some members from where they are; states of float32 are then numbers of float64, as quantities are."""
+    out = engine.advance(plan, at.slot, at.y, at.bad, carried=at.carried)
+    return out._replace(**{name: getattr(out, name).astype(np.float64, copy=False) for name in ("v", "y", "slot")})
+
+
 def check_room(events: Sequence[Event], plan: engine.Plan) -> None:
     """Raise if what may be kept of the events would not fit in memory."""
     numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
@@ -97,7 +103,13 @@ class _Driver(Collected):
         v, y = v.reshape(*plan.system.v_shape, total), y.reshape(*plan.system.y_shape, total)
         bad = self.first_bad.copy() if before is None else before.reshape(-1)
         size = max(1, NUMBERS_AT_ONCE // numbers)
-        if plan.backend == "rust" and not plan.fused and (plan.every is None or plan.every >= LEAST_BETWEEN_SAVES):
+        # In float32 the core's quantities are too coarse to notice all changes of sign.
+        if (
+            plan.backend == "rust"
+            and not plan.fused
+            and not plan.single
+            and (plan.every is None or plan.every >= LEAST_BETWEEN_SAVES)
+        ):
             self.watched = watched(self.quantities, self.members.plan(np.arange(min(2, total))))
         for first in range(0, total, size):
             index = np.arange(first, min(first + size, total))
@@ -119,7 +131,7 @@ class _Driver(Collected):
                 return
             if noticing and done > 0:
                 now = now._replace(steps=min(together, self._next_save(done) - done), every=None, watched=self.watched)
-                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                out = advanced(now, at)
                 if out.noticed is None or np.isnan(out.noticed[-1]).any():
                     self.watched = None  # steps too long for one tape
                     continue
@@ -133,7 +145,7 @@ class _Driver(Collected):
             else:
                 longest = 1 if noticing else min(piece, most // len(index), MOST_STEPS)
                 now = now._replace(steps=min(max(1, longest), plan.steps - done), every=1)
-                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                out = advanced(now, at)
                 self._save(done, now.steps, index, out.v, out.y)
                 stopped = self._look(now, index, out, done)
             self.done += now.steps * len(index)
@@ -170,7 +182,7 @@ class _Driver(Collected):
             again = self.members.plan(index[these])
             again = now._replace(system=again.system, batch=again.batch, t0=again.t0, force=again.force, every=1, watched=None)
             then = at.some(these)
-            states = engine.advance(again, then.slot, then.y, then.bad, carried=then.carried)
+            states = advanced(again, then)
             last = self.before[:, index[these]]
             self.before[:, index[these]] = np.nan
             stopped[these] = self._look(again, index[these], states, done)
@@ -233,10 +245,14 @@ class _Driver(Collected):
     def _outcome(self) -> engine.Outcome:
         """As that of a run without events, without what a control added up."""
         batch, blocks = self.plan.batch, (self.plan.system.v_shape, self.plan.system.y_shape)
-        v, y = (each.reshape(len(self.saves), *shape, *batch) for each, shape in zip(self.kept, blocks, strict=True))
+        shapes = (len(self.saves), *blocks[0]), (len(self.saves), *blocks[1]), blocks[0]
+        v, y, slot = (
+            each.reshape((*shape, *batch)).astype(self.plan.dtype, copy=False)
+            for each, shape in zip((*self.kept, self.slot), shapes, strict=True)
+        )
         first_bad = self.first_bad.reshape(batch)
         diverged = bool((first_bad >= 0).any())
-        return engine.Outcome(v, y, self.slot.reshape((*blocks[0], *batch)), first_bad, {}, None, diverged)
+        return engine.Outcome(v, y, slot, first_bad, {}, None, diverged)
 
 
 class _Resetting(_Driver):
@@ -266,7 +282,7 @@ class _Resetting(_Driver):
                 return
             steps = min(max(1, min(piece, most // len(index), MOST_STEPS)), plan.steps - done)
             now = some._replace(first=plan.first + done, steps=steps, every=1, record=(), progress=None)
-            out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+            out = advanced(now, at)
             before = self.before[:, index]
             known, may = self._may(now, index, out)
             changes = [self.changes(e, each, known) for e, each in enumerate(may)]
@@ -280,7 +296,7 @@ class _Resetting(_Driver):
             now = now._replace(steps=min(row + 1, steps))
             if now.steps < steps:
                 self.before[:, index] = before
-                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                out = advanced(now, at)
                 known, _ = self._may(now, index, out)
             self.take(
                 index, now.steps, [each.some((each.row < row) | ((each.row == row) & ~at_event[each.place])) for each in changes]

@@ -109,7 +109,10 @@ class Frames(Collected):
     def _flat(self, blocks: Sequence[Array]) -> tuple[Array, ...]:
         """Blocks with one axis for all members."""
         shapes = self.plan.system.v_shape, self.plan.system.y_shape
-        return tuple(each.reshape(*shape, len(self._all)) for each, shape in zip(blocks, shapes, strict=True))
+        return tuple(
+            each.reshape(*shape, len(self._all)).astype(np.float64, copy=False)
+            for each, shape in zip(blocks, shapes, strict=True)
+        )
 
     def _found(self, step: int, may: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> list[Array]:
         """Take what happened in a step; the quantities at its end."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,11 @@ from ...reference.signal import of_slot, over
 from ...reference.tape.replayed import Operations
 from ...reference.traced import Tracer
 from .. import engine
+from ..engine import by_tape
 from .members import Members
+
+if TYPE_CHECKING:
+    from ...reference.tape.single import Steps
 
 #: A step of an own system of more operations is computed by calling its function.
 MOST_OPERATIONS = 4000
@@ -47,13 +51,17 @@ class Trials:
         #: Whether there is no other way, however long the step is.
         self._always_traced = False
         self._is_traced = not isinstance(plan.system, OwnSystem)
-        self._by_core = plan.backend == "rust"
+        self._by_core = plan.backend == "rust" and not plan.single
+        #: Of float32: what makes steps, one part after the other.
+        self._singles: list[Steps] = []
         self._plans: dict[int, engine.Plan] = {}
         self._rates: tuple[Operations, list[Array]] | None = None
         self._rates_traced = False
 
     def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """A step of these members from v and y, of another time and length for each."""
+        if self._plan.single:
+            return self._in_single(index, t, h, v, y)
         if self._by_core and len(index) <= MEMBERS_BY_CORE:
             return self._one_by_one(index, t, h, v, y)
         if not self._is_traced:
@@ -67,6 +75,27 @@ class Trials:
             made = self._operations(state, numbers)
         n = len(made) - y[..., 0].size
         return _block(made[:n], v), _block(made[n:], y)
+
+    def _in_single(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """The same in float32."""
+        if not self._singles:
+            plan = self._members.plan(np.arange(self._plan.members))
+            self._singles = [by_tape.steps_of_single(plan, part) for part in self._parts()]
+        with np.errstate(all="ignore"):
+            return self._made_in_single(self._singles, index, t, h.astype(np.float32).astype(np.float64), v, y)
+
+    def _parts(self) -> list[str]:
+        """The parts of a step: what a method carries in place of v is made anew for its length."""
+        return ["step"] if self._plan.method.carry is None else ["start", "step", "finish"]
+
+    def _made_in_single(self, steps: list[Steps], index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        rows: list[Any] = [*_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
+        works = [np.zeros(len(index))] if self._plan.system.control is not None else []
+        n_v, n = len(_rows(v, self._plan.system.v_shape)), len(rows)
+        for part, each in zip(self._parts(), steps, strict=True):
+            at = t + h if part == "finish" else t
+            rows = each([*rows, *works], at, h, *by_tape.some_of(each, index))[:n]
+        return _block(rows[:n_v], v), _block(rows[n_v:], y)
 
     def rates(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """How much v and y of these members would change in a step of the length if they went on as they do here."""
@@ -165,6 +194,12 @@ class AdaptiveTrials(Trials):
 
     def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
         return tracer.attempted(backward=self._plan.backward).rates(h)
+
+    def _parts(self) -> list[str]:
+        return ["tried"]
+
+    def _made_in_single(self, steps: list[Steps], index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        return by_tape.tried(self._plan, steps[0], t, h, v, y, by_tape.some_of(steps[0], index)).projected
 
     def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         with np.errstate(all="ignore"):

@@ -124,8 +124,6 @@ def explain(
         system = system.under(control, batch)
         fits_together(system, how)
         system = system.stepped_by(how)
-        if single:
-            float32.check_control(system)
     plan = engine.Plan(system, how, batch, 1.0, fused=fused, form=form, choice=choice, single=single)
     explained = _explained(plan, attempt)
     if explained.parts is not None or attempt:

@@ -143,8 +143,6 @@ def export(
         system = _under(system, control, blocks, batch, dt)
         fits_together(system, how)
         system = system.stepped_by(how)
-        if single:
-            float32.check_control(system)
     push = None if push is None else _wide(push, system.v_shape, batch)
     stepped = system.over_steps(how, t0, dt)
     plan = engine.Plan(stepped, how, batch, dt, t0, choice=choice, fused=fused, force=push, single=single)
