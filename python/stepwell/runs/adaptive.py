@@ -14,7 +14,7 @@ from .result import AdaptiveState, Paces, Run
 
 
 def adaptive_run(request: Request) -> Run:
-    """Make the run, without a look at what it means."""
+    """Make the run; its diagnostics are for others."""
     assert request.adaptive is not None
     plan, (pacing, paces, t0, times, going_on), how = request.plan, request.adaptive, request.plan.method
     ended, adapt = None, engine.adapt

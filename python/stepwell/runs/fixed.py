@@ -17,7 +17,7 @@ from .result import Run
 
 
 def fixed_run(request: Request) -> Run:
-    """Make the run, without a look at what it means."""
+    """Make the run; its diagnostics are for others."""
     plan, v, y, carried, how = request.plan, request.v, request.y, request.carried, request.plan.method
     make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=request.before, carried=carried)
     ended = None

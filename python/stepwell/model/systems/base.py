@@ -188,7 +188,7 @@ class System(Immutable, ValueEquality, ABC):
         return parts
 
     def surrounded(self, part: Part) -> Self:
-        """The same system with a part around its equations, in the place of one of the same kind.
+        """The same system with a part around its equations, in place of one of the same kind.
 
         Args:
             part: what acts on the system, such as a spring to a moving anchor; see docs/developing/adding.md.
