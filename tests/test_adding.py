@@ -46,8 +46,11 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     added = FILES.findall(page)
     assert sorted(name for name, _ in added) == [
         "python/stepwell/model/systems/van_der_pol.py",
+        "python/stepwell/model/tether.py",
         "python/stepwell/reference/steppers/midpoint.py",
         "python/stepwell/reference/systems/van_der_pol.py",
+        "python/stepwell/reference/tether.py",
+        "rust/core/src/model/around/tether.rs",
         "rust/core/src/model/steppers/midpoint.rs",
         "rust/core/src/model/systems/van_der_pol.rs",
     ]
@@ -104,6 +107,12 @@ def test_the_suite_tests_the_system(tree: Path) -> None:
     assert suite(tree, "Pol", "bits") >= 7  # each test of bits has every system
 
 
+def test_the_suite_tests_what_is_around_a_system(tree: Path) -> None:
+    """The same graphs by every method, the same bits in any company, and events by fixed and adaptive steps."""
+    assert suite(tree, "tethered", "graphs", "tracing") > 5
+    assert suite(tree, "tethered", "bits") >= 8
+
+
 def test_the_command_line_and_the_docs_show_it(tree: Path) -> None:
     assert "Midpoint" in run(tree, "-m", "stepwell", "methods", "midpoint")
     assert "midpoint" in run(tree, "-m", "stepwell", "methods", "--json")
@@ -139,6 +148,26 @@ def test_it_is_the_system_of_that_name(tree: Path) -> None:
         "chosen = sw.integrate(sw.VanDerPol(1.0), 'dop853', v=0.0, y=y, tolerance=1e-9, at=[5.0])\n"
         "steps = sw.integrate(sw.VanDerPol(1.0), 'dop853', v=0.0, y=y, dt=0.01, steps=500)\n"
         "assert abs(chosen.y[-1] - steps.y[-1]).max() < 1e-6\n"
+    )
+    run(tree, "-c", code)
+
+
+def test_it_is_the_spring_of_that_name(tree: Path) -> None:
+    """A free mass at a moving anchor is the driven oscillator, forward and backward in time, by fixed and adaptive steps."""
+    code = (
+        "import stepwell as sw\n"
+        "anchor = sw.Sinusoid(0.3, 2.0, 0.5)\n"
+        "tethered = sw.Oscillator(0.0, form='physical').surrounded(sw.Tether(1.5, anchor))\n"
+        "driven = sw.Oscillator(1.5, x=anchor, form='physical')\n"
+        "fixed, adaptive = {'dt': 0.01, 'steps': 500}, {'tolerance': 1e-10, 'at': [5.0]}\n"
+        "crossing = sw.Event(lambda t, v, y: y, name='crossing')\n"
+        "for options in (fixed, fixed | {'dt': -0.01}, adaptive, adaptive | {'at': [-5.0]}):\n"
+        "    arguments = {'v': 0.0, 'y': 1.0, 'events': crossing} | options\n"
+        "    runs = [sw.integrate(each, 'dop853', **arguments) for each in (tethered, driven)]\n"
+        "    reference = sw.integrate(tethered, 'dop853', **arguments, backend='numpy')\n"
+        "    assert reference.y.tobytes() == runs[0].y.tobytes()\n"
+        "    assert abs(runs[0].y[-1] - runs[1].y[-1]) < 1e-8\n"
+        "    assert abs(runs[0].events['crossing'].t - runs[1].events['crossing'].t).max() < 1e-8\n"
     )
     run(tree, "-c", code)
 

@@ -32,6 +32,10 @@ class Part(Immutable, ValueEquality, ABC):
     velocity_term: ClassVar[str | None] = None
     acts_on_rates: ClassVar[bool] = True
 
+    def check(self, system: Any) -> None:
+        """Raise if it does not go with a system."""
+        return
+
     @property
     def batch(self) -> Shape:
         """The shape to which its numbers broadcast."""

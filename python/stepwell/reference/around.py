@@ -9,7 +9,12 @@ from ..base.arrays import Array, Blocks, Scaled
 from . import bits
 
 #: The kinds of parts, from the inside out: friction resists all other forces, so it comes last.
-ORDER = ("surfaces", "control", "force", "friction")
+ORDER = (
+    "surfaces",
+    "control",
+    "force",
+    "friction",
+)
 
 #: A part, and its parameters by name: numbers, or symbols.
 Bound = tuple[Any, dict[str, Any]]

@@ -275,7 +275,7 @@ class Request(NamedTuple):
         checks.batch_shape(batches)  # before t0 and at are compared
         backward = _is_backward(times, t0)
         acting = system.keeper if control is None else control
-        if backward and acting is not None and getattr(acting, "pushes", True):
+        if backward and acting is not None and getattr(acting, "acts_on_rates", True):
             raise UnsupportedError(
                 f"at: {acting!r} leads a state back to its target as time goes on, so backward in time it leads away from it; "
                 f"use a projection"
@@ -619,7 +619,7 @@ def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:
     """The times that no step crosses, ascending along the first axis: those of the user, of inputs and of the equations."""
     parts = []
     ahead = bool((times[-1] - t0).max() >= 0.0)
-    if system.given_inputs():
+    if system.all_inputs():
         # Those after the last time count, too: the step that contains it goes on from there when the run is continued.
         parts.append(system.jumps(*((float(t0.min()), np.inf) if ahead else (-np.inf, float(t0.max())))))
     if system.reads_time:

@@ -105,7 +105,7 @@ def limit_of(system: System, method: Method, v: Array | None = None, y: Array | 
     members = system.batch if v is None or y is None else maps.together(system, np.asarray(1.0), v, y)
     if v is None or y is None or system.linear:
         _fit(sum(maps.size(system)), members)
-    elif isinstance(system, Springs) and system.control is None:
+    elif isinstance(system, Springs) and all(part.kind == "surfaces" for part in system.around):
         return _of_springs(system, method, v, y, members)
     else:
         _fit(sum(maps.size(system)), members)
@@ -166,7 +166,7 @@ def _linear_part(system: System, method: Method, v: Array, y: Array, t: float, m
     There is one where the derivative of the rates is the same in all stages of a step: of equations that are linear but for what
     drives them, and where nothing moves. Its eigenvalues are those of a step of a matrix, which are found however they meet.
     """
-    if not isinstance(system, OwnSystem) or system.control is not None or system.stick_friction is not None or system.contacts:
+    if not isinstance(system, OwnSystem) or system.around:
         return None
     of = traced.reading(system)
     if not of.linear and of.time:

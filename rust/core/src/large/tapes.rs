@@ -77,7 +77,7 @@ fn rate(kind: &Kind, signature: &Signature, shape: Shape, unforced: bool, make: 
         let state = |i: usize| Symbol::new(Op::State(i as u32));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(signature, Symbol::new(Op::Step));
-        let wrap = if unforced { around::wrap_below_force } else { around::wrap };
+        let wrap = if unforced { around::wrap_without_forces } else { around::wrap };
         let s = wrap(&p, (kind.make)(&p), state(behind(shape)));
         let seen = || WINDOW_ENDS.map(|end| Symbol::new(Op::Param(end)));
         let (made, v, y) = window::over(signature, seen, || make(s.as_ref(), v, y));

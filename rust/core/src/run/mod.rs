@@ -23,7 +23,7 @@ use crate::{
         tapes::{self, RateTapes, TapeRates},
     },
     model::{
-        around::{controls, friction},
+        around::{self, controls},
         spec::Spec,
         system::Shape,
     },
@@ -66,12 +66,12 @@ impl Model<'_> {
         let (rates, step) = traced.operations;
         let single = members == 1;
         // Operations are fused on the tape of the whole step, friction needs the state at its start, and only there have members
-        // times of their own.
+        // times of their own. Not everything around a system is known over rows.
         let own_times = self.key.signature.count(BEGINS) > 0;
         let is_single = self.key.precision == Precision::Single;
         let is_given = matches!(self.key.how, StepKind::Step(_));
         let as_one = is_single || own_times || self.key.fused || traced.series || is_given;
-        if as_one || friction::is_given(&self.key.signature) {
+        if as_one || around::is_one_tape(&self.key.signature) {
             return StepStrategy::Tape;
         }
         if let StepKind::Matrix { .. } = &self.key.how {

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     model::{
-        around::{self, controls, force},
+        around::{self, controls},
         program::Program,
         spec::Signature,
         system::{Block, Kind, Shape, System},
@@ -37,9 +37,14 @@ impl AttemptsOf<'_> {
         (self.kind.make)(&parameters(self.signature, h))
     }
 
-    /// Rates for a step, under the force from outside: h·v̇ + h·f.
+    /// Rates for a step with the forces around the system: h·v̇ + h·f. Where time runs backward, these see the step and the time
+    /// of the system.
     fn forced(&self, h: Symbol, rates: Box<dyn System<Symbol>>) -> Box<dyn System<Symbol>> {
-        force::wrap(&parameters(self.signature, if self.backward { -h } else { h }), rates)
+        if self.backward && around::has_forces(self.signature) {
+            let p = parameters(self.signature, -h);
+            return Box::new(Backward(around::wrap_in_forces(&p, Box::new(Backward(rates)))));
+        }
+        around::wrap_in_forces(&parameters(self.signature, h), rates)
     }
 
     /// The rates for a step of 1.
@@ -50,7 +55,7 @@ impl AttemptsOf<'_> {
     /// The system scaled to a step of 1, under its projection if there is one.
     fn projected(&self) -> Box<dyn System<Symbol>> {
         let p = parameters(self.signature, Symbol::of(1.0));
-        around::wrap_below_force(&p, self.scaled(Symbol::of(1.0)), Symbol::of(0.0))
+        around::wrap_without_forces(&p, self.scaled(Symbol::of(1.0)), Symbol::of(0.0))
     }
 
     fn state(&self) -> (Block<Symbol>, Block<Symbol>) {
@@ -81,7 +86,7 @@ impl AttemptsOf<'_> {
             }
             let stretched = Box::new(Stretched { s: self.scaled(Symbol::of(1.0)), h: step });
             let pushed = match controls::pushes(signature) {
-                true => around::wrap_below_force(&parameters(signature, step), stretched, Symbol::of(0.0)),
+                true => around::wrap_without_forces(&parameters(signature, step), stretched, Symbol::of(0.0)),
                 false => stretched,
             };
             self.forced(step, pushed)

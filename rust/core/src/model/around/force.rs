@@ -1,11 +1,11 @@
 //! A force from outside, added to v̇ in every stage: the caller's own array, which a [`crate::run::world::World`] reads before
 //! its steps.
 
+use super::Part;
 use crate::{
-    error::Error,
     model::{
-        spec::{Parameters, Signature},
-        system::{Block, Shape, System},
+        spec::Signature,
+        system::{Block, System},
     },
     tape::number::Number,
 };
@@ -13,23 +13,23 @@ use crate::{
 /// The name under which it is given, one row for each number of v.
 pub const NAME: &str = "added.force";
 
-/// An error unless it has a row for each number of v.
-pub(crate) fn check(signature: &Signature, shape: Shape) -> Result<(), Error> {
-    match signature.count(NAME) {
-        0 => Ok(()),
-        _ => signature.expect(NAME, shape.v),
-    }
-}
-
-/// A system under the force that is given, or the system itself.
-pub(crate) fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn System<N>> {
-    match p.numbers(NAME) {
-        [] => system,
-        force => {
+/// The part: a row for each number of v.
+pub(crate) fn part<N: Number>() -> Part<N> {
+    Part {
+        name: NAME,
+        is_given: |signature| signature.count(NAME) > 0,
+        check: |_, signature, shape| signature.expect(NAME, shape.v),
+        velocity_term: |_, _| None,
+        is_force: true,
+        is_for_carry: true,
+        is_only_fixed: false,
+        has_rows: true,
+        wrap: |p, system, _| {
+            let force = p.numbers(NAME);
             let fixed = fixed(p.signature, force.len());
             let push = force.iter().zip(&fixed).map(|(force, fixed)| (!fixed).then(|| p.h * *force)).collect();
             Box::new(Forced { system, push })
-        }
+        },
     }
 }
 

@@ -7,38 +7,38 @@
 //! Methods of several stages mix such increments, and v would only shrink by a factor in each step. So after the step v is set to
 //! zero if the first stage said that the block stops, and friction can hold it there.
 
+use super::{Part, controls};
 use crate::{
     error::Error,
     model::{
-        spec::{Parameters, Signature},
-        system::{Block, System},
+        spec::Signature,
+        system::{Block, Kind, Shape, System},
     },
     tape::number::Number,
 };
 
 /// The name under which it is given, in the unit of v̇: one number for all velocities.
-pub(crate) const NAME: &str = "friction.limit";
+const NAME: &str = "friction.limit";
 
-/// Whether a system is given any.
-pub(crate) fn is_given(signature: &Signature) -> bool {
-    signature.count(NAME) > 0
+/// The part.
+pub(crate) fn part<N: Number>() -> Part<N> {
+    Part {
+        name: NAME,
+        is_given: |signature| signature.count(NAME) > 0,
+        check,
+        velocity_term: |_, _| Some("friction"),
+        is_force: false,
+        is_for_carry: false,
+        is_only_fixed: true,
+        has_rows: false,
+        wrap: |p, system, _| Box::new(Rubbing { system, limit: p.h * p.number(NAME) }),
+    }
 }
 
-/// An error if it is given wrongly: beside a control, whose work would count a stage twice.
-pub(crate) fn check(signature: &Signature) -> Result<(), Error> {
-    if !is_given(signature) {
-        return Ok(());
-    }
+/// An error beside a control, whose work would count a stage twice.
+fn check(_: &Kind, signature: &Signature, _: Shape) -> Result<(), Error> {
     signature.expect(NAME, 1)?;
-    if crate::model::around::controls::is_given(signature) { Err(signature.unknown("control")) } else { Ok(()) }
-}
-
-/// A system with the friction that is given, or the system itself.
-pub(crate) fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn System<N>> {
-    match p.maybe(NAME) {
-        None => system,
-        Some(limit) => Box::new(Rubbing { system, limit: p.h * limit }),
-    }
+    if controls::is_given(signature) { Err(signature.unknown("control")) } else { Ok(()) }
 }
 
 struct Rubbing<N: Number> {

@@ -1,7 +1,6 @@
-//! What is around a system. Each part is a system that wraps another, or acts on the state after a step.
+//! What is around a system: parts, each of which is a system that wraps another, or acts on the state after a step.
 //!
-//! From the inside out: springs of surfaces ([`contact`]), control or projection ([`controls`]), a force from outside
-//! ([`force`]), and friction (`friction`), which resists all other forces.
+//! [`parts`] lists them from the inside out. A new kind is a file here and a line there; see docs/developing/adding.md.
 
 pub mod contact;
 pub mod controls;
@@ -15,22 +14,48 @@ use super::{
 };
 use crate::{error::Error, tape::number::Number};
 
+/// A kind of part. A system has it if parameters of its names are given.
+pub(crate) struct Part<N: Number> {
+    /// The name that is reported where it does not go with something.
+    pub name: &'static str,
+    /// Whether a system has it.
+    pub is_given: fn(&Signature) -> bool,
+    /// An error if its parameters are wrong, or if it does not go with the system or with another part.
+    pub check: fn(&Kind, &Signature, Shape) -> Result<(), Error>,
+    /// The term of it that depends on the velocity, if there is one: methods that need an acceleration refuse it.
+    pub velocity_term: fn(&Signature, &Record) -> Option<&'static str>,
+    /// Whether it only adds to v̇. Attempts at adaptive steps add such parts to rates that are stretched to their step.
+    pub is_force: bool,
+    /// Whether a method's start and finish see it.
+    pub is_for_carry: bool,
+    /// Whether it goes with steps of fixed length only.
+    pub is_only_fixed: bool,
+    /// Whether `large/` has it over rows. Otherwise the whole step of a system with it is one tape.
+    pub has_rows: bool,
+    /// The system with the part around it. The tally starts from the number: h times the energy that a control added.
+    pub wrap: fn(&Parameters<N>, Box<dyn System<N>>, N) -> Box<dyn System<N>>,
+}
+
+/// All kinds, from the inside out: friction resists all other forces.
+pub(crate) fn parts<N: Number>() -> Vec<Part<N>> {
+    vec![
+        contact::part(),
+        controls::part(),
+        force::part(),
+        friction::part(), //
+    ]
+}
+
 /// The size of the blocks, or an error if the parameters are wrong or the method cannot step the system.
 ///
 /// A system that passes this check can be made and stepped.
 pub fn fit(kind: &Kind, signature: &Signature, method: &Record) -> Result<Shape, Error> {
     let shape = (kind.shape)(signature)?;
-    force::check(signature, shape)?;
-    friction::check(signature)?;
-    controls::check(kind, signature)?;
-    contact::check(signature, shape)?;
-    if contact::is_given(signature) && controls::is_given(signature) {
-        return Err(signature.unknown("control"));
+    let mut term = (kind.velocity_term)(signature);
+    for part in parts::<f64>().iter().filter(|part| (part.is_given)(signature)) {
+        (part.check)(kind, signature, shape)?;
+        term = term.or((part.velocity_term)(signature, method));
     }
-    // What a method carries in place of v would have to change with v.
-    let apart = controls::is_after_the_step(signature) && method.carry.is_none();
-    let around = [(friction::is_given(signature), "friction"), (controls::is_given(signature) && !apart, "energy control")];
-    let term = (kind.velocity_term)(signature).or(around.into_iter().find_map(|(is_given, term)| is_given.then_some(term)));
     match term {
         Some(term) if method.needs == Needs::Acceleration => {
             Err(Error::VelocityDependent { method: method.name, system: kind.name, term })
@@ -41,26 +66,51 @@ pub fn fit(kind: &Kind, signature: &Signature, method: &Record) -> Result<Shape,
 
 /// An error if something is given that goes with steps of fixed length only.
 pub(crate) fn only_fixed(signature: &Signature) -> Result<(), Error> {
-    match signature.count(friction::NAME) {
-        0 => Ok(()),
-        _ => {
-            Err(Error::Options { system: signature.system.clone(), options: format!("{}, with adaptive steps", friction::NAME) })
+    match parts::<f64>().iter().find(|part| part.is_only_fixed && (part.is_given)(signature)) {
+        None => Ok(()),
+        Some(part) => {
+            Err(Error::Options { system: signature.system.clone(), options: format!("{}, with adaptive steps", part.name) })
         }
     }
+}
+
+/// Whether the whole step of a system has to be one tape.
+pub(crate) fn is_one_tape(signature: &Signature) -> bool {
+    parts::<f64>().iter().any(|part| !part.has_rows && (part.is_given)(signature))
+}
+
+fn wrap_in<N: Number>(
+    p: &Parameters<N>,
+    system: Box<dyn System<N>>,
+    tally: N,
+    which: impl Fn(&Part<N>) -> bool,
+) -> Box<dyn System<N>> {
+    let given = parts().into_iter().filter(|part| which(part) && (part.is_given)(p.signature));
+    given.fold(system, |system, part| (part.wrap)(p, system, tally))
 }
 
 /// A system with all that is given around it. The tally starts from this number: h times the energy that control or projection
 /// added.
 pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
-    friction::wrap(p, force::wrap(p, wrap_below_force(p, system, tally)))
+    wrap_in(p, system, tally, |_| true)
 }
 
-/// A system with what is around it below the force from outside, which attempts add to rates that are stretched already.
-pub(crate) fn wrap_below_force<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
-    controls::wrap(p, contact::wrap(p, system), tally)
+/// A system with what is around it but forces, which attempts add to rates that are stretched already.
+pub(crate) fn wrap_without_forces<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
+    wrap_in(p, system, tally, |part| !part.is_force)
 }
 
-/// A system with surfaces and the force from outside: what a method's start and finish see.
+/// Whether there are any of these forces.
+pub(crate) fn has_forces(signature: &Signature) -> bool {
+    parts::<f64>().iter().any(|part| part.is_force && (part.is_given)(signature))
+}
+
+/// Rates with these forces.
+pub(crate) fn wrap_in_forces<N: Number>(p: &Parameters<N>, rates: Box<dyn System<N>>) -> Box<dyn System<N>> {
+    wrap_in(p, rates, N::of(0.0), |part| part.is_force)
+}
+
+/// A system as a method's start and finish see it: with surfaces and forces.
 pub(crate) fn wrap_for_carry<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn System<N>> {
-    force::wrap(p, contact::wrap(p, system))
+    wrap_in(p, system, N::of(0.0), |part| part.is_for_carry)
 }

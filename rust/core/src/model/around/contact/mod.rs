@@ -18,6 +18,7 @@ use meet::{OPERATIONS, Step};
 use rods::RodContacts;
 use surface::{ContactMode, Surface};
 
+use super::{Part, controls};
 use crate::{
     error::Error,
     model::{
@@ -48,8 +49,29 @@ fn are_rods(signature: &Signature) -> bool {
     matches!(signature.system.as_str(), "rods" | "pendulum_3d")
 }
 
-/// An error if the surfaces that are given are wrong.
-pub(crate) fn check(signature: &Signature, shape: Shape) -> Result<(), Error> {
+/// The part: springs. Other surfaces act after a step, see [`Contacts`].
+pub(crate) fn part<N: Number>() -> Part<N> {
+    Part {
+        name: "contacts",
+        is_given,
+        check: |_, signature, shape| check(signature, shape),
+        velocity_term: |_, _| None,
+        is_force: false,
+        is_for_carry: true,
+        is_only_fixed: false, // a trace of attempts says so
+        has_rows: true,
+        wrap: |p, system, _| match Springs::new(p) {
+            Some(springs) => Box::new(Sprung { system, springs }),
+            None => system,
+        },
+    }
+}
+
+/// An error if the surfaces are wrong, or beside a control, which would undo what they do.
+fn check(signature: &Signature, shape: Shape) -> Result<(), Error> {
+    if controls::is_given(signature) {
+        return Err(signature.unknown("control"));
+    }
     let dim = dimensions(signature);
     for i in 0..signature.whole("contacts") {
         surface::check(signature, i, dim)?;
@@ -57,7 +79,7 @@ pub(crate) fn check(signature: &Signature, shape: Shape) -> Result<(), Error> {
             return Err(signature.unknown(&format!("contact_{i}_way")));
         }
     }
-    if is_given(signature) && (shape.v != shape.y || !shape.y.is_multiple_of(dim)) {
+    if shape.v != shape.y || !shape.y.is_multiple_of(dim) {
         return Err(Error::Shape { what: "points that meet a surface", expected: dim, got: shape.y });
     }
     Ok(())
@@ -184,14 +206,6 @@ impl Contacts<f64> {
 /// The programs with which a method goes from velocities to what it carries, and back.
 pub fn carry(method: &Record, choice: usize) -> Option<[Program; 2]> {
     Some([method.start(choice)?, method.finish(choice)?])
-}
-
-/// A system with the springs that are given, or the system itself.
-pub(crate) fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn System<N>> {
-    match Springs::new(p) {
-        Some(springs) => Box::new(Sprung { system, springs }),
-        None => system,
-    }
 }
 
 /// Surfaces that push points back by springs.

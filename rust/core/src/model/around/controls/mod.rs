@@ -13,11 +13,12 @@ pub(crate) mod energy;
 pub(crate) mod projection;
 
 use self::energy::is_between;
+use super::Part;
 use crate::{
     error::Error,
     model::{
-        spec::{Parameters, Signature},
-        system::{Kind, System},
+        spec::Signature,
+        system::{Kind, Shape},
     },
     tape::number::Number,
 };
@@ -37,10 +38,31 @@ pub(crate) fn is_after_the_step(signature: &Signature) -> bool {
     signature.word("control") == "projection" || is_between(signature)
 }
 
-/// An error if the control that is given is wrong.
-pub(crate) fn check(kind: &Kind, signature: &Signature) -> Result<(), Error> {
+/// The part.
+pub(crate) fn part<N: Number>() -> Part<N> {
+    Part {
+        name: "control",
+        is_given,
+        check,
+        // What a method carries in place of v would have to change with v.
+        velocity_term: |signature, method| {
+            let is_apart = is_after_the_step(signature) && method.carry.is_none();
+            (!is_apart).then_some("energy control")
+        },
+        is_force: false,
+        is_for_carry: false,
+        is_only_fixed: false,
+        has_rows: true,
+        wrap: |p, system, tally| match p.signature.word("control") {
+            "energy" => Box::new(energy::Controlled::new(p, system, tally)),
+            _ => Box::new(projection::Projected::new(p, system, tally)),
+        },
+    }
+}
+
+/// An error if the control is wrong.
+fn check(kind: &Kind, signature: &Signature, _: Shape) -> Result<(), Error> {
     let name = match signature.word("control") {
-        "" => return Ok(()),
         "energy" => "control.form",
         "projection" => "control.way",
         _ => return Err(signature.unknown("control")),
@@ -59,14 +81,4 @@ pub(crate) fn check(kind: &Kind, signature: &Signature) -> Result<(), Error> {
         _ => return Err(signature.unknown(name)),
     }
     signature.expect("control.target", 1)
-}
-
-/// A system under the control or the projection that is given. The tally starts from this number: h times the energy that it
-/// added.
-pub(crate) fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
-    match p.signature.word("control") {
-        "energy" => Box::new(energy::Controlled::new(p, system, tally)),
-        "projection" => Box::new(projection::Projected::new(p, system, tally)),
-        _ => system,
-    }
 }
