@@ -14,7 +14,8 @@ import stepwell as sw
 from stepwell.base import checks
 from stepwell.errors import ArgumentError, DTypeError
 from stepwell.studies.measuring import timing
-from stepwell.views import charts, cli
+from stepwell.views import charts
+from support.commands import run_command
 
 #: Each command that writes: its words, what its work is done by, the name of a file, or one that it writes into a folder.
 COMMANDS: dict[str, tuple[list[str], str, str, str | None]] = {
@@ -50,11 +51,6 @@ COMMANDS: dict[str, tuple[list[str], str, str, str | None]] = {
 EACH = pytest.mark.parametrize("command", COMMANDS)
 
 
-def told(capsys: Any, *words: str) -> tuple[int, str, str]:
-    code = cli.main(list(words))
-    return code, *capsys.readouterr()
-
-
 def places(tmp_path: Path, file: str) -> dict[str, Path]:
     """Where nothing can be written, even by root: each with a word of why."""
     (tmp_path / "a file").write_text("kept")
@@ -79,7 +75,7 @@ def test_a_place_is_tried_before_any_work(command: str, capsys: Any, tmp_path: P
     monkeypatch.setattr(work, worked)
     for why, path in places(tmp_path, file).items():
         before = sorted(tmp_path.rglob("*"))
-        code, out, err = told(capsys, *words, "-o", str(path))
+        code, out, err = run_command(capsys, *words, "-o", str(path))
         assert (code, out) == (2, "")
         assert err.startswith("stepwell: -o: expected a f")
         assert why in err
@@ -91,7 +87,7 @@ def test_a_place_is_tried_before_any_work(command: str, capsys: Any, tmp_path: P
 @pytest.mark.parametrize(("words", "inside"), [(words, inside) for words, _, _, inside in COMMANDS.values() if inside])
 def test_a_file_in_a_folder_is_tried_too(words: list[str], inside: str, capsys: Any, tmp_path: Path) -> None:
     (tmp_path / inside).mkdir()
-    code, out, err = told(capsys, *words, "-o", str(tmp_path))
+    code, out, err = run_command(capsys, *words, "-o", str(tmp_path))
     assert (code, out) == (2, "")
     assert f"{inside}': Is a directory" in err
 
@@ -117,7 +113,7 @@ def test_what_was_found_is_printed_though_it_cannot_be_written(
     monkeypatch.setattr("csv.writer", full)
     monkeypatch.setattr(Path, "write_text", full)
     monkeypatch.setattr("os.replace", full)  # by which a text takes its place when it is whole
-    code, out, err = told(capsys, *words, *form, "-o", str(tmp_path / file))
+    code, out, err = run_command(capsys, *words, *form, "-o", str(tmp_path / file))
     assert code == 2
     assert err.strip() == "stepwell: [Errno 28] No space left on device"  # after the line of a bar
     if form:

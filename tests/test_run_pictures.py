@@ -6,7 +6,6 @@ import json
 import math
 import pickle
 import sys
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -19,58 +18,7 @@ from stepwell.views.charts import orbits_picture, runs_animation, runs_picture, 
 from stepwell.views.charts.kinds import KINDS as ROWS
 from stepwell.views.charts.kinds import kind_of
 from stepwell.views.charts.runs import own_picture
-
-
-def looked_at(scene, method="false_euler", dt=None, **options):
-    return sw.charts.run_picture(scene, scene.run(method, dt, **({"every": 1} | options)))
-
-
-@pytest.fixture(scope="module")
-def pictures():
-    """One of each kind of picture, and of what can go wrong in it."""
-    scenes = sw.scenes
-    with pytest.warns(sw.DivergenceWarning):
-        crash = looked_at(scenes.oscillator(), "standard_euler", 100.0, steps=400)
-    with pytest.warns(sw.AccuracyWarning, match="has another energy at the end"):
-        gone = looked_at(scenes.pythagorean(), "leapfrog", every=5)
-    with pytest.warns(sw.AccuracyWarning, match="bodies 1 and 2 met within step 349"):
-        long = looked_at(scenes.energy_control(), "standard_euler", steps=5000)
-    return {
-        "attitude": looked_at(scenes.aircraft()),
-        "body": looked_at(scenes.dzhanibekov(), "rk4"),
-        "top": looked_at(scenes.heavy_top(), "rk4"),
-        "trapped": looked_at(scenes.gimbal_trap()),
-        "orbits": looked_at(scenes.figure_eight(), "leapfrog"),
-        "long": long,
-        "space": looked_at(scenes.plummer(), "leapfrog", steps=200),
-        "two": looked_at(scenes.kepler()),
-        "gone": gone,
-        "swing": looked_at(scenes.oscillator()),
-        "steady": looked_at(scenes.forced_oscillator(), "rk4"),
-        "grown": looked_at(scenes.oscillator(), "standard_euler"),
-        "crash": crash,
-        "rows": looked_at(scenes.chain()),
-        "many rows": looked_at(scenes.chain(100, {1: 1.0, 3: 0.4}), steps=900),
-    }
-
-
-KINDS = ("body", "top", "orbits", "long", "space", "two", "gone", "swing", "steady", "grown", "crash", "rows", "many rows")
-#: Of an aircraft, whose pictures show angles in place of errors.
-ATTITUDES = ("attitude", "trapped")
-#: By default one of each way to lay out, and one that ends in what cannot be drawn.
-SHOWN = ("attitude", "body", "orbits", "space", "swing", "rows", "crash")
-
-
-def each_of(kinds):
-    return pytest.mark.parametrize("kind", [pytest.param(k, marks=() if k in SHOWN else pytest.mark.long) for k in kinds])
-
-
-every_kind, every_kind_with_errors = each_of((*ATTITUDES, *KINDS)), each_of(KINDS)
-
-
-def said(figure):
-    return " ".join(text.get_text() for text in figure.texts)
-
+from support.pictured import every_kind, every_kind_with_errors, looked_at, said, the_pictures  # noqa: F401
 
 # ---- the data
 
@@ -467,109 +415,6 @@ def test_pictures_can_be_drawings(pictures, ending, tmp_path):
     path = tmp_path / f"run.{ending}"
     pictures["orbits"].plot(path)
     assert path.read_bytes()[:5] in (b"<?xml", b"%PDF-")
-
-
-# ---- the animation
-
-
-@every_kind
-def test_an_animation_shows_the_states(pictures, kind, tmp_path):
-    chart = pictures[kind]
-    chart.animate(tmp_path / "run.gif", seconds=0.4, fps=10)
-    frames = []
-    with Image.open(tmp_path / "run.gif") as animation:
-        assert (animation.size, animation.n_frames, animation.info["duration"]) == ((1000, 562), 4, 100)
-        for i in range(4):
-            animation.seek(i)
-            frames.append(np.asarray(animation.convert("L"), dtype=int))
-    for one, other in pairwise(frames):
-        assert (np.abs(one - other) > 60).sum() > 30  # the bodies moved, and the clock went on
-
-
-@every_kind
-def test_nothing_in_an_animation_is_cut_off_or_covered(pictures, kind):
-    figure, show = runs_animation.stage(pictures[kind])
-    show(int(np.flatnonzero(pictures[kind].finite)[-1]))
-    page = figure.bbox
-    boxes = [axes.get_tightbbox() for axes in figure.axes]
-    boxes += [text.get_window_extent() for text in figure.texts if text.get_text()]
-    for i, box in enumerate(boxes):
-        assert page.x0 <= box.x0 < box.x1 <= page.x1
-        assert page.y0 <= box.y0 < box.y1 <= page.y1
-        assert not any(box.overlaps(other) for other in boxes[:i])
-
-
-def test_a_frame_is_the_state_of_its_time(pictures):
-    chart = pictures["orbits"]
-    figure, show = runs_animation.stage(chart)
-    show(70)
-    assert f"t = {chart.run.t[70]:6.3f}" in [text.get_text() for text in figure.texts]
-    marks = [line.get_xydata().tolist() for line in figure.axes[0].lines if len(line.get_xdata()) == 1]
-    assert marks == [[chart.run.y[70, i].tolist()] for i in range(3)]
-    trails = [line.get_xydata() for line in figure.axes[0].lines if 1 < len(line.get_xdata()) <= 71]
-    for i, trail in enumerate(trails):
-        assert np.array_equal(trail, chart.run.y[71 - len(trail) : 71, i])
-        assert len(trail) == pytest.approx(0.3 * chart.scene.period / chart.run.dt, abs=2)
-    assert len(trails) == 3
-
-    chart = pictures["rows"]
-    figure, show = runs_animation.stage(chart)
-    show(33)
-    exact, mark = figure.axes[0].lines[1:3]
-    assert np.array_equal(mark.get_ydata(), chart.run.y[33])
-    assert np.array_equal(exact.get_ydata(), chart.scene.exact(chart.run.t[33:34])[1][0])
-
-    chart = pictures["swing"]
-    figure, show = runs_animation.stage(chart)
-    show(33)
-    show(20)
-    grown = next(line for line in figure.axes[0].lines if line.get_zorder() == 3)
-    assert np.array_equal(grown.get_ydata(), chart.run.y[:21])
-
-
-def test_no_frame_is_made_up(tmp_path):
-    """Six states are six frames, and the animation is as long as was asked."""
-    chart = looked_at(sw.scenes.clover(), every=20)
-    chart.animate(tmp_path / "run.gif", seconds=3, fps=25)
-    with Image.open(tmp_path / "run.gif") as animation:
-        assert (animation.n_frames, animation.info["duration"]) == (6, 500)
-
-
-def test_without_ffmpeg_an_mp4_is_refused_by_name(monkeypatch, tmp_path):
-    from matplotlib import animation
-
-    monkeypatch.setattr(animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
-    chart = looked_at(sw.scenes.clover())
-    with pytest.raises(UnsupportedError, match=r"an \.mp4 needs the program ffmpeg, which is not found"):
-        chart.animate(tmp_path / "run.mp4")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_with_ffmpeg_an_mp4_is_written(tmp_path):
-    from matplotlib import animation
-
-    if not animation.FFMpegWriter.isAvailable():
-        pytest.skip("there is no ffmpeg here")
-    looked_at(sw.scenes.clover(), every=50).animate(tmp_path / "run.mp4", seconds=1, fps=2)
-    assert (tmp_path / "run.mp4").read_bytes()[4:8] == b"ftyp"
-
-
-@pytest.mark.parametrize(
-    ("path", "options", "message"),
-    [
-        ("run.avi", {}, r"path: expected an ending of an animation, one of \.gif, \.mp4, \.html, got"),
-        ("run.gif", {"seconds": 0}, "seconds: expected numbers above zero"),
-        ("run.gif", {"fps": math.inf}, "fps"),
-        ("run.gif", {"seconds": 1e6, "fps": 1e3}, "expected 20000 or fewer"),
-    ],
-)
-def test_an_animation_that_cannot_be_is_refused(path, options, message, tmp_path):
-    chart = looked_at(sw.scenes.clover())
-    with pytest.raises(ArgumentError, match=message):
-        chart.animate(tmp_path / path, **options)
-    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
-        chart.plot(tmp_path / "run.gif2")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_matplotlib_the_numbers_are_still_there(monkeypatch, tmp_path):

@@ -149,7 +149,7 @@ class Exact:
     """The exact solution of a scene of the package; it is pickled as the call that made the scene."""
 
     def __init__(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any], solution: table.Exact) -> None:
-        self.made, self.solution = (name, args, kwargs), solution
+        self.call, self.solution = (name, args, kwargs), solution
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
         """Both blocks at these times."""
@@ -160,13 +160,13 @@ class Exact:
         return getattr(self.solution, name)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _exact, self.made
+        return _exact, self.call
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Exact) and same(self.made, other.made)
+        return isinstance(other, Exact) and same(self.call, other.call)
 
     def __hash__(self) -> int:
-        return hash(self.made[0])
+        return hash(self.call[0])
 
 
 def _exact(name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> table.Exact | None:

@@ -90,7 +90,7 @@ def finding(chart: Figures) -> str:
         (len(exact), "", "look exact"),
     ]
     parts = [f"{count} {one if count == 1 else several}" for count, one, several in kinds if count]
-    return f"Of {len(chart.samples)} methods {', '.join(parts)}" if len(chart.samples) > 1 else _said(chart.samples[0], digits=2)
+    return f"Of {len(chart.samples)} methods {', '.join(parts)}" if len(chart.samples) > 1 else _words(chart.samples[0], digits=2)
 
 
 def _distance(samples: Samples) -> Array:
@@ -110,7 +110,7 @@ def _together(axes: Axes, chart: Figures, same: list[Samples]) -> None:
         axes.set_title(f"{len(same)} of the same eigenvalues", loc="left", size=13.5, weight="bold")
     else:
         axes.set_title(named(first.method), loc="left", size=13.5, weight="bold")
-    axes.set_title(_said(first, digits=2).split(" (")[0], loc="right", size=11)  # the rest has no room
+    axes.set_title(_words(first, digits=2).split(" (")[0], loc="right", size=11)  # the rest has no room
     axes.set_ylabel("y")
 
 
@@ -142,7 +142,7 @@ def one(chart: Figures, samples: Samples) -> Figure:
         figure.text(0.012, 0.925, f"{method.title} ({method.section}): y(t)", size=18, weight="bold")
         figure.text(0.012, 0.865, _start(chart, samples), size=12.5, color=GREY)
         limit = f"Stable for Φ < {samples.limit:.6g}." if samples.limit else "Never stable."
-        figure.text(0.012, 0.805, f"{_said(samples)}. {limit}", size=12.5)
+        figure.text(0.012, 0.805, f"{_words(samples)}. {limit}", size=12.5)
         figure.text(0.012, 0.03, "\n".join(MARKS), size=12, color=GREY, linespacing=1.35)
     return figure
 
@@ -197,7 +197,7 @@ def _largest(axes: Axes, y: Array) -> None:
         axes.text(0.985, 0.07, largest, transform=axes.transAxes, size=11.5, ha="right", bbox=box, zorder=5)
 
 
-def _said(samples: Samples, digits: int = 3) -> str:
+def _words(samples: Samples, digits: int = 3) -> str:
     change = signed(samples.r1_squared - 1.0, digits=digits)
     ratio = f"Ψ/Φ − 1 = {signed(samples.ratio - 1.0, percent=True, digits=digits)}" if math.isfinite(samples.ratio) else "no Ψ"
     return f"r₁² − 1 = {change}, {ratio}".replace("-", "−") + f": {samples.kind}"

@@ -176,11 +176,11 @@ class _Exact:
         if self.carries:  # what the method carries at the start, from the run's end by one step back
             slot = method.steps.start(system.scaled(dt, ()), 0, 0.0, slot, y)
         self.start = [_fixed(Fraction(x)) for x in [*np.ravel(slot).tolist(), *np.ravel(y).tolist()]]
-        self.found: dict[int, list[int]] = {}
+        self.states: dict[int, list[int]] = {}
 
     def state(self, n: int) -> list[int]:
         """The slots after n steps, by squaring."""
-        if n not in self.found:
+        if n not in self.states:
             s, square, left = self.start, self.p, n
             while left:
                 if left & 1:
@@ -189,8 +189,8 @@ class _Exact:
                 if left:
                     columns = list(zip(*square, strict=True))
                     square = [[sum(a * b for a, b in zip(row, c, strict=True)) >> BITS for c in columns] for row in square]
-            self.found[n] = s
-        return self.found[n]
+            self.states[n] = s
+        return self.states[n]
 
     def length(self, n: int) -> float:
         """The length of the exact coordinates and velocities, or of their replacement."""

@@ -44,8 +44,7 @@ def command(args: argparse.Namespace) -> None:
     dtype: Dtypes = "both" if args.float32 else "float64"
     advice = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed, dtype=dtype)
     written = show.Written()
-    if args.output is not None:
-        written.write(args.output, advice.to_json)
+    written.write(args.output, advice.to_json)
     rejected = advice.rejections(REASONS)
     if args.json:
         show.print_json(advice.data())

@@ -100,9 +100,9 @@ def _summary(chart: WorkPrecision, files: list[str]) -> None:
 def _best(chart: WorkPrecision) -> list[str]:
     """Which is the cheapest for each of three errors."""
     rows = [(error, row) for error in TARGETS if (row := chart.best(error)) is not None]
-    text = "; ".join(f"for {error:g} {row['method']} ({_how(row)})" for error, row in rows)
+    text = "; ".join(f"for {error:g} {row['method']} ({_step(row)})" for error, row in rows)
     return [f"cheapest: {text}"] if text else []
 
 
-def _how(row: dict[str, Any]) -> str:
+def _step(row: dict[str, Any]) -> str:
     return f"dt = {row['dt']:.3g}" if row["tolerance"] is None else f"tolerance {row['tolerance']:.3g}"

@@ -51,8 +51,7 @@ def command(args: argparse.Namespace) -> None:
         **state,
     )
     written = show.Written()
-    if args.output is not None:
-        written.write(args.output, step.save)
+    written.write(args.output, step.save)
     if args.json:
         show.print_json(step.as_dict())
     else:

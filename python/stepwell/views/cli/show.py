@@ -51,8 +51,7 @@ def listing(
     """Print a list as a table or as JSON, and write it if a file is asked for; ``data`` has all of it for programs."""
     options.check_file(args, TABLE_FILES)
     written = Written()
-    if args.output is not None:
-        written.write(args.output, lambda path: _write(path, columns, rows, data))
+    written.write(args.output, lambda path: _write(path, columns, rows, data))
     if args.json:
         print_json(data)
     else:
@@ -84,8 +83,10 @@ class Written:
         self.files: list[str] = []
         self.error: Exception | None = None
 
-    def write(self, path: Path, writer: Callable[[Path], Any]) -> Any:
-        """Return the result of ``writer``, or keep its error for ``close``."""
+    def write(self, path: Path | None, writer: Callable[[Path], Any]) -> Any:
+        """Return the result of ``writer``, or keep its error for ``close``; without a path there is nothing to write."""
+        if path is None:
+            return None
         try:
             result = writer(path)
         except Exception as error:  # whatever it is, it is raised in the end

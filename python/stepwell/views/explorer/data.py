@@ -170,8 +170,8 @@ def sizes(scene: Scene) -> dict[str, Any]:
 
 
 def _finite(values: Array) -> Array:
-    found = values[np.isfinite(values)]
-    return found if len(found) else np.zeros(1)
+    finite_values = values[np.isfinite(values)]
+    return finite_values if len(finite_values) else np.zeros(1)
 
 
 def _slider(slider: sliders.Slider, values: dict[str, Any]) -> dict[str, Any] | None:
@@ -179,8 +179,8 @@ def _slider(slider: sliders.Slider, values: dict[str, Any]) -> dict[str, Any] | 
     value = 1.0 if slider.relative else None
     if value is None:
         for path, factor in slider.targets.items():
-            if (found := _at(values, path)) is not None:
-                value = found / factor
+            if (number := _at(values, path)) is not None:
+                value = number / factor
                 break
     if value is None or not math.isfinite(value):
         return None
