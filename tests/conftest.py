@@ -12,6 +12,7 @@ LONGEST = (
     "test_bits.py",
     "test_charts.py",
     "test_export.py",
+    "test_export_files.py",
     "test_site.py",
     "test_docs.py",
     "test_adaptive.py",

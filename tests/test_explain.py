@@ -24,151 +24,48 @@ from stepwell.runs.engine.adaptive import evaluated_attempt
 from stepwell.runs.engine.plan import per_step
 from stepwell.source.explanation import listing
 from support.cases import ADAPTIVE, SOME, SYSTEMS, drawn, fits, has_branches
-from support.explain import evaluate, leaves, lines
+from support.explain import evaluate, leaves
+from support.snapshots import Snapshots
 from support.tracing import ABLE, CONTROLS, MEMBERS, METHODS, H, T, assert_computes, made
 
 WRONG: Any = "yes"
 
 
-# ---- listings, written by hand from the document
+# ---- listings, which were first written by hand from the document
 
+LINEAR = sw.LinearSystem([[1, 2, 3], [4, 5, 6], [7, 8, 9.0]], np.ones((3, 2)), x=[None, 2.0], velocities=[2])
+DRIVEN = sw.Oscillator([1.0, 2.0], 0.1, a=sw.Sampled([1.0, 2.0], 0.5), form="physical")
+UNDAMPED = ("standard_euler", "damped_euler", "false_euler", "leapfrog", "verlet", "standard_heun", "rk4")
 
-@pytest.mark.parametrize(
-    ("method", "step"),
-    [
-        ("standard_euler", ["v' = v − Φ·y", "y' = y + Φ·v"]),
-        ("damped_euler", ["y' = y + Φ·v", "v' = v − Φ·y'"]),
-        ("false_euler", ["v' = v − Φ·y", "y' = y + Φ·v'"]),
-        ("leapfrog", ["v_half' = v_half − Φ·y", "y'      = y + Φ·v_half'"]),
-        ("verlet", ["y'      = 2·y − y_prev − Φ·(Φ·y)", "y_prev' = y"]),
-        (
-            "standard_heun",
-            ["a1  = Φ·y    (−dv1)", "dy1 = Φ·v", "v'  = v + 0.5·(−a1 − Φ·(y + dy1))", "y'  = y + 0.5·(dy1 + Φ·(v − a1))"],
-        ),
-        (
-            "rk4",
-            [
-                "a1  = 0.5·(Φ·y)",
-                "a2  = 0.5·(Φ·v)",
-                "a3  = Φ·(y + a2)    (−dv2)",
-                "dy2 = Φ·(v − a1)",
-                "a4  = Φ·(y + 0.5·dy2)    (−dv3)",
-                "dy3 = Φ·(v − 0.5·a3)",
-                "v'  = v + 0.16666666666666666·(2·(−a1 − a3 − a4) − Φ·(y + dy3))",
-                "y'  = y + 0.16666666666666666·(Φ·(v − a4) + 2·(dy3 + (a2 + dy2)))",
-            ],
-        ),
-    ],
-)
-def test_the_undamped_oscillator(method: str, step: list[str]) -> None:
-    assert lines(sw.explain(sw.Oscillator(), method)) == ["once a run", "Φ = h·omega", "in each step", *step]
-
-
-def test_who_has_what_in_common() -> None:
-    sweep = lines(sw.explain(sw.Oscillator([1.0, 2.0]), "false_euler"))
-    assert sweep == [
-        "once a run, for each member",
-        "Φ = h·omega",
-        "in each step, for each member",
-        "v' = v − Φ·y",
-        "y' = y + Φ·v'",
-    ]
-    driven = sw.Oscillator([1.0, 2.0], 0.1, a=sw.Sampled([1.0, 2.0], 0.5), form="physical")
-    explained = sw.explain(driven, "damped_euler")
-    assert [section.when for section in explained.sections if section.lines] == ["member", "step", "member step"]
-    assert lines(explained)[-3:] == [
-        "in each step, for each member",
-        "y' = y + h·v",
-        "v' = v + (c2·y' − c1·v + h·(a[s12] + s9·(a[s6] − a[s12])))",
-    ]
+LISTINGS: dict[str, tuple[sw.System, str, dict[str, Any]]] = {
+    **{f"undamped/{method}": (sw.Oscillator(), method, {}) for method in UNDAMPED},
+    # Both increments of a block have one factor, which is multiplied last.
+    **{f"fused/{method}": (sw.Oscillator(), method, {"fused": True}) for method in ("false_euler", "leapfrog", "standard_heun")},
+    "start": (sw.Oscillator(), "verlet", {"start": "first_order"}),
+    "members": (sw.Oscillator([1.0, 2.0]), "false_euler", {}),
     # The sample at the start of the step, that at its end, and for how much of it the latter has been there.
-    assert "s10 = floor(1.0000000000000568·((t + s1 − a.start)/a.interval))" in lines(explained)
-    assert "s7  = (s3 − (a.start + a.interval·s6))/(s2 − s1)" in lines(explained)
+    "sampled": (DRIVEN, "damped_euler", {}),
+    # Newton's law, a = G·m·d/r³, of which the cube is r²·√r².
+    "bodies": (sw.NBody([3.0, 4.0], force="newton"), "false_euler", {}),
+    "matrices": (LINEAR, "standard_euler", {}),
+    "transition": (sw.Oscillator(), "rk4", {"form": "matrix"}),
+}
 
 
-def test_bodies() -> None:
-    """Newton's law, a = G·m·d/r³, of which the cube is r²·√r²."""
-    step = """
-        a1      = y[1,0] − y[0,0]
-        a2      = y[1,1] − y[0,1]
-        a3      = a1·a1 + a2·a2 + c3
-        a4      = 1/(a3·√(a3))
-        a5      = c2·a4
-        a6      = c1·a4
-        v'[0,0] = v[0,0] + (a1·a5 + 0)
-        v'[0,1] = v[0,1] + (a2·a5 + 0)
-        v'[1,0] = v[1,0] − a1·a6
-        v'[1,1] = v[1,1] − a2·a6
-        y'[0,0] = y[0,0] + h·v'[0,0]
-        y'[0,1] = y[0,1] + h·v'[0,1]
-        y'[1,0] = y[1,0] + h·v'[1,0]
-        y'[1,1] = y[1,1] + h·v'[1,1]
-    """
-    said = lines(sw.explain(sw.NBody([3.0, 4.0], force="newton"), "false_euler"))
-    assert said[:5] == ["once a run", "c1 = h·Gm[0]", "c2 = h·Gm[1]", "c3 = softening·softening", "in each step"]
-    assert said[5:] == [line.strip() for line in step.strip().splitlines()]
-
-
-def test_matrices_are_named_as_given() -> None:
-    system = sw.LinearSystem([[1, 2, 3], [4, 5, 6], [7, 8, 9.0]], np.ones((3, 2)), x=[None, 2.0], velocities=[2])
-    said = [re.sub(" +", " ", line) for line in lines(sw.explain(system, "standard_euler"))]
-    assert "c1 = h·A[2,2]" in said
-    assert "c2 = h·A[2,0]" in said
-    assert any("h·B[0,1]·x[1]" in line for line in said)
-
-
-def test_fused() -> None:
-    assert lines(sw.explain(sw.Oscillator(), "false_euler", fused=True))[-2:] == ["v' = fma(−Φ, y, v)", "y' = fma(Φ, v', y)"]
-
-
-def beside(explained: sw.Explanation) -> dict[str, list[str]]:
-    """Lines of what is made beside the steps."""
-    return {section.when: [f"{line.name} = {line.formula}" for line in section.lines] for section in explained.beside}
-
-
-@pytest.mark.parametrize(
-    ("method", "step"),
-    [
-        ("leapfrog", ["v_half' = fma(−Φ, y, v_half)", "y'      = fma(Φ, v_half', y)"]),
-        # c1 is ½Φ: both increments of a block have one factor, which is multiplied last.
-        ("standard_heun", ["v2 = fma(−Φ, y, v)", "v' = fma(−c1, y + fma(Φ, v, y), v)", "y' = fma(c1, v + v2, y)"]),
-    ],
-)
-def test_increments_of_a_fused_step_are_multiplied_last(method: str, step: list[str]) -> None:
-    told = lines(sw.explain(sw.Oscillator(), method, fused=True))
-    assert told[told.index("in each step") + 1 :] == step
-
-
-def test_both_ends_of_what_is_carried() -> None:
-    """Verlet starts by y − Φv + ½ of the increment of the increment, as a Taylor series, or by y − Φv; v is made from it so."""
-    assert beside(sw.explain(sw.Oscillator(), "verlet")) == {
-        "start": ["Φ = h·omega", "y_prev = y − Φ·v − 0.5·(Φ·(Φ·y))"],
-        "finish": ["Φ = h·omega", "v = (y − y_prev)/Φ − 0.5·(Φ·y)"],
-    }
-    assert beside(sw.explain(sw.Oscillator(), "verlet", start="first_order")) == {
-        "start": ["y_prev = y − h·omega·v"],
-        "finish": ["v = (y − y_prev)/(h·omega)"],
-    }
-    fused = beside(sw.explain(sw.Oscillator(), "leapfrog", fused=True))
-    assert fused == {"start": ["v_half = fma(0.5·(h·omega), y, v)"], "finish": ["v = fma(−0.5·(h·omega), y, v_half)"]}
-    assert sw.explain(sw.Oscillator(), "rk4").beside == ()
-    text = str(sw.explain(sw.Oscillator(), "verlet"))
-    assert "at the start of a run, y_prev from v\n  Φ      = h·omega\n" in text
-    assert "where a state is kept, v from y_prev\n" in text
+@pytest.mark.parametrize("name", LISTINGS)
+def test_listings(name: str, snapshot: Snapshots) -> None:
+    """Values before the steps, in each step, and at both ends of what a method carries."""
+    system, method, options = LISTINGS[name]
+    text = str(sw.explain(system, method, **options))
+    listing, _, rest = text.partition("\n\noperations of a step")
+    ends = re.findall(r"^(?:at the start of a run|where a state is kept), .*\n(?:  .*\n)+", rest, re.MULTILINE)
+    snapshot(f"{name}.txt", "\n".join([listing, "", *ends]))
 
 
 def test_the_transition_matrix() -> None:
     explained = sw.explain(sw.Oscillator(), "rk4", form="matrix")
-    assert [line.replace("  ", " ") for line in lines(explained)] == [
-        "in each step",
-        "v' = P[0,0]·v + P[0,1]·y",
-        "y' = P[1,0]·v + P[1,1]·y",
-    ]
     assert (explained.computed["additions"], explained.computed["multiplications"]) == (2, 4)
     assert explained.written == explained.computed
-    assert (
-        explained.title == "Runge-Kutta 4: a step of Oscillator(omega=1.0, form='canonical'), 1 member, by its transition matrix"
-    )
     assert "P, Q: the transition matrix of a step, and what the inputs add at each node" in str(explained)
 
 

@@ -1,0 +1,310 @@
+"""What a sweep keeps of each member: extremes, means, crossings, periods, exponents, histories, functions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.errors import ArgumentError
+from stepwell.studies.sweeps import crossings, observed
+from stepwell.studies.sweeps.task import Stopped
+from support.sweeping import AXES, OUTCOMES, duffing, ends, power, small
+
+Oscillator = sw.Oscillator
+F = np.float32
+#: Outcomes that go with float32.
+WITH_FLOAT32 = tuple(each for each in OUTCOMES if each != "lyapunov")
+
+each_type = pytest.mark.parametrize("dtype", ["float64", "float32"])
+
+
+def whole(**options: Any) -> tuple[Any, sw.Run]:
+    """A sweep, and the run of the same members with every observed state."""
+    gamma = np.linspace(0.1, 0.6, 40)
+    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.05}
+    found = sw.sweep(duffing, {"gamma": ("gamma", gamma)}, "rk4", steps=400, transient=30, chunk=7, **given, **options)
+    start = sw.integrate(duffing(gamma=gamma), "rk4", steps=30, **given)
+    return found, sw.integrate(duffing(gamma=gamma), "rk4", steps=400, every=1, resume=start)
+
+
+def test_extremes() -> None:
+    found, run = whole(outcomes=["extremes", sw.sweeps.Extremes("energy"), sw.sweeps.Extremes(power)])
+    for name, values in {"v": run.v, "y": run.y, "energy": run.quantity("energy"), "power": run.v * run.y}.items():
+        np.testing.assert_array_equal(found[f"{name}_min"], values.min(axis=0))
+        np.testing.assert_array_equal(found[f"{name}_max"], values.max(axis=0))
+
+
+@pytest.mark.parametrize("observe", [1, 7, 400])
+def test_means(observe: int) -> None:
+    """By the trapezoidal rule, the last interval shorter where the steps are no multiple of the interval."""
+    found, run = whole(outcomes=["mean", sw.sweeps.Mean(power, name="p")], observe=observe)
+    k = np.unique(np.append(np.arange(0, 401, observe), 400))
+    for name, values in {"v": run.v, "y": run.y, "p": run.v * run.y}.items():
+        t = run.t[k]
+        sums = ((t[1:] - t[:-1])[:, None] / 2 * (values[k][1:] + values[k][:-1])).sum(axis=0) / (t[-1] - t[0])
+        # n additions of numbers of size 1 err by n·2⁻⁵³ at most, on both sides.
+        np.testing.assert_allclose(found[f"{name}_mean"], sums, atol=2 * 400 * 2**-53 * abs(values).max())
+
+
+def mean_of(t: Any, values: Any) -> Any:
+    """The trapezoidal rule, state after state."""
+    total = np.zeros(values.shape[1:], values.dtype)
+    for k in range(1, len(t)):
+        total += 0.5 * (t[k] - t[k - 1]) * (values[k - 1] + values[k])
+    return total / (t[-1] - t[0])
+
+
+def test_what_is_found_of_states_of_float32_is_computed_in_float64() -> None:
+    outcomes = ["mean", "extremes", sw.sweeps.Mean(power), sw.sweeps.Extremes("energy"), ends]
+    found = small(dtype="float32", outcomes=outcomes, transient=0)
+    gamma, y = (values for _, values in AXES.values())
+    system = duffing(delta=0.2, gamma=gamma[:, None])
+    run = sw.integrate(system, "rk4", v=0.0, y=y, dt=0.05, steps=80, every=1, dtype="float32")
+    y, v = run.y.astype(np.float64), run.v.astype(np.float64)
+    np.testing.assert_array_equal(found.y_mean, mean_of(run.t, y))
+    np.testing.assert_array_equal(found.power_mean, mean_of(run.t, v * y))
+    np.testing.assert_array_equal(found.energy_max, run.energy.max(axis=0))
+    np.testing.assert_array_equal(found.y_max, run.y.max(axis=0))
+    assert found.y_max.dtype == found.twice.dtype == F
+    assert found.y_mean.dtype == found.power_mean.dtype == found.energy_max.dtype == np.float64
+    # Sums and products of float32 are others.
+    assert (mean_of(run.t.astype(F), run.y) != found.y_mean).any()
+    assert (mean_of(run.t, (run.v * run.y).astype(np.float64)) != found.power_mean).any()
+
+
+def test_means_of_a_closed_form() -> None:
+    """The mean of cos² over a period is 1/2; the trapezoidal rule over whole periods has no error but RK4's."""
+    steps = 200
+    axes = {"y": ("y0", [1.0, 2.0])}
+    of = sw.sweeps.Mean(lambda t, v, y: y * y, name="square")
+    found = sw.sweep(Oscillator(1.0), axes, "rk4", v=0.0, dt=2 * np.pi / steps, steps=steps, outcomes=of)
+    # RK4 errs by Φ⁵/120 a step, so y by 2π·Φ⁴/120 after a period, and y² by twice that, times the amplitude squared.
+    bound = 2 * 2 * np.pi * (2 * np.pi / steps) ** 4 / 120
+    np.testing.assert_allclose(found.square_mean, [0.5, 2.0], rtol=2 * bound)
+
+
+def crossing_errors(steps: int, **options: Any) -> Any:
+    """By how much the time errs at which cos(ωt) falls to 1/2, for some ω; and the bound."""
+    omega = np.array([1.0, 1.3, 1.7])
+    h = 2.0 / steps
+    of = sw.sweeps.Crossing("y", 0.5, "falling", **options)
+    found = sw.sweep(Oscillator, {"omega": omega}, "rk4", v=0.0, y=1.0, dt=h, steps=steps, outcomes=of)
+    t, phi = np.pi / 3 / omega, omega * h
+    # A cubic by values and slopes at both ends errs by h⁴/384 of the fourth derivative, which is ω⁴ at most. RK4's states err by
+    # Φ⁵/120 a step. The slopes err as much, and a cubic takes 4/27 of an interval of them: 4/27·Φ < 3 % more. The speed there is
+    # ω·sin 60°.
+    bound = 1.1 * (phi**4 / 384 + t / h * phi**5 / 120) / (omega * np.sin(np.pi / 3)) + 1e-15
+    return abs(found.y_crossing.values - t), bound
+
+
+@pytest.mark.parametrize("steps", [20, 40, 80, 400])
+def test_first_crossings_are_those_of_the_exact_motion(steps: int) -> None:
+    errors, bound = crossing_errors(steps)
+    assert (errors < bound).all()
+
+
+@pytest.mark.mutant
+def test_linear_crossings_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(crossings, "rates", lambda *_: None)
+    errors, bound = crossing_errors(40)
+    assert (errors > 10 * bound).all()
+
+
+@pytest.mark.mutant
+def test_slopes_of_the_wrong_sign_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(crossings, "rates", lambda *given: -np.asarray(observed.rates(*given)))
+    errors, bound = crossing_errors(40)
+    assert (errors > 10 * bound).any()
+
+
+def test_crossings_of_other_quantities_are_linear() -> None:
+    """Of a function: (interval)²/8 · largest curvature / speed."""
+    omega, h = np.array([1.0, 1.7]), 0.02
+    of = sw.sweeps.Crossing(lambda t, v, y: y, 0.5, "falling", name="first")
+    found = sw.sweep(Oscillator, {"omega": omega}, "rk4", v=0.0, y=1.0, dt=h, steps=100, outcomes=of)
+    errors = abs(found.first_crossing.values - np.pi / 3 / omega)
+    assert (errors < 1.01 * h**2 / 8 * omega**2 / (omega * np.sin(np.pi / 3))).all()
+    assert (errors > 1e-7).any()
+
+
+def test_a_crossing_is_found_between_states_of_float32() -> None:
+    """A quarter of a period. Each step rounds y by 2^-25 a few times, ten at most, and where it passes 0 its slope is 1.
+
+    Between states the cubic is wrong by h⁴/384, 3e-7 with h = 0.1; in float32 numbers near 1.57 are 1.2e-7 apart.
+    """
+    steps, h = 20, 0.1
+    crossing = sw.sweeps.Crossing("y", direction="falling")
+    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": h, "steps": steps, "outcomes": crossing, "dtype": "float32"}
+    found = sw.sweep(sw.Oscillator, {"omega": [1.0, 1.0]}, "dop853", **given)
+    assert found.y_crossing.dtype == np.float64
+    assert abs(found.y_crossing.values - np.pi / 2).max() < 10 * steps * 2.0**-25 + h**4 / 384
+    run = sw.integrate(sw.Oscillator(1.0), "dop853", v=0.0, y=1.0, dt=h, steps=steps, every=1, dtype="float32")
+    after = int(np.argmax(run.y <= 0.0))
+    assert run.t[after - 1] < found.y_crossing.values[0] < run.t[after]
+
+
+def test_directions_and_what_never_passes() -> None:
+    outcomes = [sw.sweeps.Crossing("y", 0.5, d, name=d) for d in ("falling", "rising", "both")]
+    found = sw.sweep(Oscillator(1.0), {"y": [1.0, 0.4]}, "rk4", v=0.0, dt=0.01, steps=600, outcomes=[*outcomes, "crossing"])
+    third = np.pi / 3
+    for name, time in {"falling": third, "rising": 5 * third, "both": third}.items():
+        assert float(found[f"{name}_crossing"][0]) == pytest.approx(time, abs=1e-8)
+        assert np.isnan(found[f"{name}_crossing"][1])
+    np.testing.assert_allclose(found.y_crossing, 1.5 * np.pi, atol=1e-8)
+
+
+@pytest.mark.parametrize(("number", "word"), [(1, "rising"), (-1, "falling"), (0, "both")])
+def test_directions_are_those_of_events(number: int, word: Any) -> None:
+    """As a number or as a word, in both; a crossing of both says it as an event does."""
+    crossings = [sw.sweeps.Crossing("y", 0.5, each) for each in (number, word)]
+    events = [sw.Event(power, direction=each) for each in (number, word)]
+    assert [each.direction for each in crossings + events] == [number] * 4
+    assert events[0] == events[1]
+    assert repr(crossings[0]) == repr(crossings[1])
+    with pytest.raises(ArgumentError, match=r"direction: there is no 'up'.* Known: rising, falling, both"):
+        sw.sweeps.Crossing("y", direction="up")  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="direction: expected -1 or more, up to 1, got 2"):
+        sw.Event(power, direction=2)
+
+
+def test_a_crossing_at_a_state_counts_once() -> None:
+    """A sampled level that is met exactly at a state: it is passed there, and not again in the next interval."""
+    of = [
+        sw.sweeps.Crossing(lambda t, v, y: t + 0.0 * y, 0.5, name="met"),
+        sw.sweeps.Period(lambda t, v, y: t + 0.0 * y, 0.5, name="met"),
+    ]
+    found = sw.sweep(Oscillator(1.0), {"y": [1.0, 2.0]}, "rk4", v=0.0, dt=0.25, steps=8, outcomes=of)
+    np.testing.assert_array_equal(found.met_crossing, 0.5)
+    np.testing.assert_array_equal(found.met_passages, 1)
+    assert np.isnan(found.met_period).all()
+
+
+@pytest.mark.parametrize("memory", [64 * 2**20, 3000])
+def test_periods(memory: float) -> None:
+    """Of 2π/ω: RK4's own frequency is lower by Φ⁴/120; n intervals share the errors of two passages, of Φ⁴/384 each at most."""
+    omega, h, steps = np.array([1.0, 1.5, 2.0]), 0.05, 1000
+    of = sw.sweeps.Period("y", 0.2)
+    found = sw.sweep(Oscillator, {"omega": omega}, "rk4", v=0.0, y=1.0, dt=h, steps=steps, outcomes=of, memory=memory)
+    phi, period = omega * h, 2 * np.pi / omega
+    expected = np.floor((steps * h - np.arccos(-0.2) / omega) / period)
+    n = found.y_passages.values - 1
+    assert (abs(n - expected) <= 1).all()
+    speed = omega * np.sqrt(1 - 0.2**2)
+    # The amplitude falls by Φ⁶/144 a step, which moves a passage of 0.2 by 0.2/speed times that.
+    drift = 0.2 / speed * steps * phi**6 / 144 / n
+    bound = 1.1 * (period * phi**4 / 120 + 2 * phi**4 / 384 / speed / n + drift)
+    assert (abs(found.y_period.values - period) < bound).all()
+    wrong = found.y_period.values * n / (n + 1)  # as many intervals as passages
+    assert (abs(wrong - period) > bound).all()
+
+
+def test_a_sweep_of_exponents_stops_between_two_orthonormalisations() -> None:
+    """As at Ctrl-C: of a chunk that would take days, in a thread that no signal reaches."""
+    start, calls = {"v": 0.0, "y": np.ones(1000), "dt": 0.1, "t0": 0.0}, []
+
+    def look() -> None:
+        calls.append(None)
+        if len(calls) == 5:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        sw.sweeps.Exponents(every=20).of_start(sw.Pendulum(), "rk4", start, 40, 10**12, look)
+
+
+def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
+    gamma = np.array([0.2, 0.5])
+    found = sw.sweep(
+        duffing, {"gamma": gamma}, "rk4", v=0.0, y=1.0, dt=0.05, steps=300, transient=40, outcomes=sw.sweeps.Exponents("all", 5)
+    )
+    truth = sw.lyapunov(duffing(gamma=gamma), "rk4", v=0.0, y=1.0, dt=0.05, steps=300, transient=40, exponents="all", every=5)
+    np.testing.assert_array_equal(found.lyapunov, truth.exponents.T)
+    # The sum of both is minus the damping, up to the error of RK4.
+    np.testing.assert_allclose(found.lyapunov.sum("exponent"), -0.3, atol=1e-5)
+
+
+@each_type
+@pytest.mark.parametrize(("every", "steps"), [(1, 10), (4, 10), (5, 10), (20, 10)])
+def test_histories_are_those_of_integrate(every: int, steps: int, dtype: Any) -> None:
+    omega = np.array([1.0, 2.0, 3.0])
+    given: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": steps, "every": every, "dtype": dtype}
+    found = sw.sweep(Oscillator, {"omega": omega}, "verlet", **given, memory=1500, chunk=2)
+    run = sw.integrate(Oscillator(omega), "verlet", **given)
+    assert found.y.dtype == found.v.dtype == run.y.dtype == dtype
+    assert found.attrs.get("dtype", "float64") == dtype
+    np.testing.assert_array_equal(found.y, run.y.T)
+    np.testing.assert_array_equal(found.v, run.v.T)
+    np.testing.assert_array_equal(found.t, run.t)
+
+
+def test_a_history_beside_reductions_that_see_other_states() -> None:
+    found = sw.sweep(
+        Oscillator, {"omega": [1.0, 2.0]}, "rk4", v=0.0, y=1.0, dt=0.1, steps=20, every=6, observe=4,
+        outcomes=["history", "extremes", "last"], memory=1500,
+    )  # fmt: skip
+    run = sw.integrate(Oscillator([1.0, 2.0]), "rk4", v=0.0, y=1.0, dt=0.1, steps=20, every=1)
+    np.testing.assert_array_equal(found.y, run.y[[0, 6, 12, 18, 20]].T)
+    np.testing.assert_array_equal(found.y_min, run.y[[0, 4, 8, 12, 16, 20]].min(axis=0))
+    np.testing.assert_array_equal(found.y_last, run.y[-1])
+
+
+def test_functions_of_a_run() -> None:
+    def seen(run: sw.Run) -> Any:
+        return {"largest": abs(run.y).max(axis=0), "states": ("k", run.y), "number": np.full(run.status.size, len(run.t))}
+
+    found, run = whole(outcomes=[seen, lambda run: run.y[-1] > 0], every=50)
+    assert "y" not in found
+    np.testing.assert_array_equal(found.states, run.y[::50].T)
+    np.testing.assert_array_equal(found.largest, abs(run.y[::50]).max(axis=0))
+    assert found.number.dtype.kind == "i"
+    np.testing.assert_array_equal(found.function, run.y[-1] > 0)
+
+
+def test_what_diverges_leaves_the_others_alone() -> None:
+    omega = np.array([1.0, 30.0, 2.0, 40.0])
+    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1000}
+    message = r"2 of 4 members diverged, the first of them at omega = 30, at step 369; status and first_bad_step tell"
+    with pytest.warns(sw.DivergenceWarning, match=message) as caught:
+        found = sw.sweep(Oscillator, {"omega": omega}, "false_euler", outcomes=["last", "extremes", "period"], chunk=3, **given)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    with pytest.warns(sw.DivergenceWarning):
+        run = sw.integrate(Oscillator(omega), "false_euler", **given)
+    np.testing.assert_array_equal(found.status, run.status)
+    np.testing.assert_array_equal(found.first_bad_step, run.first_bad_step)
+    alone = sw.sweep(Oscillator, {"omega": omega[::2]}, "false_euler", outcomes=["last", "extremes", "period"], **given)
+    for name in alone.data_vars:
+        np.testing.assert_array_equal(found[name][::2], alone[name])
+    assert found.status.attrs["flag_meanings"].split()[:3] == ["not_computed", "ok", "diverged"]
+    assert np.isnan(found.y_max[1])
+
+
+def test_finite_numbers_that_mean_nothing_are_told() -> None:
+    with pytest.warns(sw.AccuracyWarning, match=r"in 1 chunk, the first beginning at v = 1: "):
+        sw.sweep(sw.Pendulum(), {"v": [1.0, 1e18]}, "rk4", y=0.0, dt=0.1, steps=10)
+
+
+OBSERVED: dict[str, sw.System] = {
+    "own equations, driven": duffing(gamma=np.array([0.1, 0.5, 0.9])),
+    "sinusoid": sw.Pendulum(1.3, 0.1, a=sw.Sinusoid(np.array([0.5, 1.0, 1.5]), 1.1, 0.3)),
+    "samples": sw.Oscillator(1.3, 0.1, x=sw.Sampled(np.linspace(-1.0, 1.0, 16), 0.5), form="physical"),
+    "canonical": sw.Oscillator(np.array([1.0, 2.0, 3.0])),
+    "bodies": sw.scenes.figure_eight().system,
+}
+
+
+@pytest.mark.parametrize("name", OBSERVED)
+def test_rates_are_those_of_the_motion(name: str) -> None:
+    """Each member at a time of its own, as at passages; compared with a short step of RK4 from there."""
+    system, rng, t, h = OBSERVED[name], np.random.default_rng(1), np.array([0.1, 1.3, 2.6]), 1e-5
+    v, y = (rng.uniform(0.5, 1.0, (*shape, 3)) for shape in (system.v_shape, system.y_shape))
+    run = sw.integrate(system, "rk4", v=v, y=y, dt=0.1, steps=1)
+    for block in ("v", "y"):
+        found = observed.rates(run, block, t, v, y)
+        assert found is not None
+        for i in range(3):
+            after = sw.integrate(system, "rk4", v=v, y=y, dt=h, steps=1, t0=float(t[i]))
+            change = (getattr(after, block)[-1] - (v if block == "v" else y))[..., i] / h
+            # Rates change by some units in a unit of time (bodies that are near: some hundred), and differences are rounded.
+            np.testing.assert_allclose(found[..., i], change, atol=1e3 * h, rtol=1e-4)
