@@ -28,7 +28,7 @@ from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed, Single
 from .costs import Times, step_times, tried_times
 from .motion import SINGLE_STEP_ROUNDING, Grid, Motion, motion_of
 from .result import Advice, Rejected, Row, Shortfall
-from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
+from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Fewest, Missed, Search
 from .trials import ASYMPTOTIC_ERROR, Trial, Trials
 
 if TYPE_CHECKING:
@@ -159,35 +159,35 @@ def advise(
     prices = times if cost == "time" else {each.name: float(each.evaluations) for each in candidates}
     hints = _hints(known, trials, [each for each in candidates if each.dtype == "float64"], prices, tolerance, most)
     search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + SINGLE_WORK * narrow.work + adaptive.work)
-    found, missed = search.run(candidates, hints=hints)
+    fewest, missed = search.run(candidates, hints=hints)
 
     spent = _Spending(known.grid, adaptive, times)
-    broken = [each for each in candidates if each.name in found and not spent.fits(each, found[each.name].k, budget)]
+    broken = [each for each in candidates if each.name in fewest and not spent.fits(each, fewest[each.name].k, budget)]
     if budget is not None and any(each.by == "tolerance" for each in broken):
         # What is cheap on average but not in its worst frame must not exclude what costs more on average, and the same in all.
         rest = [each for each in candidates if each not in broken]
-        useful = max(2.0 * budget, min(spent.longest(each, found[each.name].k) for each in broken))
+        useful = max(2.0 * budget, min(spent.longest(each, fewest[each.name].k) for each in broken))
         again, _ = search.run(rest, {each.name: spent.steps(each, useful) for each in rest})
-        found |= again
+        fewest |= again
         missed = {name: why for name, why in missed.items() if name not in again}
-    enough = [each for each in candidates if each.name in found]
-    fits = [each for each in enough if spent.fits(each, found[each.name].k, budget)]
-    costs = [search.cost(each, found[each.name].k) for each in fits]
-    fits = by_cost_and_error(fits, costs, [_judged(each, found[each.name].trial) for each in fits], noise)
+    enough = [each for each in candidates if each.name in fewest]
+    fits = [each for each in enough if spent.fits(each, fewest[each.name].k, budget)]
+    costs = [search.cost(each, fewest[each.name].k) for each in fits]
+    fits = by_cost_and_error(fits, costs, [_judged(each, fewest[each.name].trial) for each in fits], noise)
     for each in candidates:
         if each.name in missed:
             rejected.append(_missed(each, missed[each.name], search))
         elif each not in fits:
             worst = " in its worst frame" if each.by == "tolerance" and frame is not None else ""
-            need = spent.longest(each, found[each.name].k)
+            need = spent.longest(each, fewest[each.name].k)
             reason = f"good enough, but takes {need:.3g} s{worst} of the {budget:.3g} s"
             rejected.append(Rejected(each.method.name, "budget", reason, each.by, each.dtype))
     fastest = predict.fastest_oscillation(trials) if fits else None
-    ranked = tuple(_row(trials, each, found[each.name], spent, budget, fastest) for each in fits)
-    shortfall = None if ranked else _shortfall(candidates, found, spent, budget)
-    made = trials.made + narrow.made + adaptive.made
-    found_of = (trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, made, known.cut, noise)
-    return Advice(*found_of, dtype=dtype)
+    ranked = tuple(_row(trials, each, fewest[each.name], spent, budget, fastest) for each in fits)
+    shortfall = None if ranked else _shortfall(candidates, fewest, spent, budget)
+    runs = trials.runs + narrow.runs + adaptive.runs
+    outcome = (trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, runs, known.cut, noise)
+    return Advice(*outcome, dtype=dtype)
 
 
 def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
@@ -314,10 +314,10 @@ class _Spending:
 
 
 def _row(
-    trials: Trials, candidate: Candidate, found: Found, spent: _Spending, budget: float | None, fastest: float | None
+    trials: Trials, candidate: Candidate, fewest: Fewest, spent: _Spending, budget: float | None, fastest: float | None
 ) -> Row:
-    method, trial, grid = candidate.method, found.trial, trials.grid
-    ns, mean, longest = spent.times[candidate.name], spent.mean(candidate, trial), spent.longest(candidate, found.k)
+    method, trial, grid = candidate.method, fewest.trial, trials.grid
+    ns, mean, longest = spent.times[candidate.name], spent.mean(candidate, trial), spent.longest(candidate, fewest.k)
     per_frame = candidate.evaluations * trial.steps / grid.spans
     by_modes, limit = None, predict.Limit(None, "none", None, None)
     wide_error = wide_ns = None
@@ -329,17 +329,17 @@ def _row(
         by_modes = predict.predicted(trials.scene, method, trial.dt, trial.steps)
         limit = predict.limit(trials, method, fastest)
         observed = predict.observed_limit(trials, method, trial.steps)
-    robust: float | None = found.robust
-    if isinstance(candidate, Adaptive) and found.robust is not None:
-        robust = candidate.tolerance(found.robust)
+    robust: float | None = fewest.robust
+    if isinstance(candidate, Adaptive) and fewest.robust is not None:
+        robust = candidate.tolerance(fewest.robust)
     return Row(
         method=method,
-        substeps=found.k if grid.framed and candidate.by == "step" else None,
+        substeps=fewest.k if grid.framed and candidate.by == "step" else None,
         steps=trial.steps,
         dt=trial.dt,
         error=trial.error,
-        predicted=by_modes.error if by_modes else found.expected,
-        predicted_by="modes" if by_modes else ("order" if found.expected is not None else None),
+        predicted=by_modes.error if by_modes else fewest.expected,
+        predicted_by="modes" if by_modes else ("order" if fewest.expected is not None else None),
         frequency_error=by_modes.frequency if by_modes else None,
         damping_error=by_modes.damping if by_modes else None,
         evaluations_per_frame=per_frame if grid.framed else None,
@@ -349,14 +349,14 @@ def _row(
         seconds_per_time=1e-9 * ns / trial.dt,
         objects=None if budget is None else int(budget / longest),
         limit=limit.dt,
-        limit_by=limit.how,
+        limit_by=limit.by,
         mode=limit.mode,
         mode_frequency=limit.frequency,
         observed_limit=observed,
         robust=robust,
-        tolerance=candidate.tolerance(found.k) if isinstance(candidate, Adaptive) else None,
+        tolerance=candidate.tolerance(fewest.k) if isinstance(candidate, Adaptive) else None,
         rejected_steps=trial.rejected,
-        worst_evaluations=candidate.evaluations * spent.most(candidate, found.k) if grid.framed else None,
+        worst_evaluations=candidate.evaluations * spent.most(candidate, fewest.k) if grid.framed else None,
         dtype=candidate.dtype,
         float64_error=wide_error,
         float64_ns_per_step=wide_ns,
@@ -389,10 +389,12 @@ def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
     return Rejected(candidate.method.name, missed.kind, reason, candidate.by, candidate.dtype)
 
 
-def _shortfall(candidates: Sequence[Candidate], found: Mapping[str, Found], spent: _Spending, budget: float | None) -> Shortfall:
+def _shortfall(
+    candidates: Sequence[Candidate], fewest: Mapping[str, Fewest], spent: _Spending, budget: float | None
+) -> Shortfall:
     """What would have to give: the least error within the budget of all that was tried, and the budget for the tolerance."""
     least, best = _least(candidates, spent, budget)
-    needs = [(spent.longest(each, found[each.name].k), each.name) for each in candidates if each.name in found]
+    needs = [(spent.longest(each, fewest[each.name].k), each.name) for each in candidates if each.name in fewest]
     needed, by = min(needs) if needs else (None, None)
     if best is None:
         return Shortfall(least, None, None, needed, by)

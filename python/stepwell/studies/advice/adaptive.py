@@ -58,7 +58,7 @@ class AdaptiveTrials:
         self._confirmed: dict[tuple[str, float], Trial] = {}
         self._worst: dict[tuple[str, float], int] = {}
         #: Number of runs, and their function evaluations in total.
-        self.made, self.work = 0, 0.0
+        self.runs, self.work = 0, 0.0
 
     def look(self, method: Method, tolerance: float, share: float = 1.0) -> Trial:
         """The run, at some of the marks; if it is made for this, with this share of the most function evaluations."""
@@ -116,7 +116,7 @@ class AdaptiveTrials:
         return self._runs[key]
 
     def _integrated(self, method: Method, tolerance: float, at: Array, share: float) -> Run:
-        self.made += 1
+        self.runs += 1
         scene, most = self.scene, max(1, int(share * self.most / method.attempt_evaluations))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ToleranceWarning)
@@ -137,10 +137,10 @@ class AdaptiveTrials:
             legs = [start, *self._legs(method, start, ends)]
             if len(ends) < number:
                 pairs = sorted(itertools.pairwise(legs), key=lambda pair: pair[0].tried - pair[1].tried)[:WORST_PIECES]
-                found = [[a, *self._legs(method, a, range(a.end + 1, b.end + 1))] for a, b in pairs]
+                pieces = [[a, *self._legs(method, a, range(a.end + 1, b.end + 1))] for a, b in pairs]
             else:
-                found = [legs]
-            self._worst[key] = max(b.tried - a.tried for each in found for a, b in itertools.pairwise(each))
+                pieces = [legs]
+            self._worst[key] = max(b.tried - a.tried for each in pieces for a, b in itertools.pairwise(each))
         return self._worst[key]
 
     def _legs(self, method: Method, leg: Leg, ends: Iterable[int]) -> Iterator[Leg]:

@@ -52,14 +52,14 @@ class Limit(NamedTuple):
     Attributes:
         dt: the step beyond which something grows, in units of time; 0 for never stable, infinite for always; None if unknown.
             Where rounding hides what grows, the largest step of which it is known that nothing does; ``mode`` then says so.
-        how: ``"linear"``, or ``"frozen"`` for the fastest oscillation along the true motion, as if it stood still; ``"none"`` of
+        by: ``"linear"``, or ``"frozen"`` for the fastest oscillation along the true motion, as if it stood still; ``"none"`` of
             steps that are chosen to a tolerance.
         mode: what grows there, in words; None if nothing or unknown.
         frequency: in rad per unit of time, of that mode, or None.
     """
 
     dt: float | None
-    how: str
+    by: str
     mode: str | None
     frequency: float | None
 
@@ -69,10 +69,10 @@ def predicted(scene: Scene, method: Method, dt: float, steps: int) -> Prediction
     system = scene.system
     if not system.linear or system.given_inputs() or scene.control is not None:
         return None
-    found = analyse(system, method, dt=dt)
+    analysis = analyse(system, method, dt=dt)
     v, y = (np.asarray(block, dtype=float) for block in (scene.v, scene.y))
     slot = method.steps.start(system.scaled(dt, ()), 0, 0.0, v, y) if method.carry else v
-    z, vectors = np.linalg.eig(found.P)
+    z, vectors = np.linalg.eig(analysis.P)
     rates, shapes = np.linalg.eig(maps.rates(system))
     if not max(np.linalg.cond(vectors), np.linalg.cond(shapes)) < MAX_CONDITION:
         return None
@@ -91,10 +91,10 @@ def predicted(scene: Scene, method: Method, dt: float, steps: int) -> Prediction
         ]
         # The mode that drifts most, by its share of the start.
         weight = np.abs(true_share) * np.sqrt((np.abs(shapes) ** 2).sum(axis=0))
-        own = np.array([np.sqrt(weight[np.abs(rates - rate).argmin()]) for rate in found.rates])
-        drift = np.log(found.eigenvalues) / dt - found.rates
+        own = np.array([np.sqrt(weight[np.abs(rates - rate).argmin()]) for rate in analysis.rates])
+        drift = np.log(analysis.eigenvalues) / dt - analysis.rates
         worst = int(np.nanargmax(own * np.abs(drift)))
-    ratio = float(found.frequency_ratios[worst])
+    ratio = float(analysis.frequency_ratios[worst])
     frequency = ratio - 1.0 if math.isfinite(ratio) else None
     return Prediction(float(max(errors, default=math.inf)), frequency, float(-drift[worst].real))
 
@@ -103,12 +103,12 @@ def limit(trials: Trials, method: Method, fastest: float | None) -> Limit:
     """The limit of a method on a scene; ``fastest`` is what ``fastest_oscillation`` found of one that is not linear."""
     scene = trials.scene
     if scene.system.linear and scene.control is None:
-        found = limit_of(scene.system, method)
-        mode: Mode | None = found.mode
+        limits = limit_of(scene.system, method)
+        mode: Mode | None = limits.mode
         if mode is None:
-            return Limit(found.stable, "linear", None, None)
-        kind = mode.kind if found.decided else f"{mode.kind}; not decided between {found.stable:.6g} and {found.grows:.6g}"
-        return Limit(found.stable, "linear", kind, abs(mode.rate.imag))
+            return Limit(limits.stable, "linear", None, None)
+        kind = mode.kind if limits.decided else f"{mode.kind}; not decided between {limits.stable:.6g} and {limits.grows:.6g}"
+        return Limit(limits.stable, "linear", kind, abs(mode.rate.imag))
     if not fastest:
         return Limit(None, "frozen", None, None)
     return Limit(method.limit / fastest, "frozen", "the fastest oscillation along the motion", fastest)

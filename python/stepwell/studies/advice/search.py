@@ -60,7 +60,7 @@ PREDICTION_FACTOR = 3.0
 STOPPED_LEAP = 4
 
 
-class Found(NamedTuple):
+class Fewest(NamedTuple):
     """The fewest steps of a candidate that are good enough.
 
     Attributes:
@@ -150,20 +150,20 @@ class Search:
         candidates: Sequence[Candidate],
         ceilings: Mapping[str, float] = MappingProxyType({}),
         hints: Mapping[str, Collection[int]] = MappingProxyType({}),
-    ) -> tuple[dict[str, Found], dict[str, Missed]]:
+    ) -> tuple[dict[str, Fewest], dict[str, Missed]]:
         """What was found, and what was given up, by the candidate's name.
 
         ``ceilings`` are the most steps in a span, if any, ``hints`` are k that may be good enough.
         """
         octaves, missed = self.octaves(candidates, ceilings)
         by_name = {candidate.name: candidate for candidate in candidates}
-        found: dict[str, Found] = {}
+        fewest: dict[str, Fewest] = {}
         best = math.inf
         for name in missed.keys() & hints.keys():
             hinted = self.least(by_name[name], None, hints[name])
             if hinted is not None:
                 del missed[name]
-                found[name] = Found(hinted, by_name[name].confirm(hinted), hinted, None)
+                fewest[name] = Fewest(hinted, by_name[name].confirm(hinted), hinted, None)
                 best = min(best, self.cost(by_name[name], hinted))
         for name in sorted(octaves, key=lambda name: self.cost(by_name[name], octaves[name])):
             candidate, k = by_name[name], octaves[name]
@@ -185,14 +185,14 @@ class Search:
                 missed[name] = Missed("inaccurate", k, candidate.look(k), None)
                 continue
             best = min(best, self.cost(candidate, least))
-            found[name] = Found(least, candidate.confirm(least), least, None)
-        for name in list(found):
-            candidate, k = by_name[name], found[name].k
+            fewest[name] = Fewest(least, candidate.confirm(least), least, None)
+        for name in list(fewest):
+            candidate, k = by_name[name], fewest[name].k
             if self.cost(candidate, k) > MAX_COST_RATIO * best:
-                missed[name] = Missed("dominated", k, found.pop(name).trial, None)
+                missed[name] = Missed("dominated", k, fewest.pop(name).trial, None)
             else:
-                found[name] = found[name]._replace(robust=self.robust(candidate, k), expected=self.expected(candidate, k))
-        return found, missed
+                fewest[name] = fewest[name]._replace(robust=self.robust(candidate, k), expected=self.expected(candidate, k))
+        return fewest, missed
 
     def least(self, candidate: Candidate, k: int | None, hints: Collection[int]) -> int | None:
         """The cheapest of a k that is good enough, if any, and of hints that are; or the next that keeps away from blowing up."""
@@ -211,7 +211,7 @@ class Search:
 
     def octaves(self, candidates: Sequence[Candidate], ceilings: Mapping[str, float]) -> tuple[dict[str, int], dict[str, Missed]]:
         """For each candidate the first k in a ladder of doublings that is good enough; the cheapest run is always made next."""
-        found: dict[str, int] = {}
+        first: dict[str, int] = {}
         missed: dict[str, Missed] = {}
         best = math.inf
         waiting = [(self.prices[each.name] * each.first, i, each.first) for i, each in enumerate(candidates)]
@@ -221,7 +221,7 @@ class Search:
             candidate = candidates[i]
             trial, cost = candidate.look(k), self.cost(candidate, k)
             if self.good(candidate, k):
-                found[candidate.name] = k
+                first[candidate.name] = k
                 best = min(best, cost)
                 continue
             wanted = self.wanted(candidate, k, trial)
@@ -230,16 +230,16 @@ class Search:
             # What a run with a tolerance cost that stopped early says nothing of one that does not.
             stopped = trial.unstable and candidate.by == "tolerance"
             following = STOPPED_LEAP * k if stopped else 2 * k
-            made, ceiling = trial.steps * candidate.evaluations, ceilings.get(candidate.name, math.inf)
+            evaluations, ceiling = trial.steps * candidate.evaluations, ceilings.get(candidate.name, math.inf)
             most = self.most if cost * least <= best else min(self.most, LATER_RUN_SHARE * self.longest)
-            if not candidate.possible(following) or made * least > most or trial.steps / self.spans * least > ceiling:
+            if not candidate.possible(following) or evaluations * least > most or trial.steps / self.spans * least > ceiling:
                 missed[candidate.name] = Missed(kind, k, trial, wanted)
             elif cost * least > MAX_COST_RATIO * best and not stopped:
                 missed[candidate.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, expensive=True)
             else:
                 # Of equally expensive ones that which came farther goes first.
-                heapq.heappush(waiting, (2.0 * cost / trial.made, i, following))
-        return found, missed
+                heapq.heappush(waiting, (2.0 * cost / trial.share, i, following))
+        return first, missed
 
     def wanted(self, candidate: Candidate, k: int, trial: Trial) -> int | None:
         """The k that the order of the method asks for, if the error is small enough to tell."""
@@ -332,8 +332,8 @@ class Search:
         """
         if candidate.by == "tolerance":
             return IRREGULAR_POINTS[0]
-        made = candidate.look(k).steps * candidate.evaluations
-        return max(IRREGULAR_POINTS[0], min(IRREGULAR_POINTS[1], int(IRREGULAR_SHARE * self.longest / made)))
+        evaluations = candidate.look(k).steps * candidate.evaluations
+        return max(IRREGULAR_POINTS[0], min(IRREGULAR_POINTS[1], int(IRREGULAR_SHARE * self.longest / evaluations)))
 
     def very_long(self, candidate: Candidate, k: int) -> bool:
         """Whether a run takes so long that only few more like it can be made."""

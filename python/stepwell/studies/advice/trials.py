@@ -42,7 +42,7 @@ class Trial(NamedTuple):
         unstable: whether it is wrong altogether and grew, or with a tolerance stopped early.
         rejected: how many of the steps were rejected.
         before: the largest error before it left the asymptotic range, if it did.
-        made: the share of the run that was made; the rest of a long one is left out where it is wrong altogether.
+        share: of the run that was made; the rest of a long one is left out where it is wrong altogether.
     """
 
     dt: float
@@ -51,12 +51,12 @@ class Trial(NamedTuple):
     unstable: bool
     rejected: int = 0
     before: float = 0.0
-    made: float = 1.0
+    share: float = 1.0
 
     @property
     def stopped(self) -> bool:
         """Whether a part of the run was left out."""
-        return self.made < 1.0
+        return self.share < 1.0
 
 
 class Trials:
@@ -80,7 +80,7 @@ class Trials:
         #: The last run, for what is looked at is often confirmed at once.
         self._last: tuple[tuple[str, int, float], Run] | None = None
         #: Runs, and rate evaluations of all.
-        self.made, self.work = 0, 0.0
+        self.runs, self.work = 0, 0.0
 
     def evaluations(self, method: Method) -> int:
         """Function evaluations of a step."""
@@ -138,7 +138,7 @@ class Trials:
             run = self._run(method, dt, steps)
             self._last = (method.name, steps, dt), run
             return run, 0.0
-        self.made += 1
+        self.runs += 1
         worst, done, pieces = 0.0, 0, []
         state: dict[str, Any] = {"v": self.scene.v, "y": self.scene.y, "dt": dt, "control": self.scene.control}
         state["dtype"] = self.dtype
@@ -162,7 +162,7 @@ class Trials:
         return whole, worst
 
     def _run(self, method: Method, dt: float, steps: int) -> Run:
-        self.made += 1
+        self.runs += 1
         self.work += self.evaluations(method) * steps
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DivergenceWarning)

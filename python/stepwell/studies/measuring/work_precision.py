@@ -96,8 +96,8 @@ def work_precision(
         numbers = sorted({checks.count("steps", n, 4) for n in checks.several("steps", steps, "numbers of steps")})
         if not numbers:
             raise ArgumentError("steps: expected at least one, got none")
-    given = TOLERANCES if tolerances is None else checks.several("tolerances", tolerances, "tolerances")
-    asked = sorted({checks.number("tolerances", each, positive=True) for each in given}, reverse=True)
+    several = TOLERANCES if tolerances is None else checks.several("tolerances", tolerances, "tolerances")
+    wanted = sorted({checks.number("tolerances", each, positive=True) for each in several}, reverse=True)
     others = [find_peer(each) for each in checks.several("peers", peers, "peers")]
     ways = (False, True) if isinstance(fused, str) and checks.known("fused", fused, ("both",)) else (checks.flag("fused", fused),)
     dtypes = [name for name in ("float64", "float32") if checks.known("dtype", dtype, DTYPES) in (name, "both")]
@@ -108,7 +108,7 @@ def work_precision(
     reasons = {method.name: measure.refusal(scene, method) for method in chosen}
     refused = {name: reason for name, reason in reasons.items() if reason is not None}
     able = [method for method in chosen if reasons[method.name] is None]
-    paced = asked and scene.system.stick_friction is None and not scene.system.contacts  # adaptive steps do not go with these
+    paced = wanted and scene.system.stick_friction is None and not scene.system.contacts  # adaptive steps do not go with these
     adaptive = [method for method in able if method.error_order is not None and not method.has_series and paced]
     curves: list[Curve] = []
 
@@ -127,7 +127,7 @@ def work_precision(
     for way in ways:
         batch, single = timing.tried_times(scene, adaptive, None, way), timing.tried_times(scene, adaptive, 0, way)
         for method in adaptive:
-            points = tuple(measure.assess_tolerance(scene, method, tolerance, way) for tolerance in asked)
+            points = tuple(measure.assess_tolerance(scene, method, tolerance, way) for tolerance in wanted)
             times = batch[method.name], single[method.name]
             curves.append(Curve(method, points, math.inf, *times, by="tolerance", fused=way))
             done()

@@ -19,7 +19,7 @@ from ...runs.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_se
 from .axes import Grid
 from .exponents import Exponents
 from .observed import Piece
-from .outcomes import Found, Outcome, ReducedOutcome, Reduction, Variable
+from .outcomes import Outcome, ReducedOutcome, Reduction, Results, Variable
 
 #: A member takes so many numbers for the step-size controller while it is computed: before, after, and as it is handed over.
 NUMBERS_OF_A_CONTROLLER = 4 * PACE_NUMBERS
@@ -49,7 +49,7 @@ class _Evaluations(Reduction):
     def see(self, piece: Piece) -> None:
         self.run = piece.run
 
-    def results(self) -> Found:
+    def results(self) -> Results:
         paces = self.run.paces
         assert paces is not None
         return {
@@ -100,18 +100,18 @@ def arguments(
     if times.ndim > 1:
         raise ShapeError(f"at: expected times along one axis, the same for all members, got shape {times.shape}")
     _fits_outcomes(outcomes, times)
-    given = {} if tolerance is None else {"tolerance": _one_for_all(tolerance)}
+    arguments = {} if tolerance is None else {"tolerance": _one_for_all(tolerance)}
     if options["max_steps"] is not None:
-        given["max_steps"] = checks.count("max_steps", options["max_steps"], 1)
+        arguments["max_steps"] = checks.count("max_steps", options["max_steps"], 1)
     if options["max_step"] is not None:
-        given["max_step"] = checks.number("max_step", options["max_step"], positive=True, unit="units of time")
+        arguments["max_step"] = checks.number("max_step", options["max_step"], positive=True, unit="units of time")
     if options["jumps"] is not None:
-        given["jumps"] = jumps = np.atleast_1d(checks.numbers("jumps", options["jumps"], unit="units of time"))
+        arguments["jumps"] = jumps = np.atleast_1d(checks.numbers("jumps", options["jumps"], unit="units of time"))
         if jumps.ndim > 1:
             raise ShapeError(f"jumps: expected times along one axis, the same for all members, got shape {jumps.shape}")
     if options["positive"] is not None:
-        given["positive"] = options["positive"]
-    return given, times
+        arguments["positive"] = options["positive"]
+    return arguments, times
 
 
 def _one_for_all(tolerance: Any) -> Any:
@@ -123,8 +123,8 @@ def _one_for_all(tolerance: Any) -> Any:
             f"tolerance: expected a number, or a pair (relative, absolute), the same for all members, got "
             f"{checks.short(tolerance)}; if it varies, it is an axis"
         )
-    found = tuple(float(each) for each in numbers)
-    return found if isinstance(tolerance, tuple) else found[0]
+    parts_of_it = tuple(float(each) for each in numbers)
+    return parts_of_it if isinstance(tolerance, tuple) else parts_of_it[0]
 
 
 def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:

@@ -13,7 +13,7 @@ from ...errors import ShapeError
 from ...model.systems import System
 from ...runs.result import Run
 from .observed import Of, Piece, checked, name_of, possible, rates
-from .outcomes import Found, ReducedOutcome, Reduction, Variable, called
+from .outcomes import ReducedOutcome, Reduction, Results, Variable, called
 
 if TYPE_CHECKING:
     from ...base.literals import Direction
@@ -169,7 +169,7 @@ class _States:
 def _root(a: Array, b: Array, da: Array, db: Array) -> Array:
     """Where in 0 … 1 the cubic with these values and slopes at both ends is zero; the ends have different signs.
 
-    Found by halving, in as many steps for each: the same operations for every member, wherever it is computed.
+    Results by halving, in as many steps for each: the same operations for every member, wherever it is computed.
     """
     third, second = 2.0 * (a - b) + da + db, 3.0 * (b - a) - 2.0 * da - db
     low, high = np.zeros(a.shape), np.ones(a.shape)
@@ -196,7 +196,7 @@ class _Crossing(_Seeing):
         if new.any():
             self.time = np.where(new, states.times(states.mask.argmax(axis=0), new), self.time)
 
-    def results(self) -> Found:
+    def results(self) -> Results:
         name = self.outcome.name
         about = f"first time at which {name} passes {self.outcome.level:g}, {WORDS[self.outcome.direction]}"
         assert self.time is not None
@@ -220,7 +220,7 @@ class _Period(_Seeing):
         self.last = np.where(passing, states.times(len(states.mask) - 1 - states.mask[::-1].argmax(axis=0), passing), self.last)
         self.count = self.count + states.mask.sum(axis=0)
 
-    def results(self) -> Found:
+    def results(self) -> Results:
         name = self.outcome.name
         assert self.first is not None
         with np.errstate(all="ignore"):

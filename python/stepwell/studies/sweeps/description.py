@@ -45,11 +45,11 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
         "every": task.every,
         "outcomes": [_identity(each) for each in task.outcomes],
         "axes": {axis.argument: f"along {', '.join(axis.dims)}: {_digest(axis.values)}" for axis in grid.axes},
-        "given": {name: _digest(value) for name, value in task.given.items() if name != "threads"},
+        "given": {name: _digest(value) for name, value in task.options.items() if name != "threads"},
         "first steps": bits,
     }
-    if "events" in task.given:
-        identity["given"]["events"] = [_identity(each) for each in task.given["events"]]
+    if "events" in task.options:
+        identity["given"]["events"] = [_identity(each) for each in task.options["events"]]
     if task.at is not None:
         identity["at"] = _digest(task.at)
     attrs: dict[str, Any] = {
@@ -59,11 +59,11 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
         "system": repr(task.system) if isinstance(task.system, System) else system.kind_name,
         "method": task.method,
         **_step_facts(task, grid),
-        "t0": task.given["t0"],
-        "fused": int(task.given["fused"]),
+        "t0": task.options["t0"],
+        "fused": int(task.options["fused"]),
         **({"dtype": "float32"} if task.single else {}),
         **({} if task.every is None else {"every": task.every}),
-        **({"control": repr(task.given["control"])} if "control" in task.given else {}),
+        **({"control": repr(task.options["control"])} if "control" in task.options else {}),
         SWEEP: json.dumps(identity, ensure_ascii=False),
     }
     return Layout(grid, coords, attrs, units, renamed)
@@ -72,10 +72,10 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
 def _step_facts(task: Task, grid: Grid) -> dict[str, Any]:
     """How long the steps are, and how many."""
     if task.at is None:
-        dt = {} if grid.of_dt else {"dt": task.given["dt"]}
+        dt = {} if grid.of_dt else {"dt": task.options["dt"]}
         return {**dt, "steps": task.steps, "transient": task.transient, "observe": task.observe}
-    facts: dict[str, Any] = {name: task.given[name] for name in ("dt", "max_steps") if name in task.given}
-    if (tolerance := task.given.get("tolerance")) is not None:
+    facts: dict[str, Any] = {name: task.options[name] for name in ("dt", "max_steps") if name in task.options}
+    if (tolerance := task.options.get("tolerance")) is not None:
         facts["tolerance"] = repr(tolerance) if isinstance(tolerance, tuple) else float(tolerance)
     return facts | {"end": float(task.at[-1])}
 
@@ -90,9 +90,9 @@ def _times(
     every = task.every or task.steps
     k = task.transient + np.append(np.arange(0, task.steps, every), task.steps).astype(np.float64)
     if not grid.of_dt:
-        return ("t",), task.given["t0"] + k * task.rounded(np.asarray(task.given["dt"])), attrs
+        return ("t",), task.options["t0"] + k * task.rounded(np.asarray(task.options["dt"])), attrs
     axis = next(axis for axis in grid.axes if axis.argument == "dt")
-    return (*axis.dims, renamed["t"]), task.given["t0"] + k * task.rounded(axis.values)[..., np.newaxis], attrs
+    return (*axis.dims, renamed["t"]), task.options["t0"] + k * task.rounded(axis.values)[..., np.newaxis], attrs
 
 
 def _digest(value: Any) -> str:

@@ -171,37 +171,37 @@ def sweep(
         (('omega', 'y0'), array([3.141593, 3.141593]))
     """
     need("xarray")
-    grid, how, named = a_grid(axes), find_method(method), named_units(units)
+    grid, method, named = a_grid(axes), find_method(method), named_units(units)
     paced = tolerance is not None or at is not None or any(axis.argument == "tolerance" for axis in grid.axes)
     fixed = {"v": v, "y": y, "dt": dt, "force": force, "tolerance": tolerance}
     _fits_axes(system, {axis.argument for axis in grid.axes}, fixed, ("y",) if paced else ("y", "dt"))
     if dt is not None:
         fixed["dt"] = checks.number("dt", dt, positive=True, unit="units of time")
-    given = {name: value for name, value in fixed.items() if value is not None}
-    given |= {"t0": checks.number("t0", t0, unit="units of time"), "fused": checks.flag("fused", fused), "threads": 1}
-    given |= {name: value for name, value in (("control", control), ("start", start)) if value is not None}
+    arguments = {name: value for name, value in fixed.items() if value is not None}
+    arguments |= {"t0": checks.number("t0", t0, unit="units of time"), "fused": checks.flag("fused", fused), "threads": 1}
+    arguments |= {name: value for name, value in (("control", control), ("start", start)) if value is not None}
     if checks.is_single(dtype):
         _fits_single(grid, paced)
-        given["dtype"] = "float32"
+        arguments["dtype"] = "float32"
     every = None if every is None else checks.count("every", every, 1)
     kept_of_each = _outcomes(outcomes, every)
     if events is not None:
         located = happenings.events_of(events, kept_of_each, transient)
-        given["events"], kept_of_each = list(located), (*kept_of_each, happenings.Happenings(located))
+        arguments["events"], kept_of_each = list(located), (*kept_of_each, happenings.Happenings(located))
     times = None
     if paced:
         others = {"steps": steps, "transient": transient, "every": every, "observe": observe, "start": start}
         options = {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive}
-        more, times = adaptive.arguments(grid, how, tolerance, at, options, others, kept_of_each)
-        given |= more
+        more, times = adaptive.arguments(grid, method, tolerance, at, options, others, kept_of_each)
+        arguments |= more
     else:
         adaptive.refuse_fixed(kept_of_each, {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive})
         if steps is None:
             raise ArgumentError("steps: expected with fixed steps; or give tolerance= and at= for adaptive steps")
     task = Task(
         system=system,
-        method=how.name,
-        given=given,
+        method=method.name,
+        options=arguments,
         transient=0 if transient is None else checks.count("transient", transient, 0),
         steps=0 if steps is None else checks.count("steps", steps, 1),
         observe=1 if observe is None else checks.count("observe", observe, 1),
@@ -323,17 +323,17 @@ def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progre
         shown: Any = bar(f"sweep, {counted(grid.members, 'member')}")
     else:
         shown = nullcontext(None)
-    with shown as told:
-        found = engine.compute(task, grid, unfinished())
+    with shown as report:
+        chunks = engine.compute(task, grid, unfinished())
         try:
-            for chunk, each in found:
-                kept.write(chunk, each.found)
+            for chunk, each in chunks:
+                kept.write(chunk, each.results)
                 tally.add(chunk, each)
                 done += chunk.members
-                if told is not None:
-                    told(done / grid.members)
+                if report is not None:
+                    report(done / grid.members)
         finally:
-            found.close()  # type: ignore[attr-defined]
+            chunks.close()  # type: ignore[attr-defined]
     tally.warn()
 
 
@@ -347,13 +347,13 @@ class _Tally:
         self.growths: dict[int, Growth] = {}
 
     def add(self, chunk: Chunk, done: Done) -> None:
-        status = np.where(np.isin(done.found["status"].values, happenings.EVENTS), 0, done.found["status"].values)
+        status = np.where(np.isin(done.results["status"].values, happenings.EVENTS), 0, done.results["status"].values)
         self.members += chunk.members
         if status.any():
             self.bad += int(np.count_nonzero(status))
             member = int(np.flatnonzero(status)[0])
             if chunk.first + member < self.first:
-                self.first, self.step = chunk.first + member, int(done.found["first_bad_step"].values[member])
+                self.first, self.step = chunk.first + member, int(done.results["first_bad_step"].values[member])
                 self.status = int(status[member])
         self.lost += done.lost
         if done.doubt is not None:

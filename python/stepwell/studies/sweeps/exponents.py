@@ -11,7 +11,7 @@ from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError
 from ...model.systems import System
-from .outcomes import Found, Outcome, Variable
+from .outcomes import Outcome, Results, Variable
 
 
 class Exponents(Outcome):
@@ -52,7 +52,7 @@ class Exponents(Outcome):
         steps: int,
         look: Callable[[], object],
         at: Array | None = None,
-    ) -> Found:
+    ) -> Results:
         """The exponents of members with these start values and options.
 
         ``look`` is called now and then, and may raise. ``at`` has the output times of adaptive steps.

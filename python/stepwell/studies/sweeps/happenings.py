@@ -15,7 +15,7 @@ from ...runs.events.event import several
 from ...runs.result import Run, Status
 from .exponents import Exponents
 from .observed import Piece
-from .outcomes import Found, Function, Outcome, ReducedOutcome, Reduction, Variable
+from .outcomes import Function, Outcome, ReducedOutcome, Reduction, Results, Variable
 
 #: How a member ended that an event stopped.
 EVENTS = (int(Status.EVENT), int(Status.REST))
@@ -69,7 +69,7 @@ class _Happenings(Reduction):
     def see(self, piece: Piece) -> None:
         self.run: Run = piece.run
 
-    def results(self) -> Found:
+    def results(self) -> Results:
         run, results = self.run, {}
         for name, each in run.events.items():
             first = np.full(run.status.size, np.nan)

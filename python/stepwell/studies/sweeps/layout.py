@@ -13,7 +13,7 @@ from ...base.arrays import Array, Shape
 from ...errors import ArgumentError, ShapeError
 from ...runs.result import Status
 from .axes import Chunk, Grid
-from .outcomes import Found
+from .outcomes import Results
 
 #: What stands for whole numbers of members that are not computed yet.
 NOT_YET = -1
@@ -59,7 +59,7 @@ class Layout(NamedTuple):
     units: Mapping[str, str]
     renamed: dict[str, str]
 
-    def arrays(self, results: Found) -> dict[str, Planned]:
+    def arrays(self, results: Results) -> dict[str, Planned]:
         """The arrays of the whole sweep, which follow from the results of one chunk."""
         sizes = dict(zip(self.grid.dims, self.grid.shape, strict=True))
         taken = set(sizes) | set(self.coords)
@@ -123,7 +123,7 @@ def _plain(values: Array) -> Array:
     return values
 
 
-def along_dims(results: Found, chunk: Chunk) -> dict[str, Array]:
+def along_dims(results: Results, chunk: Chunk) -> dict[str, Array]:
     """The results of a chunk, its members along the dimensions of the sweep, which come first."""
     arrays = {}
     for name, variable in results.items():

@@ -48,17 +48,17 @@ class Piece(NamedTuple):
             return np.asarray(run.quantity(what)[since:])
         v, y = (np.moveaxis(np.asarray(a[since:], np.float64), 0, -2) for a in (run.v, run.y))
         with np.errstate(all="ignore"):
-            found = np.asarray(what(self.t[:, np.newaxis], v, y), dtype=np.float64)
+            values = np.asarray(what(self.t[:, np.newaxis], v, y), dtype=np.float64)
         shape = (len(self.t), run.status.size)
-        if found.shape[-2:] != shape:
+        if values.shape[-2:] != shape:
             try:
-                found = np.broadcast_to(found, shape)
+                values = np.broadcast_to(values, shape)
             except ValueError:
                 raise ShapeError(
                     f"of: expected that {name_of(what)}(t, v, y) returns the shape (…, {shape[0]}, {shape[1]}), states and "
-                    f"members, got {found.shape}"
+                    f"members, got {values.shape}"
                 ) from None
-        return np.moveaxis(found, -2, 0)
+        return np.moveaxis(values, -2, 0)
 
 
 def name_of(what: Of | Callable[..., Any]) -> str:
@@ -87,8 +87,8 @@ def checked(what: Any) -> Of:
     if callable(what):
         checks.argument_order("of", what, ("t", "v", "y"))
     if isinstance(what, str) or callable(what):
-        found: Of = what
-        return found
+        quantity: Of = what
+        return quantity
     raise ArgumentError(
         f"of: expected 'v', 'y', a component such as ('y', 0), a quantity such as 'energy', or a function f(t, v, y), "
         f"got {checks.short(what)}"

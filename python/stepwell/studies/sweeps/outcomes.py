@@ -38,16 +38,16 @@ class Variable(NamedTuple):
     coords: Mapping[str, Array] = {}
 
 
-Found = dict[str, Variable]
+Results = dict[str, Variable]
 
 
-def together(parts: Iterable[Found]) -> Found:
+def together(parts: Iterable[Results]) -> Results:
     """All results.
 
     Raises:
         ArgumentError: if two have one name.
     """
-    results: Found = {}
+    results: Results = {}
     for part in parts:
         if twice := sorted(set(results) & set(part)):
             raise ArgumentError(f"outcomes: there are two results {twice[0]!r}; give one another name by name=, or leave it out")
@@ -63,7 +63,7 @@ class Reduction(ABC):
         """Take the new states of a piece into account."""
 
     @abstractmethod
-    def results(self) -> Found:
+    def results(self) -> Results:
         """The results, by name."""
 
 
@@ -128,7 +128,7 @@ class _Last(Reduction):
     def see(self, piece: Piece) -> None:
         self.run = piece.run
 
-    def results(self) -> Found:
+    def results(self) -> Results:
         run = self.run
         return {
             f"{block}_last": Variable(
@@ -193,7 +193,7 @@ class _Extremes(Reduction):
             largest = list(map(np.maximum, largest, self.largest))
         self.least, self.largest = least, largest
 
-    def results(self) -> Found:
+    def results(self) -> Results:
         results = {}
         for what, least, largest in zip(self.outcome.whats(self.run), self.least, self.largest, strict=True):
             name, dims = self.outcome.name or name_of(what), _dims(self.run, what, least)
@@ -259,7 +259,7 @@ class _Mean(Reduction):
             self.before[i] = now[-1].copy()
         self.t = float(t[-1])
 
-    def results(self) -> Found:
+    def results(self) -> Results:
         time, results = self.t - self.begin, {}
         for what, total in zip(self.outcome.whats(self.run), self.sums, strict=True):
             name = self.outcome.name or name_of(what)
@@ -312,7 +312,7 @@ class _History(Reduction):
     def see(self, piece: Piece) -> None:
         self.pieces.append(piece)
 
-    def results(self) -> Found:
+    def results(self) -> Results:
         system = self.pieces[0].run.system
         t = np.concatenate([piece.t for piece in self.pieces])
         return {
@@ -356,7 +356,7 @@ class Function(Outcome):
             raise ArgumentError(f"outcomes: expected a function of a run, got {checks.short(function)}")
         self.function = function
 
-    def of_run(self, run: Run) -> Found:
+    def of_run(self, run: Run) -> Results:
         """The variables that the function returns for this run."""
         returned = self.function(run)
         named = returned if isinstance(returned, Mapping) else {name_of(self.function): returned}

@@ -18,7 +18,7 @@ from ...errors import ArgumentError, ShapeError, TooLargeError
 from .axes import Chunk
 from .extras import need
 from .layout import Layout, Planned, along_dims, hash_of_all, hash_of_chunk
-from .outcomes import Found
+from .outcomes import Results
 
 #: Group and array, in a store, of the hashes of finished chunks.
 PROGRESS, HASHES = "progress", "hashes"
@@ -44,14 +44,14 @@ class Memory:
         """Whether the results of a chunk are there already."""
         return False
 
-    def write(self, chunk: Chunk, found: Found) -> None:
+    def write(self, chunk: Chunk, results: Results) -> None:
         """Take the results of a chunk."""
         if not self.arrays:
-            self.about = self.layout.arrays(found)
+            self.about = self.layout.arrays(results)
             numbers = sum(each.dtype.itemsize * float(np.prod(each.shape)) for each in self.about.values()) / 8.0
             checks.fits("the results", numbers, (), "give store=, a folder on disk")
             self.arrays = {name: np.full(each.shape, each.fill, each.dtype) for name, each in self.about.items()}
-        for name, values in along_dims(found, chunk).items():
+        for name, values in along_dims(results, chunk).items():
             self.arrays[name][chunk.slices] = values
 
     def finish(self) -> Any:
@@ -131,12 +131,12 @@ class Zarr:
     def _read(self, chunk: Chunk) -> dict[str, Array]:
         return {name: self.group[name][chunk.slices] for name in self.group.attrs[RESULTS]}
 
-    def write(self, chunk: Chunk, found: Found) -> None:
+    def write(self, chunk: Chunk, results: Results) -> None:
         """Write the results of a chunk, and then that it is finished."""
         with self._disk():
             if self.group is None:
-                self._create(self.layout.arrays(found))
-            arrays = along_dims(found, chunk)
+                self._create(self.layout.arrays(results))
+            arrays = along_dims(results, chunk)
             for name, values in arrays.items():
                 self.group[name][chunk.slices] = values
             self.group[f"{PROGRESS}/{HASHES}"][chunk.place] = hash_of_chunk(arrays)

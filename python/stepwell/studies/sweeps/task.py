@@ -28,7 +28,7 @@ from .adaptive import NUMBERS_OF_A_CONTROLLER, lost
 from .axes import OF_THE_RUN
 from .exponents import Exponents
 from .observed import Piece
-from .outcomes import Found, Function, History, Outcome, ReducedOutcome, Variable, together
+from .outcomes import Function, History, Outcome, ReducedOutcome, Results, Variable, together
 
 #: A piece of a run makes at most so many steps of members, after which a sweep may be stopped.
 MAX_STEPS_OF_MEMBERS = 50_000_000
@@ -48,7 +48,7 @@ class Task(NamedTuple):
     Attributes:
         system: a system, or what makes one of parameters by name.
         method: name of the method.
-        given: further arguments of ``integrate``, the same for all members.
+        options: further arguments of ``integrate``, the same for all members.
         transient: steps before those that are observed.
         steps: steps that are observed.
         observe: interval of the states that reductions see, in steps.
@@ -60,7 +60,7 @@ class Task(NamedTuple):
 
     system: Any
     method: str
-    given: dict[str, Any]
+    options: dict[str, Any]
     transient: int
     steps: int
     observe: int
@@ -76,7 +76,7 @@ class Task(NamedTuple):
     @property
     def single(self) -> bool:
         """Whether steps are made in float32."""
-        return self.given.get("dtype") == "float32"
+        return self.options.get("dtype") == "float32"
 
     def rounded(self, dt: Array) -> Array:
         """The steps that are made of those that were given."""
@@ -102,10 +102,10 @@ class Task(NamedTuple):
         if self.at is not None:
             saved = self.at.size
             numbers += NUMBERS_OF_A_CONTROLLER
-        if "events" in self.given:  # whose run is one piece
+        if "events" in self.options:  # whose run is one piece
             observed = 1 if self.between is None else self.steps // self.between + 2
             numbers += COPIES_OF_A_STATE * state * (observed if self.at is None else saved)
-            numbers += sum((3 + state) * each.most for each in self.given["events"])
+            numbers += sum((3 + state) * each.most for each in self.options["events"])
         if self.kinds(History) or self.kinds(Function):
             numbers += 2 * saved * state
         for each in self.kinds(Exponents):
@@ -132,44 +132,44 @@ class Done(NamedTuple):
     """What was found of a chunk.
 
     Attributes:
-        found: results by name, values of shape (*own axes, members).
+        results: by name, values of shape (*own axes, members).
         doubt: a message if the numbers are finite and mean nothing, or None.
         lost: how many members have an absolute tolerance so large that the motion is lost in it.
         growth: of the members that grew by fixed steps beyond their stability limit, or None.
     """
 
-    found: Found
+    results: Results
     doubt: str | None
     lost: int = 0
     growth: Growth | None = None
 
 
-def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
+def prepared(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
     """The system of these values, and the arguments of its run."""
-    given = {**task.given, **{name: value for name, value in values.items() if name in OF_THE_RUN}}
+    options = {**task.options, **{name: value for name, value in values.items() if name in OF_THE_RUN}}
     parameters = {name: value for name, value in values.items() if name not in OF_THE_RUN}
     system = task.system if isinstance(task.system, System) else task.system(**parameters)
-    system = a_system(system).for_state_shapes(given.get("v"), given["y"])
+    system = a_system(system).for_state_shapes(options.get("v"), options["y"])
     if set(values) == {"dt"}:
         # Nothing else has an axis of members; a chunk of one dt has one.
-        block = checks.block("y", given["y"], system.y_shape, system.axes)
+        block = checks.block("y", options["y"], system.y_shape, system.axes)
         if block.shape == system.y_shape:
-            given["y"] = block[..., np.newaxis]
-    return system, given
+            options["y"] = block[..., np.newaxis]
+    return system, options
 
 
 def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], bool] | None = None) -> Done:
     """Compute a chunk of members."""
     with _quiet(), _listening(stopped), np.errstate(all="ignore"):  # members that diverge are told of by their status
-        system, given = made(task, values)
-        start = given
-        for each in _pieces(task, system, given, members, task.transient, None, stopped):
-            start = _going_on(given, each)
-        parts: list[Found] = []
+        system, options = prepared(task, values)
+        start = options
+        for each in _pieces(task, system, options, members, task.transient, None, stopped):
+            start = _going_on(options, each)
+        parts: list[Results] = []
         functions = task.kinds(Function)
         if functions:
-            how: dict[str, Any] = {"steps": task.steps, "every": task.every} if task.at is None else {"at": task.at}
-            last = integrate(system, task.method, **how, **start)
+            saved: dict[str, Any] = {"steps": task.steps, "every": task.every} if task.at is None else {"at": task.at}
+            last = integrate(system, task.method, **saved, **start)
             _as_many(last, members)
             parts += [each.of_run(last) for each in functions]
         if task.reductions or not functions:
@@ -177,29 +177,29 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
             parts += reduced
         for each in task.kinds(Exponents):
             look = partial(_stop, stopped)
-            parts.append(each.of_start(system, task.method, given, task.transient, task.steps, look, task.at))
+            parts.append(each.of_start(system, task.method, options, task.transient, task.steps, look, task.at))
     status = Variable((), np.array(last.status), "how the member ended")
     about = "first step that was not finite, or −1" if task.at is None else "step at which the member stopped, or −1"
     bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)
     parts.append({"status": status, "first_bad_step": bad})
-    grown = _growth_of(task, given, last) if task.at is None else None
+    grown = _growth_of(task, options, last) if task.at is None else None
     doubt = last.system.doubt(last.y)
     return Done(together(parts), None if doubt is None else doubt[0], lost(last), grown)
 
 
-def _growth_of(task: Task, given: dict[str, Any], last: Run) -> Growth | None:
+def _growth_of(task: Task, options: dict[str, Any], last: Run) -> Growth | None:
     """The members that grew by their steps alone, from the start of the sweep to the end of the last piece of its run."""
-    if any(event.then for event in given.get("events", ())):
+    if any(event.then for event in options.get("events", ())):
         return None  # what an event makes of a state tells nothing of the steps
     system, batch = last.system, last.status.shape
-    blocks = (("v", velocities(system, given.get("v")), system.v_shape), ("y", given["y"], system.y_shape))
+    blocks = (("v", velocities(system, options.get("v")), system.v_shape), ("y", options["y"], system.y_shape))
     v, y = (spread(checks.block(name, block, shape, system.axes), shape, batch) for name, block, shape in blocks)
     return _growth.of_last_piece(last, (v, y), task.transient + task.steps)
 
 
 def _reduced(
     task: Task, system: System, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
-) -> tuple[Run, list[Found]]:
+) -> tuple[Run, list[Results]]:
     """The last piece of the run, and what the reductions found in it."""
     between, reductions = task.between, [(each, each.begin()) for each in task.reductions]
     at, last = 0, None
@@ -264,12 +264,12 @@ def _pieces(
     done, going_on = 0, start
     while done < steps:
         _stop(stopped)
-        made = integrate(system, task.method, steps=min(length, steps - done), every=between, **going_on)
-        _as_many(made, members)
-        done += made.steps
+        piece = integrate(system, task.method, steps=min(length, steps - done), every=between, **going_on)
+        _as_many(piece, members)
+        done += piece.steps
         if done < steps:
-            going_on = _going_on(start, made)
-        yield made
+            going_on = _going_on(start, piece)
+        yield piece
 
 
 def _pieces_between_times(
@@ -281,16 +281,16 @@ def _pieces_between_times(
     going_on = start
     for first in range(0, task.at.size, length):
         _stop(stopped)
-        made = integrate(system, task.method, at=task.at[first : first + length], **going_on)
-        _as_many(made, members)
+        piece = integrate(system, task.method, at=task.at[first : first + length], **going_on)
+        _as_many(piece, members)
         if first + length < task.at.size:
-            going_on = _going_on(start, made)
-        yield made
+            going_on = _going_on(start, piece)
+        yield piece
 
 
-def _going_on(given: dict[str, Any], run: Run) -> dict[str, Any]:
+def _going_on(options: dict[str, Any], run: Run) -> dict[str, Any]:
     """Arguments with which a run goes on; what it does not carry, such as threads, is given again."""
-    return {"resume": run} | {name: value for name, value in given.items() if name in ("threads", "backend", "max_steps")}
+    return {"resume": run} | {name: value for name, value in options.items() if name in ("threads", "backend", "max_steps")}
 
 
 @contextmanager
@@ -328,25 +328,25 @@ class Probed(NamedTuple):
 def probed(task: Task, values: dict[str, Any]) -> Probed:
     """The first steps of one member: errors in what was given show here, before any work, and so does what is computed."""
     with _quiet():
-        system, given = made(task, values)
+        system, options = prepared(task, values)
         for each in task.outcomes:
             each.check(system)
         if task.kinds(History) and task.every is None and task.at is None:
             raise UnsupportedError("every: expected how many steps are between the states of a history")
         if task.at is not None:
-            few = min(PROBED_STEPS, given.get("max_steps", PROBED_STEPS))
-            begun = integrate(system, task.method, at=task.at, **(given | {"max_steps": few}))
+            few = min(PROBED_STEPS, options.get("max_steps", PROBED_STEPS))
+            begun = integrate(system, task.method, at=task.at, **(options | {"max_steps": few}))
             _as_many(begun, 1)
             assert begun.controller_state is not None
             return Probed(begun.system, (begun.controller_state.v, begun.controller_state.y), _names(task, begun))
-        first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **given)
+        first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **options)
         _as_many(first, 1)
         return Probed(first.system, (first.v[-1], first.y[-1]), _names(task, first))
 
 
 def _names(task: Task, run: Run) -> set[str]:
     """The names of results, but for those of functions and of exponents; raise if two of them are the same."""
-    parts: list[Found] = []
+    parts: list[Results] = []
     with np.errstate(all="ignore"):
         for outcome in task.reductions:
             reduction = outcome.begin()
