@@ -1,14 +1,12 @@
 """Advice: the cheapest method and step that are accurate enough for a scene, and how far they are from instability.
 
 ``motion`` holds the reference solution, ``trials`` and ``adaptive`` run the scene with fixed and with adaptive steps,
-``candidates`` gives both the same interface for ``search``, which finds the fewest steps that are accurate enough; ``predict``
-uses eigenvalues, ``result`` presents what was found.
+``candidates`` gives both the same interface for ``search``, which finds the fewest steps that are accurate enough. ``costs``
+measures steps, ``predict`` uses eigenvalues, ``outcome`` makes rows of what was found, and ``result`` presents them.
 """
 
 from __future__ import annotations
 
-import heapq
-import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
@@ -27,9 +25,11 @@ from .adaptive import AdaptiveTrials
 from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed, Single
 from .costs import Times, step_times, tried_times
 from .motion import SINGLE_STEP_ROUNDING, Grid, Motion, motion_of
-from .result import Advice, Rejected, Row, Shortfall
-from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Fewest, Missed, Search
-from .trials import ASYMPTOTIC_ERROR, Trial, Trials
+from .outcome import Spending, rejection, row, shortfall_of
+from .result import Advice
+from .rows import Rejected, Row, Shortfall
+from .search import LONG_RUN_SHARE, MAX_EVALUATIONS, SIZE_EXPONENT, Search
+from .trials import Trial, Trials
 
 if TYPE_CHECKING:
     from ...base.literals import Cost, Dtypes
@@ -161,7 +161,7 @@ def advise(
     search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + SINGLE_WORK * narrow.work + adaptive.work)
     fewest, missed = search.run(candidates, hints=hints)
 
-    spent = _Spending(known.grid, adaptive, times)
+    spent = Spending(known.grid, adaptive, times)
     broken = [each for each in candidates if each.name in fewest and not spent.fits(each, fewest[each.name].k, budget)]
     if budget is not None and any(each.by == "tolerance" for each in broken):
         # What is cheap on average but not in its worst frame must not exclude what costs more on average, and the same in all.
@@ -176,15 +176,15 @@ def advise(
     fits = by_cost_and_error(fits, costs, [_judged(each, fewest[each.name].trial) for each in fits], noise)
     for each in candidates:
         if each.name in missed:
-            rejected.append(_missed(each, missed[each.name], search))
+            rejected.append(rejection(each, missed[each.name], search))
         elif each not in fits:
             worst = " in its worst frame" if each.by == "tolerance" and frame is not None else ""
             need = spent.longest(each, fewest[each.name].k)
             reason = f"good enough, but takes {need:.3g} s{worst} of the {budget:.3g} s"
             rejected.append(Rejected(each.method.name, "budget", reason, each.by, each.dtype))
     fastest = predict.fastest_oscillation(trials) if fits else None
-    ranked = tuple(_row(trials, each, fewest[each.name], spent, budget, fastest) for each in fits)
-    shortfall = None if ranked else _shortfall(candidates, fewest, spent, budget)
+    ranked = tuple(row(trials, each, fewest[each.name], spent, budget, fastest) for each in fits)
+    shortfall = None if ranked else shortfall_of(candidates, fewest, spent, budget)
     runs = trials.runs + narrow.runs + adaptive.runs
     outcome = (trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, runs, known.cut, noise)
     return Advice(*outcome, dtype=dtype)
@@ -278,147 +278,3 @@ def by_cost_and_error(candidates: Sequence[Kind], costs: Sequence[float], errors
 def _judged(candidate: Candidate, trial: Trial) -> float:
     """The error that orders equal costs: at least that of the float64 run, for a lucky rounding proves nothing."""
     return max(trial.error, candidate.in_float64(trial)) if isinstance(candidate, Single) else trial.error
-
-
-class _Spending:
-    """Measured seconds of a run, in a frame, or in a unit of time without one."""
-
-    def __init__(self, grid: Grid, adaptive: AdaptiveTrials, times: Mapping[str, float]) -> None:
-        self.grid, self.adaptive, self.times = grid, adaptive, times
-
-    def mean(self, candidate: Candidate, trial: Trial) -> float:
-        """On the whole."""
-        return 1e-9 * self.times[candidate.name] * trial.steps / (self.grid.spans if self.grid.framed else self.grid.end)
-
-    def longest(self, candidate: Candidate, k: int) -> float:
-        """In the frame that takes longest."""
-        return (
-            1e-9 * self.times[candidate.name] * self.most(candidate, k)
-            if self.grid.framed
-            else self.mean(candidate, candidate.look(k))
-        )
-
-    def fits(self, candidate: Candidate, k: int, budget: float | None) -> bool:
-        """Whether it keeps the budget."""
-        return budget is None or self.longest(candidate, k) <= budget
-
-    def steps(self, candidate: Candidate, budget: float | None) -> float:
-        """The steps in a span for which the budget suffices."""
-        if budget is None:
-            return math.inf
-        return budget / (1e-9 * self.times[candidate.name]) * (1.0 if self.grid.framed else self.grid.end)
-
-    def most(self, candidate: Candidate, k: int) -> int:
-        """The most steps in a frame."""
-        return self.adaptive.worst(candidate.method, candidate.tolerance(k)) if isinstance(candidate, Adaptive) else k
-
-
-def _row(
-    trials: Trials, candidate: Candidate, fewest: Fewest, spent: _Spending, budget: float | None, fastest: float | None
-) -> Row:
-    method, trial, grid = candidate.method, fewest.trial, trials.grid
-    ns, mean, longest = spent.times[candidate.name], spent.mean(candidate, trial), spent.longest(candidate, fewest.k)
-    per_frame = candidate.evaluations * trial.steps / grid.spans
-    by_modes, limit = None, predict.Limit(None, "none", None, None)
-    wide_error = wide_ns = None
-    if isinstance(candidate, Single):
-        wide_error, wide_ns = candidate.in_float64(trial), spent.times[method.name]
-        trials = candidate.trials
-    observed = math.inf
-    if candidate.by == "step":
-        by_modes = predict.predicted(trials.scene, method, trial.dt, trial.steps)
-        limit = predict.limit(trials, method, fastest)
-        observed = predict.observed_limit(trials, method, trial.steps)
-    robust: float | None = fewest.robust
-    if isinstance(candidate, Adaptive) and fewest.robust is not None:
-        robust = candidate.tolerance(fewest.robust)
-    return Row(
-        method=method,
-        substeps=fewest.k if grid.framed and candidate.by == "step" else None,
-        steps=trial.steps,
-        dt=trial.dt,
-        error=trial.error,
-        predicted=by_modes.error if by_modes else fewest.expected,
-        predicted_by="modes" if by_modes else ("order" if fewest.expected is not None else None),
-        frequency_error=by_modes.frequency if by_modes else None,
-        damping_error=by_modes.damping if by_modes else None,
-        evaluations_per_frame=per_frame if grid.framed else None,
-        evaluations_per_time=candidate.evaluations / trial.dt,
-        ns_per_step=ns,
-        seconds_per_frame=mean if grid.framed else None,
-        seconds_per_time=1e-9 * ns / trial.dt,
-        objects=None if budget is None else int(budget / longest),
-        limit=limit.dt,
-        limit_by=limit.by,
-        mode=limit.mode,
-        mode_frequency=limit.frequency,
-        observed_limit=observed,
-        robust=robust,
-        tolerance=candidate.tolerance(fewest.k) if isinstance(candidate, Adaptive) else None,
-        rejected_steps=trial.rejected,
-        worst_evaluations=candidate.evaluations * spent.most(candidate, fewest.k) if grid.framed else None,
-        dtype=candidate.dtype,
-        float64_error=wide_error,
-        float64_ns_per_step=wide_ns,
-    )
-
-
-def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
-    trial = missed.trial
-    if search.allowed(candidate) < trial.error < ASYMPTOTIC_ERROR:
-        trial = candidate.measured(missed.k)
-    detail = f"dt = {trial.dt:.3g}" if candidate.by == "step" else f"{trial.steps} steps"
-    tried = f"with {candidate.described(missed.k)} ({detail})"
-    too_expensive = f"costs over {MAX_COST_RATIO:g} times the least"
-    needs = f"; by its order it needs about {candidate.described(missed.expected)}" if missed.expected else ""
-    unstable = "still unstable" if candidate.by == "step" else "stops early"
-    if trial.error <= search.allowed(candidate):
-        reason = f"good enough {tried}, which {too_expensive}"
-    elif missed.kind == "unstable":
-        reason = (
-            f"{unstable} {tried}, and more of them {too_expensive.replace('costs', 'cost')}"
-            if missed.expensive
-            else f"{unstable} {tried}, the most tried"
-        )
-    elif missed.expensive:
-        reason = f"error {trial.error:.2g} {tried}, and what is enough {too_expensive}{needs}"
-    else:
-        reason = f"error {trial.error:.2g} {tried}, the most tried{needs}"
-    if isinstance(candidate, Single) and candidate.is_rounding(missed.k):
-        reason = f"error {trial.error:.2g} {tried}, most of it rounding: in float64 it is {candidate.in_float64(trial):.2g}"
-    return Rejected(candidate.method.name, missed.kind, reason, candidate.by, candidate.dtype)
-
-
-def _shortfall(
-    candidates: Sequence[Candidate], fewest: Mapping[str, Fewest], spent: _Spending, budget: float | None
-) -> Shortfall:
-    """What would have to give: the least error within the budget of all that was tried, and the budget for the tolerance."""
-    least, best = _least(candidates, spent, budget)
-    needs = [(spent.longest(each, fewest[each.name].k), each.name) for each in candidates if each.name in fewest]
-    needed, by = min(needs) if needs else (None, None)
-    if best is None:
-        return Shortfall(least, None, None, needed, by)
-    chosen, k = best
-    tolerance = chosen.tolerance(k) if isinstance(chosen, Adaptive) else None
-    return Shortfall(least, chosen.method.name, k if tolerance is None else None, needed, by, tolerance, chosen.dtype)
-
-
-def _least(candidates: Sequence[Candidate], spent: _Spending, budget: float | None) -> tuple[float, tuple[Candidate, int] | None]:
-    """The least error within the budget, and whose it is.
-
-    Of a run that was not good enough only a part of its errors is known, which is less than the largest: so the least of them is
-    measured until one that was measured is the least.
-    """
-    waiting = [
-        (trial.error, i, k, False)
-        for i, each in enumerate(candidates)
-        for k, trial in each.seen.items()
-        if trial.error < math.inf and spent.fits(each, k, budget)
-    ]
-    heapq.heapify(waiting)
-    while waiting:
-        error, i, k, measured = heapq.heappop(waiting)
-        if measured:
-            return error, (candidates[i], k)
-        heapq.heappush(waiting, (candidates[i].measured(k).error, i, k, True))
-    return math.inf, None

@@ -12,7 +12,8 @@ from .labels import Label, beside, title
 from .style import GREY, PALE, Figure, look, page
 
 if TYPE_CHECKING:
-    from ...studies.advice.result import Advice, Row
+    from ...studies.advice.result import Advice
+    from ...studies.advice.rows import Row
 
 #: Room around the points, as a factor of cost, of error above what was asked for, and below the least.
 WIDER, HIGHER, LOWER = 1.8, 2.5, 12.0
