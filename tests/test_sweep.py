@@ -21,7 +21,6 @@ from stepwell.studies.sweeps import outcomes
 from support.sweeping import AXES, OUTCOMES, duffing, small, unlike
 
 Oscillator = sw.Oscillator
-F = np.float32
 #: Outcomes that go with float32.
 WITH_FLOAT32 = tuple(each for each in OUTCOMES if each != "lyapunov")
 

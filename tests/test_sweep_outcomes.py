@@ -10,12 +10,10 @@ import stepwell as sw
 from stepwell.errors import ArgumentError
 from stepwell.studies.sweeps import crossings, observed
 from stepwell.studies.sweeps.task import Stopped
-from support.sweeping import AXES, OUTCOMES, duffing, ends, power, small
+from support.sweeping import AXES, duffing, ends, power, small
 
 Oscillator = sw.Oscillator
 F = np.float32
-#: Outcomes that go with float32.
-WITH_FLOAT32 = tuple(each for each in OUTCOMES if each != "lyapunov")
 
 each_type = pytest.mark.parametrize("dtype", ["float64", "float32"])
 
