@@ -15,6 +15,7 @@ import stepwell as sw
 from stepwell.analysis.stability.criterion import signed
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import options
 import speed
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -158,6 +159,7 @@ TABLES = {
     "criteria": criteria,
     "deviations": deviations,
     "operations": operations,
+    "options": options.tables,
 }
 
 

@@ -277,8 +277,63 @@ def test_one_free_oscillator_is_two_operations() -> None:
 @pytest.mark.parametrize("backend", ["rust", "numpy"])
 def test_what_cannot_be_fused_says_so(backend: str) -> None:
     with pytest.raises(sw.errors.ArgumentError, match=r"fused: a step of about \d+ operations is too long"):
-        sw.integrate(sw.Chain(500), "rk4", v=np.zeros(500), y=np.ones(500), dt=0.1, steps=2, fused=True, backend=backend)
-    with pytest.raises(sw.errors.UnsupportedError, match="fused: goes with form='direct' only"):
-        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=2, fused=True, form="matrix", backend=backend)
+        sw.integrate(sw.Chain(9000), "rk4", v=np.zeros(9000), y=np.ones(9000), dt=0.1, steps=2, fused=True, backend=backend)
     with pytest.raises(sw.errors.DTypeError, match="fused: expected True or False"):
         sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=2, fused=WRONG, backend=backend)
+
+
+@pytest.mark.parametrize(
+    ("system", "members"), [(sw.Chain(500), ()), (sw.Chain(500), (9,)), (sw.NBody(np.ones(24), softening=0.1), (2,))]
+)
+def test_long_steps(system: sw.System, members: tuple[int, ...]) -> None:
+    """Of more operations than a tape has that is not fused: one tape, as long as it is."""
+    rng = np.random.default_rng(3)
+    shape = system.for_state_shapes(None, np.zeros((24, 2))).y_shape if isinstance(system, sw.NBody) else (500,)
+    v, y = 0.1 * rng.normal(size=(*shape, *members)), rng.normal(size=(*shape, *members))
+    runs = [
+        sw.integrate(system, "rk4", v=v, y=y, dt=0.01, steps=3, fused=fused, backend=backend)
+        for fused, backend in ((True, "rust"), (True, "numpy"), (False, "rust"))
+    ]
+    assert np.array_equal(runs[0].y, runs[1].y)
+    assert np.array_equal(runs[0].v, runs[1].v)
+    assert not np.array_equal(runs[0].y, runs[2].y)
+    assert np.allclose(runs[0].y, runs[2].y, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["rk4", "leapfrog"])
+@pytest.mark.parametrize("states", [1, 3, 12, 40])
+@pytest.mark.parametrize("members", [(), (2,), (33,)])
+def test_the_matrix_form(states: int, members: tuple[int, ...], method: str) -> None:
+    """Each product after the first is added by one operation: on a tape, by the kernel of large matrices, by the reference."""
+    rng = np.random.default_rng(states)
+    a = np.zeros((2 * states, 2 * states))
+    a[:states, states:], a[states:, :states] = -np.eye(states) - 0.1 * rng.normal(size=(states, states)), np.eye(states)
+    b = np.concatenate([np.ones((states, 1)), np.zeros((states, 1))])
+    system = sw.LinearSystem(a, b, x=[sw.Sinusoid(0.3, 2.0)], velocities=states)
+    v, y = rng.normal(size=(2, states, *members))
+    ask: dict[str, Any] = {"v": v, "y": y, "dt": 0.05, "steps": 20, "every": 5, "form": "matrix"}
+    runs = [
+        sw.integrate(system, method, fused=fused, backend=backend, **ask)
+        for fused, backend in ((True, "rust"), (True, "numpy"), (False, "rust"))
+    ]
+    assert np.array_equal(runs[0].y, runs[1].y)
+    assert np.array_equal(runs[0].v, runs[1].v)
+    assert not np.array_equal(runs[0].y, runs[2].y)
+    assert np.allclose(runs[0].y, runs[2].y, rtol=1e-11, atol=1e-11)
+    if members:
+        alone = sw.integrate(system, method, fused=True, **ask | {"v": v[:, 0], "y": y[:, 0]})
+        assert np.array_equal(alone.y, runs[0].y[..., 0])
+    halves = sw.integrate(system, method, fused=True, **ask | {"steps": 10})
+    rest = sw.integrate(system, method, steps=10, form="matrix", **halves.resume)
+    assert np.array_equal(rest.y[-1], runs[0].y[-1])
+
+
+def test_the_power_form() -> None:
+    """Products of matrices are fused; both backends make the same ones."""
+    system = sw.Oscillator(np.array([0.5, 1.0, 3.0]), 0.1, x=sw.Sinusoid(0.3, 2.0))
+    ask: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.05, "steps": 1000, "every": 333, "form": "power"}
+    fused, other = (sw.integrate(system, "rk4", fused=True, backend=backend, **ask) for backend in ("rust", "numpy"))
+    plain = sw.integrate(system, "rk4", **ask)
+    assert np.array_equal(fused.y, other.y)
+    assert not np.array_equal(fused.y, plain.y)
+    assert np.allclose(fused.y, plain.y, rtol=1e-10, atol=1e-10)

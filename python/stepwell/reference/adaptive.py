@@ -331,7 +331,10 @@ class Backward:
 
 
 class Outcome(NamedTuple):
-    """Saved states, and the state, pace and status of each member at the end."""
+    """Saved states, and the state, pace and status of each member at the end.
+
+    Of the attempts after which a step was kept, ``steps`` has which members made it, the times, v and y.
+    """
 
     v: Array
     y: Array
@@ -339,6 +342,7 @@ class Outcome(NamedTuple):
     last_y: Array
     pace: Pace
     status: Whole
+    steps: list[tuple[Any, Any, Array, Array]]
 
 
 def waiting(
@@ -425,13 +429,14 @@ def run(
     budget: int,
     jumps: Jumps | None = None,
     series: bool = False,
+    every: int = 0,
 ) -> Outcome:
     """Continue all members and save their states at each time of ``at``, ascending. Members that stop before have NaN.
 
-    ``attempt(pace, budget, v, y)`` is one attempt of all members.
+    ``attempt(pace, budget, v, y)`` is one attempt of all members. Every ``every``-th accepted step is kept; 0 for none.
     """
     one = np.ones(pace.t.shape)
-    saved_v, saved_y = [], []
+    saved_v, saved_y, steps = [], [], []
     if jumps is not None:
         pace = pace._replace(wall=jumps.wall(pace.t))
     with np.errstate(all="ignore"):
@@ -441,7 +446,10 @@ def run(
             there, at_target = np.zeros(pace.t.shape, dtype=bool), (np.full(v.shape, np.nan), np.full(y.shape, np.nan))
             while True:
                 while pace.outlook(budget).runs.any():
+                    before = pace.accepted
                     pace, v, y = attempt(pace, budget, v, y)
+                    if every and (kept := (pace.accepted > before) & (pace.accepted % every == 0.0)).any():
+                        steps.append((kept, pace.t, v, y))
                     if jumps is not None:
                         pace = jumps.crossed(pace, series=series)
                 held = (pace.held > 0.0) & ~there
@@ -456,7 +464,7 @@ def run(
             saved_y.append(at_target[1])
     spent = pace.accepted + pace.rejected >= budget
     status = np.where(there, OK, np.where(spent, BUDGET, np.where(pace.error < np.inf, UNDERFLOW, NOT_FINITE)))
-    return Outcome(np.stack(saved_v), np.stack(saved_y), v, y, pace, status.astype(np.int64))
+    return Outcome(np.stack(saved_v), np.stack(saved_y), v, y, pace, status.astype(np.int64), steps)
 
 
 def attempt(

@@ -31,14 +31,16 @@ class Leap(NamedTuple):
 
 
 class Drive:
-    """The sinusoids that drive the members, and the step."""
+    """The sinusoids that drive the members, the step, and whether products of matrices are fused."""
 
-    def __init__(self, waves: Sequence[Sine], h: float) -> None:
-        self.waves, self.h = waves, h
+    def __init__(self, waves: Sequence[Sine], h: float, *, fused: bool = False) -> None:
+        self.waves, self.h, self.fused = waves, h, fused
 
     def of(self, members: Chosen) -> "Drive":
         """The drive of some of the members."""
-        return Drive([Sine(w.amplitude[members], w.omega[members], w.phase[members]) for w in self.waves], self.h)
+        return Drive(
+            [Sine(w.amplitude[members], w.omega[members], w.phase[members]) for w in self.waves], self.h, fused=self.fused
+        )
 
     def columns(self, t: Array) -> list[Array]:
         """1, and sine and cosine of each angle at the members' times."""
@@ -56,12 +58,12 @@ class Drive:
 
     def after(self, leap: Leap, s: Array, t: Array) -> Array:
         """The state after a leap from s at time t."""
-        return times(leap.p, s) + times(leap.q, self.columns(t))
+        return times(leap.p, s, fused=self.fused) + times(leap.q, self.columns(t), fused=self.fused)
 
     def join(self, first: Leap, then: Leap) -> Leap:
         """One leap after the other."""
-        q = product(then.p, first.q) + self.later(then.q, first.steps * self.h)
-        return Leap(first.steps + then.steps, product(then.p, first.p), q)
+        q = product(then.p, first.q, fused=self.fused) + self.later(then.q, first.steps * self.h)
+        return Leap(first.steps + then.steps, product(then.p, first.p, fused=self.fused), q)
 
     def power(self, step: Leap, n: int) -> Leap:
         """The leap of n steps, by repeated squaring."""

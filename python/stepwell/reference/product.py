@@ -1,20 +1,24 @@
-"""Products of matrices of which each member of a batch has its own, summed in the order of the columns."""
+"""Products of matrices of which each member of a batch has its own, summed in the order of the columns.
+
+Fused, each product after the first is added by one fused multiply-add, which rounds once.
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from ..base.arrays import Array
+from .tape.fused import fma
 
 
-def times(matrix: Array, columns: "Sequence[Array] | Array") -> Array:
+def times(matrix: Array, columns: "Sequence[Array] | Array", *, fused: bool = False) -> Array:
     """The matrix, of shape (rows, columns, *batch), times a column of numbers."""
     total: Array = matrix[:, 0] * columns[0]
     for j in range(1, len(columns)):
-        total = total + matrix[:, j] * columns[j]
+        total = fma(matrix[:, j], columns[j], total) if fused else total + matrix[:, j] * columns[j]
     return total
 
 
-def product(a: Array, b: Array) -> Array:
+def product(a: Array, b: Array, *, fused: bool = False) -> Array:
     """The matrix product of a and b."""
-    return times(a[:, :, np.newaxis], b)
+    return times(a[:, :, np.newaxis], b, fused=fused)

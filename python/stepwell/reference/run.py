@@ -55,7 +55,7 @@ def run(
 
 
 def linear_step(
-    p: Array, q: Array, inputs: Sequence[Signal], nodes: Sequence[float], h: float, carries: bool = False
+    p: Array, q: Array, inputs: Sequence[Signal], nodes: Sequence[float], h: float, carries: bool = False, *, fused: bool = False
 ) -> Callable[[float, Array], Array]:
     """One step of s ← P·s + Σ Q·u, with s the rows of v and y; the sums run over s, then over the nodes and their inputs."""
     columns = [(node * h, signal) for node in nodes for signal in inputs]
@@ -63,6 +63,6 @@ def linear_step(
 
     def step(t: float, s: Array) -> Array:
         with over(of_step(t, h, carries)):
-            return times(pq, [*s, *(signal.at(t + later) for later, signal in columns)])
+            return times(pq, [*s, *(signal.at(t + later) for later, signal in columns)], fused=fused)
 
     return step

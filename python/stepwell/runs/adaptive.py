@@ -16,12 +16,17 @@ from .result import AdaptiveState, Paces, Run
 def adaptive_run(request: Request) -> Run:
     """Make the run; its diagnostics are for others."""
     assert request.adaptive is not None
-    plan, (pacing, paces, t0, times, going_on), how = request.plan, request.adaptive, request.plan.method
-    ended, adapt = None, engine.adapt
+    plan, (pacing, paces, t0, times, going_on, every, start), how = request.plan, request.adaptive, request.plan.method
+    ended, adapt, keeper = None, engine.adapt, None
+    if every is not None:
+        from .kept_steps import StepKeeper  # only such runs need it
+
+        keeper = StepKeeper(every)
+        adapt = keeper.adapt
     if request.events is not None:
         from .events import adaptive  # only such runs need it
 
-        ended = adaptive.AdaptiveRun(request.events)
+        ended = adaptive.AdaptiveRun(request.events, None if keeper is None else keeper.adapt)
         adapt = ended.adapt
     shown: Any = nullcontext(None)
     if request.progress:
@@ -36,10 +41,14 @@ def adaptive_run(request: Request) -> Run:
     evaluations = out.evaluations * (accepted + rejected + again)
     stopped, sign = np.count_nonzero(out.status) > 0, -1.0 if plan.backward else 1.0
     control = request.system.control
+    t, v, y = times, out.v, out.y
+    if keeper is not None:
+        t, v, y = keeper.saved(plan, start, (np.broadcast_to(pacing.at[-1], plan.batch), v[-1], y[-1]))
+        t = sign * t
     run = Run(
-        t=times,
-        v=out.v.astype(plan.dtype, copy=False),
-        y=out.y.astype(plan.dtype, copy=False),
+        t=t,
+        v=v.astype(plan.dtype, copy=False),
+        y=y.astype(plan.dtype, copy=False),
         status=out.status.astype(np.int8),
         first_bad_step=np.where(out.status == 0, -1, accepted + 1) if stopped else np.full(plan.batch, -1),
         carry=None,

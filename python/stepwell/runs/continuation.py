@@ -177,9 +177,15 @@ def is_there(pace: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
     return there
 
 
+def standing(pace: Array) -> Array:
+    """The times of the states with which members go on: the last output time, or that at which they stopped."""
+    times: Array = np.where(is_there(pace), pace[engine.TARGET], pace[engine.TIME])
+    return times
+
+
 def _begun_anew(plan: engine.Plan, pacing: engine.Pacing, pace: Array) -> Array:
     """The pace of members that begin with the same tolerance where they were saved, or where they stopped before."""
-    time = np.where(is_there(pace), pace[engine.TARGET], pace[engine.TIME])
+    time = standing(pace)
     groups = engine.groups_of(plan)
     own = pace[engine.PACE_NUMBERS + groups :]
     relative, absolute = (own[:groups], own[groups:]) if len(own) else (pace[engine.RELATIVE], pace[engine.ABSOLUTE])

@@ -68,7 +68,9 @@ def integrate(
             to try first; if None, a hundredth of the time in which the state changes at the start, or from rest 2⁻²⁰ units of
             time, or that part of a run of less than 2⁻¹⁵ units.
         steps: number of steps, one or more.
-        every: save the state every so many steps, and at the first and the last; None saves the last alone.
+        every: save the state every so many steps, and at the first and the last; None saves the last alone. With a tolerance so
+            many accepted steps of each member, and at the one time of ``at``, its end: rows of ``run.t``, v and y are NaN where a
+            member has made fewer steps than another.
         tolerance: in place of ``steps``, for adaptive steps: every member has steps of its own, such that the estimated error of
             each stays below this. One number is relative: of own equations to the largest that each component has been, so that
             units do not matter; of built-in systems, whose directions are equivalent, to the largest length of each block. For a
@@ -94,7 +96,7 @@ def integrate(
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
-            same on every machine and with either backend. For steps of up to some 4000 operations.
+            same on every machine and with either backend. For steps of up to some 100 000 operations.
         dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are
             rounded to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the
             same on every machine and with either backend. For fixed steps of up to some 4000 operations in the direct form.

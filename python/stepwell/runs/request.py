@@ -93,6 +93,8 @@ class Adaptive(NamedTuple):
         t0: the time of the start, of all members or of each.
         times: those at which states are saved, in the direction of the run.
         going_on: what goes on with the run: ``max_step``, ``jumps``, ``positive``.
+        every: how many accepted steps there are from one saved state to the next; None where no steps are saved.
+        start: the times, in the direction of the plan, and the states from which members go on.
     """
 
     pacing: engine.Pacing
@@ -100,6 +102,8 @@ class Adaptive(NamedTuple):
     t0: Array
     times: Array
     going_on: dict[str, Any]
+    every: int | None
+    start: tuple[Array, Array, Array]
 
 
 class Request(NamedTuple):
@@ -166,7 +170,9 @@ class Request(NamedTuple):
         form = checks.known("form", form, FORMS)
         backend = checks.known("backend", backend, BACKENDS)
         if form != "direct":
-            _goes_with_matrices(system, how, form, fused, force)
+            _goes_with_matrices(system, how, form, force)
+            if fused and single:
+                raise UnsupportedError(f"fused: form={form!r} goes with fused=True in float64 only; leave out fused= or dtype=")
         watched = None if events is None else _events(events, form)
         control = a_control(control)
         if form == "power":
@@ -329,6 +335,11 @@ class Request(NamedTuple):
             raise ShapeError(f"resume: expected a run of batch {batch}, got one of batch {pace.shape[1:]}")
         for end in (t0, times):
             system.check_time(float(np.abs(end).max()))
+        every = None if options.every is None else checks.count("every", options.every, 1)
+        if every is not None and len(times) > 1:
+            raise ShapeError(
+                f"at: with every= expected one time, that of the end, got {len(times)}; the states between are those of the steps"
+            )
         record = quantities(system, options.record)
         workers = 0 if options.threads is None else checks.count("threads", options.threads, 1, 4096)
         checks.fits(
@@ -338,6 +349,13 @@ class Request(NamedTuple):
             "ask for fewer times or split the batch",
             beside=len(times) * (prod(batch) if times.ndim > 1 else 1) * BYTES_PER_TIME,
         )
+        if every is not None:
+            checks.fits(
+                f"the saved states of up to max_steps = {budget} steps",
+                (budget // every + 2) * (numbers + 1),
+                batch,
+                "give a smaller max_steps= or a larger every=, or split the batch",
+            )
         t0, times = _of_the_run(t0, times, batch)
         since = sign * t0 if pace is None else np.maximum(pace[engine.TARGET], sign * t0)
         _ascending(sign * times, since, sign, pace is not None)
@@ -354,6 +372,7 @@ class Request(NamedTuple):
         )  # fmt: skip
         at = np.ascontiguousarray(sign * times)
         pacing = engine.Pacing(at, budget, pace is None, None if jumps is None else np.sort(sign * jumps, axis=0))
+        standing = (sign * t0 if pace is None else continuation.standing(pace)), v, y
         if before is None:
             assert tolerances is not None
             paces = engine.paces(plan, first, tolerances, most_step, pacing)
@@ -364,7 +383,7 @@ class Request(NamedTuple):
                 paces[engine.MOST_STEP] = most_step
         going_on = {"max_step": options.max_step, "jumps": options.jumps, "positive": options.positive}
         going_on = {name: each for name, each in going_on.items() if each is not None}
-        adaptive = Adaptive(pacing, paces, t0, times, going_on)
+        adaptive = Adaptive(pacing, paces, t0, times, going_on, every, standing)
         return cls(plan, system, v, y, not pacing.begins, None, record, watched, progress=progress, adaptive=adaptive)
 
     @classmethod
@@ -477,10 +496,8 @@ def _events(events: Any, form: str) -> list[Event]:
     return several(events)
 
 
-def _goes_with_matrices(system: System, how: Method, form: str, fused: bool, force: Any) -> None:
+def _goes_with_matrices(system: System, how: Method, form: str, force: Any) -> None:
     """Raise if there is no transition matrix."""
-    if fused:
-        raise UnsupportedError(f"fused: goes with form='direct' only, got form={form!r}")
     if force is not None:
         raise UnsupportedError(f"force: goes with form='direct' only, got form={form!r}; a linear system has inputs")
     if not system.linear:
@@ -544,7 +561,7 @@ def _goes_with_times(options: Options, before: Continuation | None) -> None:
             "resume: expected a run with adaptive steps, since tolerance= or at= was given, got one with fixed steps; start anew "
             "from its last state: v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
         )
-    fixed = {name: getattr(options, name) for name in ("steps", "every", "start", "start_step")}
+    fixed = {name: getattr(options, name) for name in ("steps", "start", "start_step")}
     if not isinstance(options.form, str) or options.form != "direct":
         fixed["form"] = options.form
     if wrong := [name for name, value in fixed.items() if value is not None]:

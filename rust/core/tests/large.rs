@@ -348,8 +348,10 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
 
 #[test]
 fn the_matrix_form_of_a_large_member_is_its_tape() {
-    for (n, inputs) in [(1, 0), (3, 1), (8, 2), (33, 1), (57, 0)] {
-        let how = StepKind::Matrix { nodes: [0.0, 0.5, 1.0].map(f64::to_bits).to_vec() };
+    for (n, inputs, fused) in
+        [(1, 0, false), (3, 1, false), (8, 2, false), (33, 1, false), (57, 0, false), (8, 2, true), (57, 1, true)]
+    {
+        let how = StepKind::Matrix { nodes: [0.0, 0.5, 1.0].map(f64::to_bits).to_vec(), fused };
         let rows =
             [("p", n * n), ("q", 3 * inputs * n), ("inputs[0].amplitude", 1), ("inputs[0].omega", 1), ("inputs[0].phase", 1)];
         let tables: &[&str] = if inputs == 2 { &["inputs[1]"] } else { &[] };

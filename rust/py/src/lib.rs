@@ -194,6 +194,16 @@ struct PacingOf<'py> {
     jumps: PyReadonlyArray2<'py, f64>,
     budget: i64,
     begins: bool,
+    every: i64,
+}
+
+/// The steps that are kept: see `KeptSteps` in `runs/engine/adaptive.py`.
+#[derive(FromPyObject)]
+struct KeptStepsOf<'py> {
+    counts: PyReadwriteArray1<'py, i64>,
+    t: PyReadwriteArray2<'py, f64>,
+    v: PyReadwriteArrayDyn<'py, f64>,
+    y: PyReadwriteArrayDyn<'py, f64>,
 }
 
 /// What a run with a tolerance begins with and what it fills: see `AdaptiveArrays` in `runs/engine/adaptive.py`.
@@ -208,6 +218,7 @@ struct AdaptiveArraysOf<'py> {
     last_paces: PyReadwriteArray2<'py, f64>,
     status: PyReadwriteArray1<'py, i64>,
     trail: Option<PyReadwriteArrayDyn<'py, f64>>,
+    steps: Option<KeptStepsOf<'py>>,
 }
 
 /// Makes a run of adaptive steps from the rows of `v` and `y`, and fills what is kept at the times of the pacing. Returns whether
@@ -224,9 +235,16 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
         paces: by_row(&arrays.paces)?,
         begins: pacing.begins,
         budget: pacing.budget,
+        every: pacing.every,
         v: by_row(&v)?,
         y: by_row(&y)?,
         members: arrays.status.as_array().len(),
+    };
+    let (steps, kept_steps): ([&mut [f64]; 3], &mut [i64]) = match &mut arrays.steps {
+        Some(KeptStepsOf { counts, t, v, y }) => {
+            ([t.as_slice_mut()?, v.as_slice_mut()?, y.as_slice_mut()?], counts.as_slice_mut()?)
+        }
+        None => ([&mut [], &mut [], &mut []], &mut []),
     };
     let to_fill = adaptive::Arrays {
         saved_v: arrays.saved_v.as_slice_mut()?,
@@ -235,6 +253,8 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
         paces: arrays.last_paces.as_slice_mut()?,
         status: arrays.status.as_slice_mut()?,
         attempt_log: filled(&mut arrays.trail)?,
+        steps,
+        kept_steps,
     };
     interruptible(py, plan.progress, |monitor| adaptive::run(&run, to_fill, monitor))
 }

@@ -212,7 +212,7 @@ impl ModelSpec {
         let how = match (matrix, step) {
             (None, Some(step)) => StepKind::Step(step),
             (None, None) => StepKind::Method { name: method, choice: 0 },
-            (Some((nodes, _)), _) => StepKind::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
+            (Some((nodes, _)), _) => StepKind::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect(), fused },
         };
         let acceptance =
             acceptance.map_or_else(Acceptance::default, |(groups, own, positive)| Acceptance { groups, own, positive });
@@ -276,9 +276,11 @@ impl ModelSpec {
                 .collect::<PyResult<_>>()?,
         };
         let Self { signature, record, fused, precision, .. } = self;
+        // The matrix form says itself which products are fused, whatever they are made of.
+        let fused = *fused && !matches!(how, StepKind::Matrix { .. });
         Ok(Model {
             spec,
-            key: TapeKey { signature: signature.clone(), how, record: record.clone(), fused: *fused, precision: *precision },
+            key: TapeKey { signature: signature.clone(), how, record: record.clone(), fused, precision: *precision },
         })
     }
 }

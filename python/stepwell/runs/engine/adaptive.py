@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from math import prod
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -31,6 +32,8 @@ SHORT = 32.0 * BLIND
 #: The least absolute tolerance, 1024 times the smallest number above zero. A state that grows out of zero, before a smooth push,
 #: begins with numbers of few bits, of which an error cannot be small beside the whole.
 LEAST = 2.0**-1064
+#: The status of a member that has no room for another step.
+FULL = -1
 
 
 class Tolerances(NamedTuple):
@@ -47,13 +50,17 @@ class Tolerances(NamedTuple):
 class Pacing(NamedTuple):
     """When the state is asked for, ascending, the most attempts of a member, and whether members have yet to begin.
 
-    ``at`` and ``jumps``, the times that no step crosses, are the same for all members or of each, shape (times, *batch).
+    ``at`` and ``jumps``, the times that no step crosses, are the same for all members or of each, shape (times, *batch). Every
+    ``every``-th accepted step of a member is kept, 0 for none. The core has ``room`` for so many of each, and a member that has
+    filled it ends with the status ``FULL``.
     """
 
     at: Array
     budget: int
     begins: bool = False
     jumps: Array | None = None
+    every: int = 0
+    room: int = 0
 
 
 class CorePacing(NamedTuple):
@@ -63,6 +70,7 @@ class CorePacing(NamedTuple):
     jumps: Array
     budget: int
     begins: bool
+    every: int = 0
 
 
 def jumps_of(plan: Plan, pacing: Pacing) -> Jumps | None:
@@ -82,7 +90,7 @@ def pacing_of_core(plan: Plan, pacing: Pacing) -> CorePacing:
     """As the core takes it."""
     jumps = jumps_of(plan, pacing)
     both = np.empty((0, 1)) if jumps is None else np.concatenate([_rows(jumps.before, plan), _rows(jumps.after, plan)])
-    return CorePacing(_rows(pacing.at, plan), both, pacing.budget, pacing.begins)
+    return CorePacing(_rows(pacing.at, plan), both, pacing.budget, pacing.begins, pacing.every)
 
 
 def _rows(times: Array, plan: Plan) -> Array:
@@ -90,6 +98,22 @@ def _rows(times: Array, plan: Plan) -> Array:
     width = plan.members if times.ndim > 1 else 1
     of_each = np.broadcast_to(times, (len(times), *plan.batch)) if times.ndim > 1 else times
     return np.ascontiguousarray(of_each.reshape(len(times), width), dtype=np.float64)
+
+
+class KeptSteps(NamedTuple):
+    """The states after accepted steps that are kept, as far as each member has some: their times, velocities and coordinates.
+
+    Attributes:
+        counts: how many each member has, shape (members,).
+        t: their times, shape (room, members).
+        v: velocities, shape (room, *block, members).
+        y: coordinates, likewise.
+    """
+
+    counts: Whole
+    t: Array
+    v: Array
+    y: Array
 
 
 class AdaptiveArrays(NamedTuple):
@@ -106,6 +130,7 @@ class AdaptiveArrays(NamedTuple):
         status: how they ended, shape (members,).
         trail: None; or times and steps to try next, shape (2, times, members), where attempts are made one by one until the asked
             time, and what is kept is where members stand before the first and after each.
+        steps: None; or the steps that are kept.
     """
 
     v: Array
@@ -117,12 +142,13 @@ class AdaptiveArrays(NamedTuple):
     last_paces: Array
     status: Whole
     trail: Array | None = None
+    steps: KeptSteps | None = None
 
 
 class Adapted(NamedTuple):
     """Saved states, and of each member at the end the state, the numbers of its ``Pace`` and the status.
 
-    ``evaluations`` is how many function evaluations an attempt takes.
+    ``evaluations`` is how many function evaluations an attempt takes, ``steps`` those that were kept, if they were.
     """
 
     v: Array
@@ -132,6 +158,7 @@ class Adapted(NamedTuple):
     paces: Array
     status: Whole
     evaluations: int
+    steps: KeptSteps | None = None
 
 
 def groups_of(plan: Plan) -> int:
@@ -276,7 +303,11 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     last_paces, status = np.empty((numbers, members)), np.empty(plan.batch, dtype=np.int64)
     before = paces.reshape(numbers, paces.size // numbers)
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
-    arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, status.reshape(-1))
+    steps = None
+    if pacing.every:
+        blocks = (np.empty((pacing.room, *shape, members)) for shape in (plan.system.v_shape, plan.system.y_shape))
+        steps = KeptSteps(np.zeros(members, np.int64), np.empty((pacing.room, members)), *blocks)
+    arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, status.reshape(-1), None, steps)
     core_pacing, core_plan = pacing_of_core(plan, pacing), plan._replace(t0=0.0)
     spec = model(core_plan)
     if not _core.adapt(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
@@ -284,7 +315,7 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
         _core.adapt(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
     each = _evaluations_of_attempt(plan)
     last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
-    return Adapted(saved_v, saved_y, last_v, last_y, last_paces.reshape(numbers, *plan.batch), status, each)
+    return Adapted(saved_v, saved_y, last_v, last_y, last_paces.reshape(numbers, *plan.batch), status, each, steps)
 
 
 def _evaluations_of_attempt(plan: Plan) -> int:
@@ -300,6 +331,22 @@ def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array
     pace = begun(plan, paces, v, y) if pacing.begins else pace_of(plan, paces)
     attempt, jumps = attempt_by_numpy(plan, pacing.budget), jumps_of(plan, pacing)
     series = plan.method.has_series
-    out = adaptive.run(attempt, v, y, pace, at=pacing.at, budget=pacing.budget, jumps=jumps, series=series)
+    out = adaptive.run(attempt, v, y, pace, at=pacing.at, budget=pacing.budget, jumps=jumps, series=series, every=pacing.every)
     each = _evaluations_of_attempt(plan)
-    return Adapted(out.v, out.y, out.last_v, out.last_y, numbers_of(out.pace), out.status, each)
+    steps = _gathered(plan, out.steps) if pacing.every else None
+    return Adapted(out.v, out.y, out.last_v, out.last_y, numbers_of(out.pace), out.status, each, steps)
+
+
+def _gathered(plan: Plan, steps: Sequence[tuple[Any, Any, Array, Array]]) -> KeptSteps:
+    """The steps of each member one after the other."""
+    members, shapes = plan.members, (plan.system.v_shape, plan.system.y_shape)
+    count = np.zeros(members, np.int64)
+    room = max((int(n) for n in np.sum([np.reshape(kept, -1) for kept, *_ in steps], axis=0)), default=0) if steps else 0
+    out = KeptSteps(count, np.empty((room, members)), *(np.empty((room, *shape, members)) for shape in shapes))
+    for kept, t, v, y in steps:
+        index = np.flatnonzero(kept)
+        out.t[count[index], index] = np.reshape(t, -1)[index]
+        for to, block, shape in zip((out.v, out.y), (v, y), shapes, strict=True):
+            to[count[index], ..., index] = np.moveaxis(block.reshape(*shape, members)[..., index], -1, 0)
+        count[index] += 1
+    return out

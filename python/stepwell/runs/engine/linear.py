@@ -115,14 +115,17 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
     if isinstance(plan.t0, np.ndarray) and inputs:
         linear_map[BEGINS] = plan.t0
     given = flat(linear_map, plan.batch)
-    return _core.ModelSpec("matrix", plan.method.name, given, matrix=(list(plan.method.nodes), n_v), single=plan.single)
+    nodes = list(plan.method.nodes)
+    return _core.ModelSpec(
+        "matrix", plan.method.name, given, matrix=(nodes, n_v), fused=plan.fused, single=plan.single
+    )
 
 
 def _matrix_step(plan: Plan, P: Array, Q: Array) -> Callable[[float, Array], Array]:
     """The same by the reference, from a time and the rows of a state to the next ones."""
     inputs, carries = [each.signal() for each in plan.system.given_inputs().values()], plan.method.carry is not None
     if not plan.single:
-        return reference.linear_step(P, Q, inputs, plan.method.nodes, plan.dt, carries)
+        return reference.linear_step(P, Q, inputs, plan.method.nodes, plan.dt, carries, fused=plan.fused)
     from ...reference.tape import single  # only such runs need it
     from ...reference.traced import Tracer
 
@@ -233,7 +236,7 @@ def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Ou
     s = np.concatenate([slot.reshape(n_v, members), y.reshape(prod(plan.system.y_shape), members)])
     p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in (transition(plan), pulses(plan, given)))
 
-    drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt)
+    drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt, fused=plan.fused)
     kept, saves = (np.empty((plan.kept, *v.shape)), np.empty((plan.kept, *y.shape))), plan.saves
     with np.errstate(all="ignore"):
         step = power.one_step(p, q, inputs, plan.method.nodes, drive)

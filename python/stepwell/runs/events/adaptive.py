@@ -6,7 +6,8 @@ step chosen anew; only the sizes to which errors are relative are those of all p
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import prod
 from typing import Any
 
@@ -23,6 +24,9 @@ from .event import Event, names_of_changing
 from .parts import Changes
 from .resets import LARGEST_RATIO, NO_TIME, SETTLED, Resets
 from .trials import AdaptiveTrials
+
+#: As ``engine.adapt``, of members of a whole run and the times at which they stop.
+Keep = Callable[..., engine.Adapted]
 
 #: Numbers of the states of members that are looked at together: a megabyte, which stays in a cache.
 NUMBERS_AT_ONCE = 1 << 17
@@ -43,8 +47,8 @@ class AdaptiveRun:
     Then the run is made as without events, to there, so that all that it returns is the same.
     """
 
-    def __init__(self, events: Sequence[Event]) -> None:
-        self._events = events
+    def __init__(self, events: Sequence[Event], keep: Keep | None = None) -> None:
+        self._events, self._keep = events, keep
         self._driver: _Driver | None = None
 
     def adapt(self, plan: engine.Plan, pacing: engine.Pacing, paces: Array, v: Array, y: Array) -> engine.Adapted:
@@ -54,6 +58,7 @@ class AdaptiveRun:
         checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
         changing = any(event.then for event in self._events)
         self._driver = driver = (_Resetting if changing else _Driver)(plan, self._events, pacing)
+        driver.keep = self._keep
         out = driver.run(paces, v, y)
         if plan.progress is not None:
             plan.progress(1.0)
@@ -72,6 +77,9 @@ class AdaptiveRun:
 
 class _Driver(Collected):
     """The run of all members."""
+
+    #: Makes the run and keeps states of its steps, if that was asked for.
+    keep: Keep | None = None
 
     def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
         super().__init__(plan, events, AdaptiveTrials)
@@ -191,14 +199,15 @@ class _Driver(Collected):
         """The run of some members as without events; those that stopped make no more attempts than up to there."""
         stopped_at = self.stopped_at[index]
         stopped, plan = ~np.isnan(stopped_at), plan._replace(progress=None)
+        adapt = engine.adapt if self.keep is None else partial(self.keep, index=index, until=stopped_at)
         if not stopped.any():
-            return engine.adapt(plan, pacing, paces, v, y)
+            return adapt(plan, pacing, paces, v, y)
         batch, total, rejected = plan.batch, plan.members, 1 + engine.COUNTS.start
         # What they may not make any more counts as if it had been rejected before.
         spare = np.where(stopped, pacing.budget - self.attempts[index], 0.0)
         given = np.broadcast_to(paces.reshape(self.numbers, -1), (self.numbers, total)).copy()
         given[rejected] += spare
-        out = engine.adapt(plan, pacing, given.reshape(self.numbers, *batch), v, y)
+        out = adapt(plan, pacing, given.reshape(self.numbers, *batch), v, y)
         last, status = out.paces.reshape(self.numbers, total).copy(), out.status.reshape(total).copy()
         last[rejected] -= spare
         last[engine.TIME, stopped], last[engine.WORK, stopped] = stopped_at[stopped], np.nan

@@ -28,6 +28,8 @@ pub struct Matrix {
     count: usize,
     /// Whether the method carries something in place of v.
     carries: bool,
+    /// Whether products are added by fused multiply-adds.
+    fused: bool,
     /// The inputs at all nodes.
     u: Vec<f64>,
     state: Aligned,
@@ -40,9 +42,10 @@ pub struct Matrix {
 impl Matrix {
     /// With inputs at the times of the form.
     pub fn new(spec: &Spec, shape: Shape, how: &StepKind, level: Level, clock: &Clock) -> Matrix {
-        let nodes: Vec<f64> = match how {
-            StepKind::Matrix { nodes } => nodes.iter().map(|bits| f64::from_bits(*bits)).collect(),
-            StepKind::Method { .. } | StepKind::Attempts { .. } | StepKind::Step(_) => Vec::new(), // not the matrix form: never called
+        let (nodes, fused) = match how {
+            StepKind::Matrix { nodes, fused } => (nodes.iter().map(|bits| f64::from_bits(*bits)).collect(), *fused),
+            // Not the matrix form: never called.
+            StepKind::Method { .. } | StepKind::Attempts { .. } | StepKind::Step(_) => (Vec::new(), false),
         };
         let (n, count) = (shape.v + shape.y, spec.signature.whole("inputs"));
         Matrix {
@@ -53,6 +56,7 @@ impl Matrix {
             inputs: Inputs::default(),
             count,
             carries: spec.signature.whole("carries") > 0,
+            fused,
             u: vec![0.0; nodes.len() * count],
             nodes,
             state: Aligned::new(filled(n)),
@@ -72,7 +76,7 @@ struct Steps<'a> {
 impl Task for Steps<'_> {
     #[inline(always)]
     fn run(self) {
-        let Matrix { shape, clock, nodes, pq, inputs, count, carries, u, state, next, stop, .. } = self.of;
+        let Matrix { shape, clock, nodes, pq, inputs, count, carries, fused, u, state, next, stop, .. } = self.of;
         for k in self.k..self.k + self.n {
             let t = clock.at(k);
             let window = window::of_step(t, clock.h, *carries);
@@ -82,7 +86,12 @@ impl Task for Steps<'_> {
             if stop.load(Relaxed) {
                 return;
             }
-            pq.times([&state[..shape.v + shape.y], u, &[]], next, stop);
+            let parts = [&state[..shape.v + shape.y], u, &[]];
+            if *fused {
+                pq.times_fused(parts, next, stop);
+            } else {
+                pq.times(parts, next, stop);
+            }
             std::mem::swap(state, next);
         }
     }

@@ -25,7 +25,7 @@ pub(crate) fn filled(rows: usize) -> usize {
 
 /// The sums of all rows that fill panels of `R`; what is left of entries and rows.
 #[inline(always)]
-fn panels<'a, const R: usize>(
+fn panels<'a, const R: usize, const FUSED: bool>(
     entries: &'a [f64],
     out: &'a mut [f64],
     parts: [&[f64]; 3],
@@ -39,7 +39,7 @@ fn panels<'a, const R: usize>(
             break;
         }
         let (panel, later) = left.split_at(size);
-        *now = sums(panel.as_chunks().0, parts);
+        *now = sums::<R, FUSED>(panel.as_chunks().0, parts);
         left = later;
     }
     (left, rest)
@@ -48,13 +48,13 @@ fn panels<'a, const R: usize>(
 /// The sums of `R` rows. The first product starts a sum: −0 is the number that changes nothing when added, not even a −0.
 #[inline(always)]
 #[allow(clippy::needless_range_loop, reason = "a loop over lanes is written as the instructions that it becomes")]
-fn sums<const R: usize>(mut entries: &[[f64; R]], parts: [&[f64]; 3]) -> [f64; R] {
+fn sums<const R: usize, const FUSED: bool>(mut entries: &[[f64; R]], parts: [&[f64]; 3]) -> [f64; R] {
     let mut sum = [-0.0; R];
     for part in parts {
         let (now, later) = entries.split_at(part.len());
         for (m, s) in now.iter().zip(part) {
             for r in 0..R {
-                sum[r] += m[r] * s;
+                sum[r] = if FUSED { m[r].mul_add(*s, sum[r]) } else { sum[r] + m[r] * s };
             }
         }
         entries = later;
@@ -85,8 +85,19 @@ impl Panels {
     /// `stop` is set, it returns early with an unfinished result.
     #[inline(always)]
     pub(crate) fn times(&self, parts: [&[f64]; 3], out: &mut [f64], stop: &AtomicBool) {
-        let rest = panels::<{ HEIGHTS[0] }>(&self.entries, &mut out[..self.filled], parts, stop);
-        let rest = panels::<{ HEIGHTS[1] }>(rest.0, rest.1, parts, stop);
-        panels::<{ HEIGHTS[2] }>(rest.0, rest.1, parts, stop);
+        self.all::<false>(parts, out, stop);
+    }
+
+    /// The same by fused multiply-adds.
+    #[inline(always)]
+    pub(crate) fn times_fused(&self, parts: [&[f64]; 3], out: &mut [f64], stop: &AtomicBool) {
+        self.all::<true>(parts, out, stop);
+    }
+
+    #[inline(always)]
+    fn all<const FUSED: bool>(&self, parts: [&[f64]; 3], out: &mut [f64], stop: &AtomicBool) {
+        let rest = panels::<{ HEIGHTS[0] }, FUSED>(&self.entries, &mut out[..self.filled], parts, stop);
+        let rest = panels::<{ HEIGHTS[1] }, FUSED>(rest.0, rest.1, parts, stop);
+        panels::<{ HEIGHTS[2] }, FUSED>(rest.0, rest.1, parts, stop);
     }
 }

@@ -33,6 +33,9 @@ pub struct AdaptiveRun<'a> {
     pub begins: bool,
     /// The most attempts of a member.
     pub budget: i64,
+    /// Every so manieth accepted step is kept in [`Arrays::steps`]; 0 for none. A member that has filled its rows there ends, with
+    /// a status of its own, and can go on from its pace.
+    pub every: i64,
     /// Velocities at the start, by rows.
     pub v: Vec<Row<'a>>,
     /// Coordinates at the start, by rows.
@@ -44,6 +47,8 @@ pub struct AdaptiveRun<'a> {
 /// How a member ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Status {
+    /// Its rows of [`Arrays::steps`] are full.
+    Full = -1,
     /// At the last time.
     Ok = 0,
     /// Out of attempts.
@@ -71,6 +76,10 @@ pub struct Arrays<'a> {
     /// steps to try next. Then attempts are made one by one until that time is passed, and what is kept is where members stand
     /// before the first and after each. No step is held.
     pub attempt_log: &'a mut [f64],
+    /// The states after accepted steps that are kept, by rows: their times, velocities and coordinates; empty if none are.
+    pub steps: [&'a mut [f64]; 3],
+    /// One row: how many of them each member has.
+    pub kept_steps: &'a mut [i64],
 }
 
 /// Attempts between two checks of the lanes.
@@ -91,6 +100,8 @@ struct Part<'a> {
     paces: Columns<'a, f64>,
     status: Columns<'a, i64>,
     attempt_log: Columns<'a, f64>,
+    steps: [Columns<'a, f64>; 3],
+    kept_steps: Columns<'a, i64>,
 }
 
 /// Makes the run, and returns whether it did: where members stand at the start is not found for a system whose attempt is not one
@@ -112,6 +123,13 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
     if !arrays.attempt_log.is_empty() {
         expect("attempt_log", 2 * plan.at.len() * b, arrays.attempt_log.len())?;
     }
+    if plan.every > 0 {
+        let kept = arrays.steps[0].len() / b.max(1);
+        expect("kept_steps", b, arrays.kept_steps.len())?;
+        for (rows, steps) in [1, p, q].into_iter().zip(&arrays.steps) {
+            expect("steps", rows * kept * b, steps.len())?;
+        }
+    }
     for row in plan.model.spec.rows.iter().chain(&plan.v).chain(&plan.y).chain(&plan.paces).chain(&plan.at).chain(&plan.jumps) {
         if row.0.len() != 1 {
             expect("a row", b, row.0.len())?;
@@ -131,16 +149,20 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
     // Few shares, since lanes run empty at the end of each; but several, so that the others do not wait long for a slow one.
     let shares = if threads == 1 { 1 } else { b.div_ceil(lanes).min(threads * 8) };
     let shares: Vec<usize> = (0..shares).map(|i| b * (i + 1) / shares - b * i / shares).collect();
-    let mut status = cut(arrays.status, b, &shares).into_iter();
-    let mut rows =
-        [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces, arrays.attempt_log].map(|a| cut(a, b, &shares).into_iter());
+    let mut whole = [arrays.status, arrays.kept_steps].map(|a| cut(a, b, &shares).into_iter());
+    let [t, v, y] = arrays.steps;
+    let mut rows = [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces, arrays.attempt_log, t, v, y]
+        .map(|a| cut(a, b, &shares).into_iter());
     let mut parts = Vec::with_capacity(shares.len());
     let mut first = 0;
     for count in shares {
-        if let ([Some(saved_v), Some(saved_y), Some(state), Some(paces), Some(attempt_log)], Some(status)) =
-            (rows.each_mut().map(Iterator::next), status.next())
+        if let (
+            [Some(saved_v), Some(saved_y), Some(state), Some(paces), Some(attempt_log), Some(t), Some(v), Some(y)],
+            [Some(status), Some(kept_steps)],
+        ) = (rows.each_mut().map(Iterator::next), whole.each_mut().map(Iterator::next))
         {
-            parts.push(Part { first, count, saved_v, saved_y, state, paces, status, attempt_log });
+            let steps = [t, v, y];
+            parts.push(Part { first, count, saved_v, saved_y, state, paces, status, attempt_log, steps, kept_steps });
         }
         first += count;
     }
@@ -163,6 +185,16 @@ struct Assignment {
     origin: Option<(Vec<f64>, f64)>,
     /// A run that goes on is held, and the coefficients of its series have to be found first.
     held_before: bool,
+    /// How many accepted steps it had when a step was looked at last, and how many are kept of this run.
+    accepted: f64,
+    kept_steps: usize,
+}
+
+impl Assignment {
+    /// Of a member of the log of attempts.
+    fn of_log(member: usize, next: usize) -> Assignment {
+        Assignment { member, next, origin: None, held_before: false, accepted: 0.0, kept_steps: 0 }
+    }
 }
 
 struct Worker<'a> {
@@ -207,9 +239,11 @@ impl<'a> Worker<'a> {
             }
             let numbers = self.plan.v.len() + self.plan.y.len();
             if self.group.has_terms() {
-                let attempts = self.attempts_by_series();
+                let attempts = if self.plan.every > 0 { 1 } else { self.attempts_by_series() };
                 self.group.attempt(attempts);
-                self.group.find_running(self.plan.budget as f64, &mut runs);
+                if self.plan.every == 0 {
+                    self.group.find_running(self.plan.budget as f64, &mut runs);
+                }
                 unseen += attempts;
                 if unseen >= ATTEMPTS_BETWEEN_CHECKS {
                     unseen = 0;
@@ -229,12 +263,47 @@ impl<'a> Worker<'a> {
             } else {
                 ATTEMPTS_BETWEEN_CHECKS
             };
-            self.group.attempt(attempts);
+            self.group.attempt(attempts.min(self.attempts_to_next_kept(&assignments)));
             if !go_on(0) {
                 return Err(Error::Interrupted);
             }
         }
         Ok(())
+    }
+
+    /// After how many attempts a member may have made a step that is kept.
+    fn attempts_to_next_kept(&self, assignments: &[Option<Assignment>]) -> usize {
+        let every = self.plan.every;
+        if every == 0 {
+            return usize::MAX;
+        }
+        let left = |(lane, assigned): (usize, &Option<Assignment>)| {
+            assigned.as_ref().map(|_| every - self.group.pace(lane).accepted as i64 % every)
+        };
+        assignments.iter().enumerate().filter_map(left).min().unwrap_or(1) as usize
+    }
+
+    /// Keeps the state of a lane if it has made a step that is to be kept. Returns whether there is no room for another.
+    fn keep_step(&self, part: &mut Part, lane: usize, assigned: &mut Assignment) -> bool {
+        let every = self.plan.every;
+        if every == 0 {
+            return false;
+        }
+        let pace = self.group.pace(lane);
+        let is_new = pace.accepted > assigned.accepted && pace.accepted as i64 % every == 0;
+        assigned.accepted = pace.accepted;
+        if is_new {
+            let (row, member, state) = (assigned.kept_steps, assigned.member, self.group.state(lane));
+            let (v, y) = state.split_at(self.plan.v.len());
+            for (rows, block) in part.steps.iter_mut().zip([&[pace.t], v, y]) {
+                for (i, number) in block.iter().enumerate() {
+                    rows.row(row * block.len() + i)[member] = *number;
+                }
+            }
+            assigned.kept_steps += 1;
+            part.kept_steps.row(0)[member] = assigned.kept_steps as i64;
+        }
+        assigned.kept_steps == part.steps[0].rows()
     }
 
     /// Attempts of all members one by one, keeping where they stand before the first and after each.
@@ -273,7 +342,7 @@ impl<'a> Worker<'a> {
             }
             for (lane, member) in (first..part.count).enumerate().take(lanes) {
                 let pace = self.group.pace(lane);
-                self.end(&mut part, lane, &Assignment { member, next: rows, origin: None, held_before: false }, &pace);
+                self.end(&mut part, lane, &Assignment::of_log(member, rows), &pace, None);
             }
         }
         Ok(())
@@ -288,7 +357,7 @@ impl<'a> Worker<'a> {
                 let pace = self.group.pace(lane);
                 part.attempt_log.row(row)[member] = pace.t;
                 part.attempt_log.row(rows + row)[member] = length(pace.t, pace.h, pace.wall);
-                self.save(part, lane, &Assignment { member, next: row, origin: None, held_before: false });
+                self.save(part, lane, &Assignment::of_log(member, row));
             }
             return;
         }
@@ -355,7 +424,7 @@ impl<'a> Worker<'a> {
         let before = &plan.jumps[..plan.jumps.len() / 2];
         let next = before.get(before.partition_point(|row| row.at(at) <= pace.t));
         self.group.set_pace(lane, Pace { target: pace.t, wall: next.map_or(f64::INFINITY, |row| row.at(at)), ..pace });
-        Assignment { member, next: 0, origin: None, held_before: pace.held > 0.0 }
+        Assignment { accepted: pace.accepted, held_before: pace.held > 0.0, ..Assignment::of_log(member, 0) }
     }
 
     /// Brings a lane to its next attempt: saves the states that it has reached and sets its next time, or ends its member and
@@ -370,6 +439,7 @@ impl<'a> Worker<'a> {
     ) -> Result<Option<Assignment>, Error> {
         let (plan, budget) = (self.plan, self.plan.budget as f64);
         loop {
+            let is_full = self.keep_step(part, lane, &mut assigned);
             if let Some((origin, rejected)) = assigned.origin.take() {
                 // An extra step whose error was not tolerated did not change the state; the run has gone on with shorter steps.
                 if self.group.pace(lane).rejected <= rejected {
@@ -391,7 +461,7 @@ impl<'a> Worker<'a> {
                 self.save(part, lane, &assigned);
                 assigned.next += 1;
             }
-            if assigned.next < plan.at.len() && self.group.has_terms() && pace.held > 0.0 {
+            if !is_full && assigned.next < plan.at.len() && self.group.has_terms() && pace.held > 0.0 {
                 if std::mem::take(&mut assigned.held_before) {
                     self.group.set_pace(lane, pace);
                     return Ok(Some(assigned));
@@ -399,7 +469,7 @@ impl<'a> Worker<'a> {
                 self.go_by_terms(part, lane, &mut assigned, pace);
                 continue;
             }
-            if assigned.next < plan.at.len() {
+            if !is_full && assigned.next < plan.at.len() {
                 if pace.holds() {
                     pace.extra = pace.target - pace.t;
                     assigned.origin = Some((self.group.state(lane), pace.rejected));
@@ -411,7 +481,7 @@ impl<'a> Worker<'a> {
                     return Ok(Some(assigned));
                 }
             }
-            self.end(part, lane, &assigned, &pace);
+            self.end(part, lane, &assigned, &pace, is_full.then_some(Status::Full));
             if !go_on(1) {
                 return Err(Error::Interrupted);
             }
@@ -441,10 +511,12 @@ impl<'a> Worker<'a> {
     }
 
     /// Notes how a member ended.
-    fn end(&self, part: &mut Part, lane: usize, assigned: &Assignment, pace: &Pace<f64>) {
+    fn end(&self, part: &mut Part, lane: usize, assigned: &Assignment, pace: &Pace<f64>, status: Option<Status>) {
         let times = self.plan.at.len();
         let status = if assigned.next == times {
             Status::Ok
+        } else if let Some(status) = status {
+            status
         } else if pace.accepted + pace.rejected >= self.plan.budget as f64 {
             Status::Budget
         } else if pace.error < f64::INFINITY {

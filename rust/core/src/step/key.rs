@@ -35,6 +35,8 @@ pub enum StepKind {
     Matrix {
         /// Times of the inputs, as fractions of a step, by their bits.
         nodes: Vec<u64>,
+        /// Whether each product after the first is added by one fused multiply-add.
+        fused: bool,
     },
 }
 

@@ -47,7 +47,7 @@ pub(crate) fn recorded(signature: &Signature, names: &[String]) -> Result<usize,
 /// Approximate numbers of operations of the rates of a scene and of a step.
 pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) -> Result<(usize, usize), Error> {
     Ok(match how {
-        StepKind::Matrix { nodes } => {
+        StepKind::Matrix { nodes, .. } => {
             let n = shape.v + shape.y;
             let products = n * (n + signature.whole("inputs") * nodes.len());
             (2 * products, 2 * products)
@@ -80,6 +80,6 @@ pub(super) fn has_series(how: &StepKind) -> Result<bool, Error> {
     })
 }
 
-/// The most operations, approximately, of a step that is one tape in any case: by a series, one that is given, or one of members
-/// that have times of their own. It takes some ten nanoseconds a byte to compile.
+/// The most operations, approximately, of a step that is one tape in any case: by a series, one that is given, one that is fused,
+/// or one of members that have times of their own. It takes some ten nanoseconds a byte to compile.
 pub(super) const MAX_LONG_TAPE_OPERATIONS: usize = 100_000;

@@ -81,8 +81,8 @@ impl TapeKey {
             if series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
                 return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
             }
-            if self.fused && !series && operations.1 > MAX_TAPE_OPERATIONS {
-                return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
+            if self.fused && !series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
+                return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
             }
             let own_times = self.signature.count(BEGINS) > 0;
             if own_times && operations.1 > MAX_LONG_TAPE_OPERATIONS {
@@ -112,7 +112,7 @@ impl TapeKey {
                 singles: OnceLock::new(),
                 key: self.clone(),
             };
-            let is_one = series || own_times || matches!(self.how, StepKind::Step(_));
+            let is_one = series || own_times || self.fused || matches!(self.how, StepKind::Step(_));
             let most = if is_one { MAX_LONG_TAPE_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
             Ok((traced, operations.1.min(most)))
         })

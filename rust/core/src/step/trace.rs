@@ -46,8 +46,8 @@ pub(crate) struct Steps {
 pub(crate) fn trace_step(tape: Tape, signature: &Signature, how: &StepKind) -> Result<Steps, Error> {
     let shape = shape(signature, how)?;
     match how {
-        StepKind::Matrix { nodes } => {
-            let (tape, next) = record(tape, || matrix(signature, shape, nodes));
+        StepKind::Matrix { nodes, fused } => {
+            let (tape, next) = record(tape, || matrix(signature, shape, nodes, *fused));
             Ok(Steps { tape, next, shape, terms: Vec::new() })
         }
         StepKind::Step(step) => {
@@ -141,7 +141,7 @@ pub(super) fn trace_by_terms(
 }
 
 /// s ← P·s + Σ Q·u; the sums run over s, then over the nodes and their inputs.
-fn matrix(signature: &Signature, shape: Shape, nodes: &[u64]) -> Vec<Id> {
+fn matrix(signature: &Signature, shape: Shape, nodes: &[u64], fused: bool) -> Vec<Id> {
     let (h, t) = (Symbol::new(Op::Step), time(signature));
     let p = parameters(signature, h);
     let n = shape.v + shape.y;
@@ -160,6 +160,17 @@ fn matrix(signature: &Signature, shape: Shape, nodes: &[u64]) -> Vec<Id> {
     let (of_state, of_inputs) = (p.numbers("p"), p.numbers("q"));
     // P by rows; Q by columns, nodes and inputs, each with a number for every row.
     let entry = |i: usize, j: usize| if j < n { of_state[i * n + j] } else { of_inputs[(j - n) * n + i] };
+    if fused {
+        let sum = |i: usize| {
+            let first = entry(i, 0) * columns[0];
+            columns
+                .iter()
+                .enumerate()
+                .skip(1)
+                .fold(first, |sum, (j, column)| Symbol::new(Op::MulAdd(entry(i, j).0, column.0, sum.0)))
+        };
+        return (0..n).map(|i| sum(i).0).collect();
+    }
     let made = products(n, columns.len(), |i, j| entry(i, j) * columns[j]);
     made.into_iter().map(|symbol| symbol.0).collect()
 }
