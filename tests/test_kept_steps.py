@@ -32,7 +32,7 @@ def test_equal_the_reference(every: int, method: str) -> None:
             continue
         v, y = 0.3 * rng.normal(size=(*system.v_shape, 5)), rng.normal(size=(*system.y_shape, 5))
         for end in (0.4, -0.4):
-            ask: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-5, "at": [end], "every": every, "max_steps": 60}
+            ask: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-5, "at": [end], "every": every, "max_steps": 500}
             same(*(sw.integrate(system, method, backend=backend, **ask) for backend in ("rust", "numpy")))
 
 
