@@ -12,6 +12,9 @@ import stepwell as sw
 #: Members of each run, and its steps.
 MEMBERS, STEPS, DT = 2, 4, 0.01
 
+#: Options that are given again with each piece of a run; the others go on with it.
+OF_A_PIECE = ("every", "record", "events", "form", "backend")
+
 Request = dict[str, Any]
 
 
@@ -134,18 +137,12 @@ def _run(kind: Kind, request: Request) -> None:
     system, method = kind.make(), options.pop("method")
     start: Request = {"v": 0.0, "y": kind.y}
     for piece in range(pieces):
-        if "tolerance" in options:
-            end = t0 + sign * DT * STEPS * (piece + 1)
-            steps: Request = {"at": np.array([end])}
+        if "tolerance" in request:
+            steps: Request = {"at": np.array([t0 + sign * DT * STEPS * (piece + 1)])}
         else:
-            steps = {"dt": sign * DT, "steps": STEPS}
-        if piece:
-            options = {name: value for name, value in options.items() if name not in ("t0", "tolerance", "control", "force")}
-            steps.pop("dt", None)
+            steps = {"steps": STEPS} if piece else {"dt": sign * DT, "steps": STEPS}
         run = sw.integrate(system, method, **start | options | steps)
-        if pieces > 1:
-            start = run.resume
-            options = {name: value for name, value in options.items() if name not in start}
+        start, options = {"resume": run}, {name: value for name, value in options.items() if name in OF_A_PIECE}
 
 
 def refusal(kind: Kind, names: tuple[str, ...]) -> str | None:

@@ -400,7 +400,7 @@ def test_each_member_its_tolerance() -> None:
         ({"at": 3.0}, ArgumentError, "at: expected times along the first axis"),
         ({"at": []}, ArgumentError, "at: expected times along the first axis"),
         ({"steps": 3}, ArgumentError, "steps: goes with fixed steps only"),
-        ({"every": 3, "form": "matrix"}, ArgumentError, "every, form: goes with fixed steps only"),
+        ({"start": "first_order", "form": "matrix"}, ArgumentError, "start, form: goes with fixed steps only"),
         ({"max_steps": 0}, ArgumentError, "max_steps: expected 1 or more"),
         ({"dt": -1.0}, ArgumentError, "dt: expected a step above zero"),
         ({"tolerance": np.ones(3), "y": np.ones(2)}, ArgumentError, "do not broadcast"),

@@ -324,7 +324,7 @@ def test_the_matrix_form(states: int, members: tuple[int, ...], method: str) -> 
         alone = sw.integrate(system, method, fused=True, **ask | {"v": v[:, 0], "y": y[:, 0]})
         assert np.array_equal(alone.y, runs[0].y[..., 0])
     halves = sw.integrate(system, method, fused=True, **ask | {"steps": 4})
-    rest = sw.integrate(system, method, steps=4, form="matrix", **halves.resume)
+    rest = sw.integrate(system, method, steps=4, form="matrix", resume=halves)
     assert np.array_equal(rest.y[-1], runs[0].y[-1])
 
 

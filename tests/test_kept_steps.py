@@ -82,7 +82,7 @@ def test_neither_threads_nor_room_change_a_bit(monkeypatch: pytest.MonkeyPatch) 
 def test_pieces_make_the_whole() -> None:
     """The steps count from the start of the first piece, and a piece begins with the state at its start."""
     whole, first = ensemble(), ensemble(at=[2.0])
-    rest = sw.integrate(sw.Pendulum(np.linspace(0.3, 4.0, 300)), "merson", at=[5.0], every=2, max_steps=400, **first.resume)
+    rest = sw.integrate(sw.Pendulum(np.linspace(0.3, 4.0, 300)), "merson", at=[5.0], every=2, max_steps=400, resume=first)
     for i in (0, 299):
         (t, y), (t1, y1), (t2, y2) = (
             [each[np.isfinite(run.t[:, i]), i] for each in (run.t, run.y)] for run in (whole, first, rest)

@@ -322,8 +322,6 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "an interval": ({"every": 2, "outcomes": "history"}, "every: goes with fixed steps only"),
     "an interval of reductions": ({"observe": 2}, "observe: goes with fixed steps only"),
     "a start": ({"start": "first_order"}, "start: goes with fixed steps only"),
-    "a force": ({"force": 1.0}, "force: goes with fixed steps only"),
-    "forces": ({"axes": {"force": [1.0, 2.0]}}, "axes: force: goes with fixed steps only"),
     "steps as an axis": ({"axes": {"dt": [0.1, 0.2]}}, "axes: dt: with a tolerance, dt is the step to try first"),
     "no times": ({"at": None}, "at: expected too with tolerance=: the times at which states are saved, such as at="),
     "times alone": (
