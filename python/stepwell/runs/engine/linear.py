@@ -116,9 +116,7 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
         linear_map[BEGINS] = plan.t0
     given = flat(linear_map, plan.batch)
     nodes = list(plan.method.nodes)
-    return _core.ModelSpec(
-        "matrix", plan.method.name, given, matrix=(nodes, n_v), fused=plan.fused, single=plan.single
-    )
+    return _core.ModelSpec("matrix", plan.method.name, given, matrix=(nodes, n_v), fused=plan.fused, single=plan.single)
 
 
 def _matrix_step(plan: Plan, P: Array, Q: Array) -> Callable[[float, Array], Array]:
