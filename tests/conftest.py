@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-pytest_plugins = ["pytester", "support.complete", "support.families", "support.snapshots"]
+pytest_plugins = ["pytester", "support.browser", "support.complete", "support.families", "support.snapshots"]
 
 #: Files that take longest, the longest first: with one of them last, one core would run it while the others wait.
 LONGEST = (

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,33 +9,13 @@ import numpy as np
 import pytest
 import stepwell as sw
 from support.abroad import bits
+from support.browser import needs_browser
 from support.explored import STEPS, expected, page, scene_of
 
-CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
-
-try:
-    from playwright.sync_api import Error, Page, sync_playwright
-except ImportError:  # what is skipped then needs no names
-    sync_playwright = None  # type: ignore[assignment]
-
-pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
-    pytest.mark.skipif(sync_playwright is None, reason="there is no playwright here; it is in the extra test"),
-]
+pytestmark = needs_browser
 
 #: Milliseconds that the page may take to show something on a busy machine.
 PATIENCE = 20_000
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with sync_playwright() as started:
-        try:
-            made = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        except Error as error:
-            pytest.skip(f"Chromium does not start here: {str(error)[:200]}")
-        yield made
-        made.close()
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +28,7 @@ class Shown:
 
     def __init__(self, browser: Any, file: str, words: str = "", **window: Any) -> None:
         self.context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | window))
-        self.page: Page = self.context.new_page()
+        self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
         self.complaints: list[str] = []
         self.page.on("console", lambda message: self.complaints.append(message.text))

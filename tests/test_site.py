@@ -11,7 +11,6 @@ import shutil
 import subprocess
 import sys
 import zlib
-from collections.abc import Iterator
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
@@ -24,15 +23,11 @@ from PIL import Image
 from stepwell.analysis import stability
 from stepwell.model import quaternion
 from stepwell.views import charts
+from support.browser import needs_browser
 
 pytest.importorskip("sphinx_gallery", reason="the extra docs is not installed")
 pytest.importorskip("myst_nb", reason="the extra docs is not installed")
 pytest.importorskip("furo", reason="the extra docs is not installed")
-
-try:
-    from playwright.sync_api import Error, sync_playwright
-except ImportError:  # what is skipped then needs no names
-    sync_playwright = None  # type: ignore[assignment]
 
 ROOT = Path(__file__).resolve().parents[1]
 #: What a fresh clone has of the site: what was built in docs/ before is left out.
@@ -42,7 +37,6 @@ LEFT_OUT = shutil.ignore_patterns("gallery", "__pycache__", "control")
 NOWHERE = "http://127.0.0.1:9"
 FEWEST_PICTURES = 24
 TUTORIALS = ("first_run", "choose_a_step", "keep_energy", "your_equations", "game_loop", "sweep")
-CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
 #: Attributes by which a page loads something, by element; a link that is only followed loads nothing.
 LOADS = {"script": "src", "img": "src", "iframe": "src", "source": "srcset", "video": "src", "link": "href", "object": "data"}
 
@@ -219,9 +213,6 @@ def test_every_public_name_is_in_the_reference_with_an_example(site: Path) -> No
 
 # ---- in a browser
 
-needs_browser = pytest.mark.skipif(
-    CHROMIUM is None or sync_playwright is None, reason="there is no Chromium or no playwright here"
-)
 
 SEEN = (
     *("index", "tutorials/first_run", "tutorials/sweep", "howto/usage", "gallery/index", "gallery/motion/heavy_top"),
@@ -235,17 +226,6 @@ SEEN = (
     ),
 )
 PHONE, DESKTOP = {"width": 390, "height": 844}, {"width": 1280, "height": 900}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with sync_playwright() as started:
-        try:
-            made = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        except Error as error:
-            pytest.skip(f"Chromium does not start here: {str(error)[:200]}")
-        yield made
-        made.close()
 
 
 @needs_browser
