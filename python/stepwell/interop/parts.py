@@ -48,7 +48,7 @@ def kinds(base: type[Any] = Immutable) -> dict[str, type[Any]]:
     while todo:
         for each in todo.pop().__subclasses__():
             todo.append(each)
-            if each.__module__.partition(".")[0] == "stepwell":
+            if each.__module__.startswith("stepwell.") and not each.__module__.startswith("stepwell.views."):
                 found[each.__name__] = each
     return found
 

@@ -82,6 +82,8 @@ def of(resume: Any) -> Continuation:
 
 
 def _of_run(run: Run) -> Continuation:
+    if run.is_part:
+        raise ArgumentError("resume: expected a run with its last state, got a part of one without it, as of run.select")
     if (stopped := int(np.count_nonzero(run.status >= Status.EVENT))) > 0:
         raise UnsupportedError(
             f"resume: {share(stopped, run.status.shape, run.status.size)} stopped at an event, "

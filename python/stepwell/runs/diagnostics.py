@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 from math import prod
 from typing import Any, NamedTuple
@@ -54,8 +55,11 @@ class Ends(NamedTuple):
     moved: Array
 
 
-def findings_of(run: Run, request: Request) -> tuple[Finding, ...]:
-    """What is noticed of a run: how it ended, and what means nothing, as far as that is seen at little cost."""
+def findings_of(run: Run, request: Request, heard: Callable[[type[Warning]], bool]) -> tuple[Finding, ...]:
+    """What is noticed of a run: how it ended, and what means nothing, as far as that is seen at little cost.
+
+    What takes longer than to look at the end is looked for where somebody hears of it.
+    """
     noticed = list(run.findings)
     if run.paces is None:
         if run.system.keeper is not None:
@@ -69,18 +73,18 @@ def findings_of(run: Run, request: Request) -> tuple[Finding, ...]:
     # What an event makes of a state tells nothing of the steps, and what a method carries not where it began.
     began = not request.carried and request.before is None and not any(event.then for event in request.events or ())
     start = (request.v, request.y) if began else None
-    noticed += _of_nonsense(run, start, request)
+    noticed += _of_nonsense(run, start, request, heard)
     if run.paces is None and start is not None and (growth := registry.task("growth_of")(run, start)) is not None:
         noticed.append(growth)
     return tuple(noticed)
 
 
-def _of_nonsense(run: Run, start: State | None, request: Request) -> list[Finding]:
+def _of_nonsense(run: Run, start: State | None, request: Request, heard: Callable[[type[Warning]], bool]) -> list[Finding]:
     """What is finite and yet means nothing; ``start`` is None if it went on from what a method carries."""
     system = run.system
     if not isinstance(system, NBody):
         about = system.doubt(run.y)
-        if about is None:
+        if about is None and heard(AccuracyWarning):
             about = known_energy.told(run, start, None if request.adaptive is None else partial(_visited, request))
         return [] if about is None else [Finding(AccuracyWarning, *about)]
     noticed = []
@@ -89,11 +93,13 @@ def _of_nonsense(run: Run, start: State | None, request: Request) -> list[Findin
         energy = None if ends is None else _of_energy(run.method.name, ends)
         if energy is None and system.keeps_energy and start is not None:
             energy = _of_massless(run, system, start)
-        met = None if run.encounter is None else _of_encounters(run, system, start, None if energy is None else energy[2])
+        met = None
+        if run.encounter is not None and heard(AccuracyWarning):
+            met = _of_encounters(run, system, start, None if energy is None else energy[2])
         if parts := [part for part in (energy, met) if part is not None]:
             members = np.logical_or.reduce([part[1] for part in parts])
             noticed.append(Finding(AccuracyWarning, "; ".join(part[0] for part in parts), members))
-    if (overshot := _of_a_control(run, system, start)) is not None:
+    if heard(ControlWarning) and (overshot := _of_a_control(run, system, start)) is not None:
         noticed.append(Finding(ControlWarning, *overshot))
     return noticed
 

@@ -26,6 +26,14 @@ class Finding(NamedTuple):
     members: np.ndarray[Any, np.dtype[np.bool_]]
 
 
+def is_heard(category: type[Warning]) -> bool:
+    """Whether a warning is not ignored altogether: what takes a while to look for need not be looked for then."""
+    for action, message, ignored, module, _ in warnings.filters:
+        if message is None and module is None and issubclass(category, ignored):
+            return action != "ignore"
+    return True
+
+
 def warn_of(findings: Iterable[Finding], stacklevel: int = 2) -> None:
     """Warn of findings, as of the caller of the function that calls this."""
     for each in findings:

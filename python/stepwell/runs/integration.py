@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..model.controls import AnyControl
@@ -10,7 +10,7 @@ from ..model.methods import Method
 from ..model.systems import System
 from .adaptive import adaptive_run
 from .diagnostics import findings_of
-from .findings import warn_of
+from .findings import is_heard, warn_of
 from .fixed import fixed_run
 from .request import Options, Request
 from .result import Run
@@ -152,17 +152,22 @@ def integrate(
         v, y, dt, steps, every, tolerance, at, control, force, record, events, form, fused, dtype, t0, start, max_steps, max_step,
         jumps, positive, progress, threads, backend, start_step, resume,
     )  # fmt: skip
-    request = Request.of(system, method, options)
-    run = step(request)
-    if noticed := findings_of(run, request):
-        run.findings = noticed
-        warn_of(noticed)
+    run = noticing(Request.of(system, method, options), is_heard)
+    warn_of(run.findings)
     return run
 
 
 def step(request: Request) -> Run:
     """The run that was asked for. It is not looked at what it means, and nothing is warned of."""
     return fixed_run(request) if request.adaptive is None else adaptive_run(request)
+
+
+def noticing(request: Request, heard: Callable[[type[Warning]], bool] = lambda _: True) -> Run:
+    """The run that was asked for, with its findings; what takes a while to find is looked for if it is ``heard``."""
+    run = step(request)
+    if findings := findings_of(run, request, heard):
+        run.findings = findings
+    return run
 
 
 def quietly(system: System, method: str | Method, **options: Any) -> Run:

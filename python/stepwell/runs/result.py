@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -139,6 +140,8 @@ class Run(ValueEquality):
     #: Names of the events that change the state, ``Event(…, then=…)``.
     changed_by: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+    #: Whether its last state is left out; see ``select``.
+    is_part: bool = False
 
     def __init__(
         self,
@@ -199,6 +202,30 @@ class Run(ValueEquality):
     def dtype(self) -> str:
         """Of the states, and of the arithmetic of the steps: "float64" or "float32"."""
         return str(self.y.dtype)
+
+    def select(self, saved: Any) -> Run:
+        """The run with some of its saved states; what is known of the whole run stays, such as how members ended, and its events.
+
+        Without the last state it is not one from which another run goes on.
+
+        Args:
+            saved: which, by an index of the first axis: a number, which leaves that axis, a slice, numbers or truths.
+
+        Example:
+            >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=1)
+            >>> run.select(slice(0, None, 50)).t
+            array([ 0.,  5., 10.])
+            >>> run.select(run.y < -0.99).t[[0, -1]].round(1)
+            array([3. , 9.5])
+            >>> run.select(-1).y.shape
+            (1,)
+        """
+        places = np.atleast_1d(np.arange(len(self.t))[saved])
+        part = copy.copy(self)
+        part.t, part.v, part.y = self.t[places], self.v[places], self.y[places]
+        part.recorded = {name: values[places] for name, values in self.recorded.items()}
+        part.is_part = self.is_part or not len(places) or bool(places[-1] != len(self.t) - 1)
+        return part
 
     def _held(self) -> dict[str, Any]:
         """All attributes but the functions that go through the steps again, which follow from the others."""

@@ -21,7 +21,7 @@ from ..model.controls import AnyControl, a_control
 from ..model.methods import Method
 from ..model.systems import System
 from ..model.systems.base import a_system
-from ..runs.integration import integrate
+from ..runs.integration import integrate, quietly
 from ..runs.result import Run
 
 #: So many times of the horizon give the exact solution's scale. Where a block differs by more than STEEP of its largest length
@@ -150,12 +150,15 @@ class Scene(ValueEquality):
             raise ArgumentError(
                 f"{', '.join(taken)}: expected the scene's own, which need not be given; for others there is stepwell.integrate"
             )
+        return integrate(self.system, method, **self.options_of_run(dt=dt, steps=steps, **options))
+
+    def options_of_run(self, *, dt: float | None = None, steps: int | None = None, **options: Any) -> dict[str, Any]:
+        """The arguments of ``integrate`` with which ``run`` calls it."""
+        options = {"v": self.v, "y": self.y, "control": self.control} | options
         if "tolerance" in options or "at" in options:
-            run_options: dict[str, Any] = {"control": self.control, "at": [self.horizon]} | self.adaptive_options | options
-            return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **run_options)
+            return {"at": [self.horizon], "dt": dt, "steps": steps} | self.adaptive_options | options
         dt = self.dt if dt is None else dt
-        steps = self.steps_for(dt) if steps is None else steps
-        return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
+        return options | {"dt": dt, "steps": self.steps_for(dt) if steps is None else steps}
 
     @property
     def adaptive_options(self) -> dict[str, Any]:
@@ -208,11 +211,15 @@ class Scene(ValueEquality):
             ArgumentError: if the scene has no exact solution, or the run is of another system.
         """
         self._check(run)
-        exact, known = self._solution(run.t)
+        return self.state_error_at(run.t, run.v, run.y)
+
+    def state_error_at(self, t: Array, v: Array, y: Array) -> Array:
+        """The same of states at these times, wherever they come from."""
+        exact, known = self._solution(t)
         with np.errstate(all="ignore"):
             errors = [
                 _relative(_length(block - true, shape), scale)
-                for block, true, shape, scale in zip((run.v, run.y), exact, self._shapes, self.scales, strict=True)
+                for block, true, shape, scale in zip((v, y), exact, self._shapes, self.scales, strict=True)
             ]
         error = np.maximum(*errors)
         return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
@@ -227,9 +234,13 @@ class Scene(ValueEquality):
             ArgumentError: if the scene has no exact solution, or the run is of another system.
         """
         self._check(run)
-        (true_v, true_y), known = self._solution(run.t)
+        return self.energy_error_at(run.t, run.energy)
+
+    def energy_error_at(self, t: Array, energy: Array) -> Array:
+        """The same of energies at these times, wherever they come from."""
+        (true_v, true_y), known = self._solution(t)
         with np.errstate(all="ignore"):
-            error = np.abs(run.energy - self._energy(true_v, true_y)) / self._kinetic_scale
+            error = np.abs(energy - self.energies(true_v, true_y)) / self._kinetic_scale
         return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
 
     def amplitude(self, run: Run) -> Array:
@@ -286,7 +297,7 @@ class Scene(ValueEquality):
     @cached_property
     def _kinetic_scale(self) -> float:
         v, y = self._sampled
-        return float((self._energy(v, y) - self._energy(np.zeros_like(v), y)).max())
+        return float((self.energies(v, y) - self.energies(np.zeros_like(v), y)).max())
 
     @property
     def _shapes(self) -> tuple[Shape, Shape]:
@@ -311,8 +322,10 @@ class Scene(ValueEquality):
                 raise NotFiniteError(f"exact: expected finite numbers, got {name} = {block[t == wrong][0]} at t = {wrong:g}")
         return (v, y), t <= self.until * (1.0 + TIME_ROUNDING)
 
-    def _energy(self, v: Array, y: Array) -> Array:
-        return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
+    def energies(self, v: Array, y: Array) -> Array:
+        """The energy of each of several states."""
+        with np.errstate(all="ignore"):
+            return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
 
     def _repr_html_(self) -> str:
         """A table for notebooks."""
@@ -331,6 +344,11 @@ class Scene(ValueEquality):
 
     def __repr__(self) -> str:
         return f"<scene {self.name}: {self.title}, dt = {self.dt:g}, horizon {self.horizon:g}>"
+
+
+def quiet_run(scene: Scene, method: str | Method, dt: float | None = None, **options: Any) -> Run:
+    """The same as ``scene.run``, for what judges the run by itself: nothing is looked for in it, and nothing warned of."""
+    return quietly(scene.system, method, **scene.options_of_run(dt=dt, **options))
 
 
 def _relative(length: Array, scale: float) -> Array:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Array
-from ..errors import AccuracyWarning, ArgumentError, ToleranceWarning
-from ..runs.integration import integrate
+from ..errors import ArgumentError
+from ..runs.integration import quietly
 from ..runs.result import Run
 from .base import Scene
 
@@ -101,10 +100,7 @@ class Tight:
         return run, False
 
     def _run(self, at: Array, on: dict[str, Any]) -> Run:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ToleranceWarning)
-            warnings.simplefilter("ignore", AccuracyWarning)
-            return integrate(self.scene.system, METHOD, at=at, max_steps=MAX_STEPS, **on)
+        return quietly(self.scene.system, METHOD, at=at, max_steps=MAX_STEPS, **on)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Tight, self._arguments

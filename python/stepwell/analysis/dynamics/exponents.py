@@ -19,7 +19,7 @@ from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.interrupts import POLL, available
 from ...base.reprs import counted, share
-from ...errors import ArgumentError, DivergenceWarning, ShapeError, ToleranceWarning, UnsupportedError
+from ...errors import ArgumentError, DivergenceWarning, ShapeError, UnsupportedError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
 from ...model.methods import method as find_method
@@ -31,7 +31,7 @@ from ...reference.log import log
 from ...reference.trig import cos
 from ...runs import engine
 from ...runs.events.members import Members
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ..derivatives.traced import Traced, together
 from ..stability import maps
 from ..stability.analysis import velocities
@@ -173,9 +173,7 @@ def lyapunov(
     if tolerance is not None or at is not None:
         if wrong := [name for name, value in (("steps", steps), ("every", every)) if value is not None]:
             raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ToleranceWarning)  # of single intervals
-            found = adaptive_averages(system, method, v, y, tolerance, at, dt=dt, **given)
+        found = adaptive_averages(system, method, v, y, tolerance, at, dt=dt, **given)
     else:
         if missing := [name for name, value in (("dt", dt), ("steps", steps)) if value is None]:
             raise ArgumentError(f"{' and '.join(missing)}: expected with fixed steps; for adaptive steps give tolerance= and at=")
@@ -300,7 +298,7 @@ def adaptive_averages(
         first, *parts = (each(going) for each in asked)
         given: dict[str, Any] = {"tolerance": tuple(parts) if isinstance(tolerance, tuple) else parts[0]}
         given |= {"dt": first if i == 0 else None, "max_steps": max_steps, "threads": threads}
-        run = integrate(left, how, v=states[:n_v, going], y=beside, t0=begin, at=[end], **given)
+        run = quietly(left, how, v=states[:n_v, going], y=beside, t0=begin, at=[end], **given)
         states[:, going] = np.concatenate([run.v[-1], run.y[-1, :n_y]])
         vectors[..., going], lengths = _orthonormal(run.y[-1, n_y:].reshape(n, k, -1) / unit)
         grown[:, going] += _log(lengths)

@@ -7,7 +7,6 @@ measures steps, ``predict`` uses eigenvalues, ``outcome`` makes rows of what was
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, TypeVar
@@ -16,9 +15,10 @@ from ...base import checks
 from ...errors import ArgumentError, TooLargeError, UnsupportedError
 from ...model.methods import Method, choice
 from ...runs import float32
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...scenes import Scene
 from ...scenes import scene as find_scene
+from ...scenes.base import quiet_run
 from ..measuring.timing import TIMED_STEP
 from . import predict
 from .adaptive import AdaptiveTrials
@@ -197,33 +197,31 @@ def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
     if candidate.by == "tolerance" and scene.system.contacts:
         return "adaptive steps do not go with surfaces"
     dt = TIMED_STEP * scene.dt
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            if candidate.dtype == "float32":
-                float32.step(scene.system, candidate.method, "direct", grid.dt(candidate.first))
-                float32.check_inputs(scene.system, (1.0 + SINGLE_STEP_ROUNDING) * grid.end)
-                scene.run(candidate.method, dt, steps=1, dtype="float32")
-            elif candidate.by == "step":
-                scene.run(candidate.method, dt, steps=1)
-            else:
-                integrate(
-                    scene.system,
-                    candidate.method,
-                    v=scene.v,
-                    y=scene.y,
-                    tolerance=1.0,
-                    at=[dt],
-                    max_steps=1,
-                    **scene.adaptive_options,
-                )
-        except UnsupportedError as error:
-            return str(error).removeprefix(f"{candidate.method.name} ").removeprefix("dtype: ")
-        except ArgumentError as error:
-            # Such a scene was made, so nothing is wrong with it but numbers that float32 does not have.
-            if candidate.dtype == "float64":
-                raise
-            return str(error)
+    try:
+        if candidate.dtype == "float32":
+            float32.step(scene.system, candidate.method, "direct", grid.dt(candidate.first))
+            float32.check_inputs(scene.system, (1.0 + SINGLE_STEP_ROUNDING) * grid.end)
+            quiet_run(scene, candidate.method, dt, steps=1, dtype="float32")
+        elif candidate.by == "step":
+            quiet_run(scene, candidate.method, dt, steps=1)
+        else:
+            quietly(
+                scene.system,
+                candidate.method,
+                v=scene.v,
+                y=scene.y,
+                tolerance=1.0,
+                at=[dt],
+                max_steps=1,
+                **scene.adaptive_options,
+            )
+    except UnsupportedError as error:
+        return str(error).removeprefix(f"{candidate.method.name} ").removeprefix("dtype: ")
+    except ArgumentError as error:
+        # Such a scene was made, so nothing is wrong with it but numbers that float32 does not have.
+        if candidate.dtype == "float64":
+            raise
+        return str(error)
     return None
 
 

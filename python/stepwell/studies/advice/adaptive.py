@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -16,9 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...base.arrays import Array
-from ...errors import AccuracyWarning, ToleranceWarning
 from ...model.methods import Method
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...runs.result import Run
 from .motion import Motion, looked_up
 from .trials import Trial
@@ -118,11 +116,8 @@ class AdaptiveTrials:
     def _integrated(self, method: Method, tolerance: float, at: Array, share: float) -> Run:
         self.runs += 1
         scene, most = self.scene, max(1, int(share * self.most / method.attempt_evaluations))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ToleranceWarning)
-            warnings.simplefilter("ignore", AccuracyWarning)
-            options: dict[str, Any] = {"tolerance": tolerance, "at": at, "max_steps": most} | scene.adaptive_options
-            run = integrate(scene.system, method, v=scene.v, y=scene.y, **options)
+        options: dict[str, Any] = {"tolerance": tolerance, "at": at, "max_steps": most} | scene.adaptive_options
+        run = quietly(scene.system, method, v=scene.v, y=scene.y, **options)
         assert run.paces is not None
         self.work += int(run.paces.evaluations)
         return run
@@ -146,10 +141,7 @@ class AdaptiveTrials:
     def _legs(self, method: Method, leg: Leg, ends: Iterable[int]) -> Iterator[Leg]:
         """From where a leg ended to the end of one frame after the other, or of several at once."""
         for end in ends:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", ToleranceWarning)
-                warnings.simplefilter("ignore", AccuracyWarning)
-                run = integrate(self.scene.system, method, at=self.asked[leg.end : end], max_steps=10**9, **leg.on)
+            run = quietly(self.scene.system, method, at=self.asked[leg.end : end], max_steps=10**9, **leg.on)
             assert run.paces is not None
             leg = Leg(end, {"resume": run}, int(run.paces.evaluations) // method.attempt_evaluations)
             yield leg

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import copy
 import math
-import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import AccuracyWarning, ControlWarning, DivergenceWarning
 from ...model.methods import Method
 from ...runs import engine
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...runs.result import Run
+from ...scenes.base import quiet_run
 from ..measuring.measure import grew
 from .motion import Motion
 
@@ -107,15 +106,8 @@ class Trials:
         if key not in self._dense:
             trial = self.look(method, dt, steps)
             run = self._last[1] if self._last and self._last[0] == key else self._run(method, dt, steps)
-            run = _part(
-                run,
-                np.arange(
-                    0,
-                    len(run.t),
-                    max(1, math.ceil(len(run.t) * max(self.numbers / MAX_SAVED_NUMBERS, 1.0 / MAX_CONFIRMED_STATES))),
-                ),
-            )
-            error = float(self.scene.state_error(run).max())
+            some = math.ceil(len(run.t) * max(self.numbers / MAX_SAVED_NUMBERS, 1.0 / MAX_CONFIRMED_STATES))
+            error = float(self.scene.state_error(run.select(slice(None, None, max(1, some)))).max())
             self._dense[key] = trial._replace(error=max(trial.error, error))
         return self._dense[key]
 
@@ -142,14 +134,11 @@ class Trials:
         worst, done, pieces = 0.0, 0, []
         state: dict[str, Any] = {"v": self.scene.v, "y": self.scene.y, "dt": dt, "control": self.scene.control}
         state["dtype"] = self.dtype
-        with warnings.catch_warnings():
-            for kind in (DivergenceWarning, ControlWarning, AccuracyWarning):
-                warnings.simplefilter("ignore", kind)
-            while done < steps and worst <= self.lost:
-                number = min(piece, steps - done)
-                pieces.append(run := integrate(self.scene.system, method, steps=number, every=every, **state))
-                done, state = done + number, {"resume": run}
-                worst = max(worst, float(self.scene.state_error(_part(run, np.array([-1])))[0]))
+        while done < steps and worst <= self.lost:
+            number = min(piece, steps - done)
+            pieces.append(run := quietly(self.scene.system, method, steps=number, every=every, **state))
+            done, state = done + number, {"resume": run}
+            worst = max(worst, float(self.scene.state_error(run.select(-1))[0]))
         self.work += self.evaluations(method) * done
         whole = copy.copy(pieces[-1])
         for name in ("t", "v", "y"):
@@ -164,29 +153,18 @@ class Trials:
     def _run(self, method: Method, dt: float, steps: int) -> Run:
         self.runs += 1
         self.work += self.evaluations(method) * steps
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DivergenceWarning)
-            warnings.simplefilter("ignore", ControlWarning)
-            warnings.simplefilter("ignore", AccuracyWarning)
-            return self._known(self.scene.run(method, dt, steps=steps, every=self._every(steps), dtype=self.dtype))
+        return self._known(quiet_run(self.scene, method, dt, steps=steps, every=self._every(steps), dtype=self.dtype))
 
     def _known(self, run: Run) -> Run:
         """The run as far as the true motion is known: steps that were rounded to float32 may end after it."""
         if self.dtype == "float64" or run.t[-1] <= self.until:
             return run
-        return _part(run, np.flatnonzero(run.t <= self.until))
+        return run.select(run.t <= self.until)
 
     def _marked(self, run: Run) -> Run:
         """The states at the marks; the last is one of them."""
-        return _part(run, np.unique(np.searchsorted(run.t, np.minimum(self.marks, run.t[-1]))))
+        return run.select(np.unique(np.searchsorted(run.t, np.minimum(self.marks, run.t[-1]))))
 
     def _grown(self, run: Run) -> bool:
         amplitude, half = self.scene.amplitude(run), int(np.searchsorted(run.t, 0.5 * run.t[-1]))
         return grew(amplitude, half)
-
-
-def _part(run: Run, places: np.ndarray[Any, np.dtype[np.int64]]) -> Run:
-    """The run with these of its saved states."""
-    part = copy.copy(run)
-    part.t, part.v, part.y = run.t[places], run.v[places], run.y[places]
-    return part

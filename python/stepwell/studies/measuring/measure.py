@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 import statistics
-import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from ...base.arrays import Array
-from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, ToleranceWarning, UnsupportedError
+from ...errors import ArgumentError, UnsupportedError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
 from ...runs import engine
-from ...runs.integration import integrate
-from ...runs.result import Run
+from ...runs.integration import quietly
 from ...scenes import Scene
+from ...scenes.base import quiet_run
 from .data import Curve, Point, Timing
 from .peers import Peer, Solved
 from .timing import MOST_TRIED
@@ -56,11 +55,8 @@ def refusal(scene: Scene, method: Method) -> str | None:
 
 def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = False, dtype: str = "float64") -> Point:
     """Run the scene with a fixed step and measure its errors."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DivergenceWarning)
-        warnings.simplefilter("ignore", AccuracyWarning)
-        run = scene.run(method, dt, steps=steps, every=max(1, steps // SAMPLES), fused=fused, dtype=dtype)
-    state_error, end_error, energy_error = _errors(scene, run)
+    run = quiet_run(scene, method, dt, steps=steps, every=max(1, steps // SAMPLES), fused=fused, dtype=dtype)
+    state_error, end_error, energy_error = _errors(scene, run.t, run.v, run.y, lambda: run.energy)
     amplitude = scene.amplitude(run)
     return Point(
         steps=steps,
@@ -70,7 +66,7 @@ def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = Fa
         energy_error=energy_error,
         unstable=state_error > 1.0 and grew(amplitude, len(amplitude) // 2),
         end_error=end_error,
-        phase_error=_phase(scene, run, state_error),
+        phase_error=_phase(scene, run.t, run.v, run.y, state_error),
     )
 
 
@@ -91,13 +87,10 @@ def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool
     Its cost includes rejected steps, and the extra steps for the state at the end, but not those for the other output times.
     """
     times = output_times(scene)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ToleranceWarning)
-        warnings.simplefilter("ignore", AccuracyWarning)
-        motion: dict[str, Any] = {"v": scene.v, "y": scene.y, "tolerance": tolerance, "at": times} | scene.adaptive_options
-        run = integrate(scene.system, method, **motion, dt=scene.dt, max_steps=MOST_TRIED, fused=fused)
+    motion: dict[str, Any] = {"v": scene.v, "y": scene.y, "tolerance": tolerance, "at": times} | scene.adaptive_options
+    run = quietly(scene.system, method, **motion, dt=scene.dt, max_steps=MOST_TRIED, fused=fused)
     assert run.paces is not None
-    state_error, end_error, energy_error = _errors(scene, run)
+    state_error, end_error, energy_error = _errors(scene, run.t, run.v, run.y, lambda: run.energy)
     tried = int(run.paces.accepted + run.paces.rejected) + EXTRA_STEPS
     stopped = bool(run.status != 0)
     return Point(
@@ -108,7 +101,7 @@ def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool
         energy_error=math.inf if stopped else energy_error,
         unstable=stopped,
         end_error=math.inf if stopped else end_error,
-        phase_error=None if stopped else _phase(scene, run, state_error),
+        phase_error=None if stopped else _phase(scene, run.t, run.v, run.y, state_error),
         tolerance=tolerance,
     )
 
@@ -132,22 +125,7 @@ def assess_peer(scene: Scene, peer: Peer) -> Curve:
 def _of_peer(scene: Scene, times: Array, solved: Solved, by: str, setting: float) -> Point:
     shape = (len(times), *scene.v.shape), (len(times), *scene.y.shape)
     v, y = (np.asarray(block, dtype=np.float64).reshape(s) for block, s in zip((solved.v, solved.y), shape, strict=True))
-    run = Run(
-        t=times,
-        v=v,
-        y=y,
-        status=np.zeros((), dtype=np.int8),
-        first_bad_step=np.asarray(-1),
-        carry=None,
-        system=scene.system,
-        method=None,  # type: ignore[arg-type]  # of no method; only its states are used
-        dt=setting,
-        t0=0.0,
-        start_step=0,
-        steps=0,
-        start=None,
-    )
-    state_error, end_error, energy_error = _errors(scene, run)
+    state_error, end_error, energy_error = _errors(scene, times, v, y, lambda: scene.energies(v, y))
     return Point(
         steps=None if by == "tolerance" else round(scene.horizon / setting),
         dt=None if by == "tolerance" else setting,
@@ -156,26 +134,26 @@ def _of_peer(scene: Scene, times: Array, solved: Solved, by: str, setting: float
         energy_error=energy_error,
         unstable=not math.isfinite(state_error),
         end_error=end_error,
-        phase_error=_phase(scene, run, state_error),
+        phase_error=_phase(scene, times, v, y, state_error),
         tolerance=setting if by == "tolerance" else None,
     )
 
 
-def _errors(scene: Scene, run: Run) -> tuple[float, float, float]:
+def _errors(scene: Scene, t: Array, v: Array, y: Array, energies: Callable[[], Array]) -> tuple[float, float, float]:
     """The largest state error, that at the end, and the largest energy error."""
-    state = scene.state_error(run)
+    state = scene.state_error_at(t, v, y)
     try:
-        energy = float(scene.energy_error(run).max())
+        energy = float(scene.energy_error_at(t, energies()).max())
     except UnsupportedError:  # a system without an energy of its own
         energy = math.nan
     return float(state.max()), float(state[-1]), energy
 
 
-def _phase(scene: Scene, run: Run, state_error: float) -> float | None:
+def _phase(scene: Scene, t: Array, v: Array, y: Array, state_error: float) -> float | None:
     """The phase error, where it means something: in a motion with a period, and a state that has a digit right."""
     if scene.period is None or not state_error <= 1.0:
         return None
-    return phase_error(scene, run.v[-1], run.y[-1], float(run.t[-1]))
+    return phase_error(scene, v[-1], y[-1], float(t[-1]))
 
 
 def phase_error(scene: Scene, v: Array, y: Array, t: float) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from statistics import median
@@ -12,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...base.arrays import Array
-from ...errors import AccuracyWarning, ControlWarning, ToleranceWarning
 from ...model.methods import Method
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...scenes import Scene
 from .data import Timing
 
@@ -77,7 +75,7 @@ class Batch:
 
         def timed(steps: int) -> tuple[float, int]:
             scene, begin = self.scene, time.perf_counter()
-            integrate(scene.system, method, v=self._v, y=self._y, dt=TIMED_STEP * scene.dt, steps=steps, threads=1, **options)
+            quietly(scene.system, method, v=self._v, y=self._y, dt=TIMED_STEP * scene.dt, steps=steps, threads=1, **options)
             return time.perf_counter() - begin, steps
 
         return timed
@@ -109,32 +107,29 @@ class Batch:
     def _tried(self, method: Method, v: Array, y: Array, end: float, tolerance: float, most: int, fused: bool) -> int:
         adaptive: dict[str, Any] = {"tolerance": tolerance, "at": [end], "dt": 1e-3 * end, "max_steps": most}
         adaptive |= self.scene.adaptive_options
-        run = integrate(self.scene.system, method, v=v, y=y, threads=1, fused=fused, **adaptive)
+        run = quietly(self.scene.system, method, v=v, y=y, threads=1, fused=fused, **adaptive)
         assert run.paces is not None
         return int(run.paces.evaluations.max()) // method.attempt_evaluations
 
 
 def in_turns(runs: Mapping[str, Timed], effort: Effort, members: int) -> dict[str, list[float]]:
     """Nanoseconds per step and member of each run, several times; the first time is of when its number of steps was chosen."""
-    with warnings.catch_warnings():
-        for kind in (ControlWarning, ToleranceWarning, AccuracyWarning):
-            warnings.simplefilter("ignore", kind)
-        begun = time.perf_counter()
-        sizes: dict[str, int] = {}
-        times: dict[str, list[float]] = {}
+    begun = time.perf_counter()
+    sizes: dict[str, int] = {}
+    times: dict[str, list[float]] = {}
+    for name, timed in runs.items():
+        n, (seconds, steps) = 1, timed(1)
+        # The quicker of two counts: a call that something else held up would look long enough. One far too long is not.
+        while seconds < MUCH * effort.seconds and min(seconds, timed(n)[0]) < effort.seconds:
+            n *= 2
+            seconds, steps = timed(n)
+        sizes[name], times[name] = n, [1e9 * seconds / (steps * members)]
+    for _ in range(effort.repeats):
+        if time.perf_counter() - begun > effort.slow:
+            break
         for name, timed in runs.items():
-            n, (seconds, steps) = 1, timed(1)
-            # The quicker of two counts: a call that something else held up would look long enough. One far too long is not.
-            while seconds < MUCH * effort.seconds and min(seconds, timed(n)[0]) < effort.seconds:
-                n *= 2
-                seconds, steps = timed(n)
-            sizes[name], times[name] = n, [1e9 * seconds / (steps * members)]
-        for _ in range(effort.repeats):
-            if time.perf_counter() - begun > effort.slow:
-                break
-            for name, timed in runs.items():
-                seconds, steps = timed(sizes[name])
-                times[name].append(1e9 * seconds / (steps * members))
+            seconds, steps = timed(sizes[name])
+            times[name].append(1e9 * seconds / (steps * members))
     return times
 
 

@@ -18,6 +18,7 @@ from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import System
 from ...runs import float32
+from ...runs.findings import warn_of
 from . import adaptive, happenings
 from .adaptive import Evaluations
 from .axes import OF_THE_RUN, Chunk, Grid
@@ -283,6 +284,7 @@ def _probe(task: Task, grid: Grid) -> tuple[System, str, set[str]]:
         index = np.unravel_index(member, grid.shape)
         one = Chunk(tuple(map(int, index)), tuple(slice(int(i), int(i) + 1) for i in index), (1,) * len(index), member)
         tested = probed(task, grid.values(one))
+        warn_of(tested.findings, 3)
         for block in tested.state:
             digest.update(np.where(np.isnan(block), np.nan, block).tobytes())
         if member == 0:

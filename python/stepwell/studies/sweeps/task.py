@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -17,12 +15,14 @@ from ...analysis import growth as _growth
 from ...analysis.growth import Growth
 from ...base import checks
 from ...base.arrays import Array
-from ...errors import AccuracyWarning, DivergenceWarning, EventWarning, ShapeError, ToleranceWarning, UnsupportedError
+from ...errors import ShapeError, UnsupportedError
 from ...model.compatibility import velocities
 from ...model.systems import System
 from ...model.systems.base import a_system
-from ...runs.integration import integrate
-from ...runs.request import spread
+from ...runs.diagnostics import of_a_strong_control
+from ...runs.findings import Finding
+from ...runs.integration import quietly, step
+from ...runs.request import Options, Request, spread
 from ...runs.result import Run
 from .adaptive import NUMBERS_OF_A_CONTROLLER, lost
 from .axes import OF_THE_RUN
@@ -160,7 +160,7 @@ def prepared(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]
 
 def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], bool] | None = None) -> Done:
     """Compute a chunk of members."""
-    with _quiet(), _listening(stopped), np.errstate(all="ignore"):  # members that diverge are told of by their status
+    with _listening(stopped), np.errstate(all="ignore"):  # members that diverge are told of by their status
         system, options = prepared(task, values)
         start = options
         for each in _pieces(task, system, options, members, task.transient, None, stopped):
@@ -169,7 +169,7 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
         functions = task.kinds(Function)
         if functions:
             saved: dict[str, Any] = {"steps": task.steps, "every": task.every} if task.at is None else {"at": task.at}
-            last = integrate(system, task.method, **saved, **start)
+            last = quietly(system, task.method, **saved, **start)
             _as_many(last, members)
             parts += [each.of_run(last) for each in functions]
         if task.reductions or not functions:
@@ -229,21 +229,7 @@ def _thinned(task: Task, outcome: Outcome, piece: Run, first: int, since: int) -
     wanted = number % step == 0
     wanted[-1] |= piece.start_step + piece.steps >= task.transient + task.steps
     wanted[:since] = False
-    return Piece(_Chosen(piece, wanted), 0)  # type: ignore[arg-type]
-
-
-class _Chosen:
-    """Some of the saved states of a run."""
-
-    def __init__(self, run: Run, wanted: Any) -> None:
-        self._run, self._wanted = run, wanted
-        self.t, self.v, self.y = run.t[wanted], run.v[wanted], run.y[wanted]
-
-    def quantity(self, name: str) -> Array:
-        return np.asarray(self._run.quantity(name)[self._wanted])
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._run, name)
+    return Piece(piece.select(wanted), 0)
 
 
 def _pieces(
@@ -264,7 +250,7 @@ def _pieces(
     done, going_on = 0, start
     while done < steps:
         _stop(stopped)
-        piece = integrate(system, task.method, steps=min(length, steps - done), every=between, **going_on)
+        piece = quietly(system, task.method, steps=min(length, steps - done), every=between, **going_on)
         _as_many(piece, members)
         done += piece.steps
         if done < steps:
@@ -281,7 +267,7 @@ def _pieces_between_times(
     going_on = start
     for first in range(0, task.at.size, length):
         _stop(stopped)
-        piece = integrate(system, task.method, at=task.at[first : first + length], **going_on)
+        piece = quietly(system, task.method, at=task.at[first : first + length], **going_on)
         _as_many(piece, members)
         if first + length < task.at.size:
             going_on = _going_on(start, piece)
@@ -318,30 +304,35 @@ def _as_many(run: Run, members: int) -> None:
 
 
 class Probed(NamedTuple):
-    """What the first steps of a member tell: the system, the state after them, and the names of what is found piece by piece."""
+    """What the first steps of a member tell: the system, the state after them, and the names of what is found piece by piece.
+
+    ``findings`` are of its control, which chunks do not look at.
+    """
 
     system: System
     state: tuple[Array, Array]
     names: set[str]
+    findings: tuple[Finding, ...] = ()
 
 
 def probed(task: Task, values: dict[str, Any]) -> Probed:
     """The first steps of one member: errors in what was given show here, before any work, and so does what is computed."""
-    with _quiet():
-        system, options = prepared(task, values)
-        for each in task.outcomes:
-            each.check(system)
-        if task.kinds(History) and task.every is None and task.at is None:
-            raise UnsupportedError("every: expected how many steps are between the states of a history")
-        if task.at is not None:
-            few = min(PROBED_STEPS, options.get("max_steps", PROBED_STEPS))
-            begun = integrate(system, task.method, at=task.at, **(options | {"max_steps": few}))
-            _as_many(begun, 1)
-            assert begun.controller_state is not None
-            return Probed(begun.system, (begun.controller_state.v, begun.controller_state.y), _names(task, begun))
-        first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **options)
-        _as_many(first, 1)
-        return Probed(first.system, (first.v[-1], first.y[-1]), _names(task, first))
+    system, options = prepared(task, values)
+    for each in task.outcomes:
+        each.check(system)
+    if task.kinds(History) and task.every is None and task.at is None:
+        raise UnsupportedError("every: expected how many steps are between the states of a history")
+    if task.at is not None:
+        few = min(PROBED_STEPS, options.get("max_steps", PROBED_STEPS))
+        begun = quietly(system, task.method, at=task.at, **(options | {"max_steps": few}))
+        _as_many(begun, 1)
+        assert begun.controller_state is not None
+        return Probed(begun.system, (begun.controller_state.v, begun.controller_state.y), _names(task, begun))
+    request = Request.of(system, task.method, Options(steps=min(PROBED_STEPS, task.transient + task.steps), **options))
+    first = step(request)
+    _as_many(first, 1)
+    strong = of_a_strong_control(request.system, request.v, request.y, request.plan.dt)
+    return Probed(first.system, (first.v[-1], first.y[-1]), _names(task, first), tuple(strong))
 
 
 def _names(task: Task, run: Run) -> set[str]:
@@ -357,32 +348,3 @@ def _names(task: Task, run: Run) -> set[str]:
 
 #: Of so many steps the bits tell one sweep from another.
 PROBED_STEPS = 3
-
-
-# ---- warnings
-
-_lock = threading.Lock()
-_quiet_runs = 0
-_caught = warnings.catch_warnings()
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Without the warnings of single runs, which a sweep sums up; in any number of threads, since filters are those of all."""
-    global _quiet_runs, _caught
-    with _lock:
-        _quiet_runs += 1
-        if _quiet_runs == 1:
-            _caught = warnings.catch_warnings()
-            _caught.__enter__()
-            warnings.simplefilter("ignore", DivergenceWarning)
-            warnings.simplefilter("ignore", AccuracyWarning)
-            warnings.simplefilter("ignore", ToleranceWarning)
-            warnings.simplefilter("ignore", EventWarning)
-    try:
-        yield
-    finally:
-        with _lock:
-            _quiet_runs -= 1
-            if _quiet_runs == 0:
-                _caught.__exit__(None, None, None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -12,12 +11,12 @@ import numpy as np
 from ...base import checks
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
-from ...errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning, ShapeError
+from ...errors import ArgumentError, ShapeError
 from ...model import controls
 from ...model.methods import Method
 from ...model.systems import System
 from ...runs import engine
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...runs.result import Run
 
 #: States of a run, evenly spaced, that are saved to measure energy, lengths and coordinates.
@@ -121,12 +120,9 @@ class Runs:
             held = controls.Projection(kind)
         shape = (*self.system.v_shape, len(relative))
         v, y = (np.broadcast_to(block[..., np.newaxis], shape) for block in (self.v, self.y))
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
+        with np.errstate(all="ignore"):
             # That much gain is too much is what the chart shows.
-            warnings.simplefilter("ignore", DivergenceWarning)
-            warnings.simplefilter("ignore", AccuracyWarning)
-            warnings.simplefilter("ignore", ControlWarning)
-            run = integrate(self.system, method, v=v, y=y, dt=dt, steps=steps, every=max(1, steps // SAVED_STATES), control=held)
+            run = quietly(self.system, method, v=v, y=y, dt=dt, steps=steps, every=max(1, steps // SAVED_STATES), control=held)
             energy = np.abs(run.energy - self.energy).max(axis=0) / self.kinetic
             largest = np.abs(run.y).max(axis=tuple(range(run.y.ndim - 1)))
             rods = "length_error" in self.system.quantities

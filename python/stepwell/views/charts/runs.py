@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +16,7 @@ from ...base.pictures import Drawn
 from ...base.tables import Table
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...runs.encounters import MAX_RERUN
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...runs.known_energy import keeps_energy
 from ...runs.result import Run
 from ...scenes import Scene
@@ -113,22 +112,20 @@ class RunPicture(Drawn, Table, ValueEquality):
         if run.system.keeper is None or run.paces is not None or run.events or run.steps * run.v[0].size > MAX_RERUN:
             return None
         first, second = (round((float(t) - run.t0) / run.dt) for t in run.t[:2])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the picture shows what they would say
-            free = integrate(
-                run.system.uncontrolled,
-                run.method,
-                v=run.v[0],
-                y=run.y[0],
-                dt=run.dt,
-                steps=run.steps,
-                every=second - first,
-                t0=run.t0,
-                start_step=run.start_step,
-                start=run.start,
-                force=run.force,
-                fused=run.fused,
-            )
+        free = quietly(
+            run.system.uncontrolled,
+            run.method,
+            v=run.v[0],
+            y=run.y[0],
+            dt=run.dt,
+            steps=run.steps,
+            every=second - first,
+            t0=run.t0,
+            start_step=run.start_step,
+            start=run.start,
+            force=run.force,
+            fused=run.fused,
+        )
         state_error = None if self.state_error is None else self.scene.state_error(free)
         return replace(self, run=free, energy_error=_energy_error(self.scene, free)[0], state_error=state_error)
 

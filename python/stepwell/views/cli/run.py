@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import warnings
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,10 +14,10 @@ import numpy as np
 
 from ...base import checks
 from ...base.pictures import new_figure
-from ...errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning, ToleranceWarning
+from ...errors import ArgumentError
 from ...model.controls import WAYS, AnyControl, EnergyControl, Projection
-from ...runs.integration import integrate
-from ...runs.request import FORMS
+from ...runs.integration import noticing
+from ...runs.request import FORMS, Options, Request
 from ...runs.result import Run
 from ...scenes import Scene
 from ..charts import RunPicture, run_picture
@@ -91,12 +90,9 @@ def command(args: argparse.Namespace) -> None:
         options["start"] = args.start
     if args.form != "direct":
         options |= {"form": args.form, "record": ()}
-    with warnings.catch_warnings(record=True) as warned:
-        for kind in (AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning):
-            warnings.simplefilter("always", kind)
-        run = _fixed(args, chosen, to_draw, options) if args.tolerance is None else _adaptive(args, chosen, to_draw, options)
-    for warning in warned:
-        print(f"stepwell: warning: {warning.message}", file=sys.stderr)
+    run = _fixed(args, chosen, to_draw, options) if args.tolerance is None else _adaptive(args, chosen, to_draw, options)
+    for finding in run.findings:
+        print(f"stepwell: warning: {finding.message}", file=sys.stderr)
 
     picture = run_picture(chosen, run)
     columns: dict[str, Any] = picture.columns()
@@ -124,7 +120,7 @@ def _fixed(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: dict
     dt = chosen.dt if args.dt is None else args.dt
     steps = chosen.steps_for(dt) if args.steps is None else args.steps
     every = max(1, steps // (KEPT_TO_DRAW if to_draw else KEPT)) if args.every is None else args.every
-    return chosen.run(args.method, dt, steps=steps, every=every, **options)
+    return _noticing(chosen, args, dt=dt, steps=steps, every=every, **options)
 
 
 def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: dict[str, Any]) -> Run:
@@ -133,8 +129,11 @@ def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: d
         if getattr(args, option) is not None:
             raise ArgumentError(f"--{option}: goes with fixed steps only; with --tolerance the steps follow the error")
     at = np.linspace(0.0, chosen.horizon, 1 + (ADAPTIVE_TO_DRAW if to_draw else ADAPTIVE))
-    options |= chosen.adaptive_options | ({} if args.dt is None else {"dt": args.dt})
-    return integrate(chosen.system, args.method, v=chosen.v, y=chosen.y, tolerance=args.tolerance, at=at, **options)
+    return _noticing(chosen, args, dt=args.dt, tolerance=args.tolerance, at=at, **options)
+
+
+def _noticing(chosen: Scene, args: argparse.Namespace, **options: Any) -> Run:
+    return noticing(Request.of(chosen.system, args.method, Options(**chosen.options_of_run(**options))))
 
 
 def _shown(name: str, value: Any) -> str:

@@ -6,7 +6,6 @@ import base64
 import json
 import math
 import re
-import warnings
 import zlib
 from collections.abc import Sequence
 from typing import Any
@@ -16,7 +15,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...errors import StepwellError, UnsupportedError
 from ...model.methods import Method
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...scenes import Scene
 from ...scenes import scene as find_scene
 from ...scenes.taylor import Orbit
@@ -156,9 +155,8 @@ def sizes(scene: Scene) -> dict[str, Any]:
     else:
         steps = min(scene.steps_for(scene.dt), MAX_SIZE_STEPS)
         state: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": scene.dt, "steps": steps, "control": scene.control}
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a size need not be exact
-            run = integrate(scene.system, "rk4", **state, every=max(1, steps // SAMPLES))
+        with np.errstate(all="ignore"):  # a size need not be exact
+            run = quietly(scene.system, "rk4", **state, every=max(1, steps // SAMPLES))
         blocks = run.v, run.y
         rows = (block.reshape(len(block), -1) for block in blocks)
         lengths = [float(_finite(np.sqrt((row * row).sum(axis=1))).max(initial=0.0)) for row in rows]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...analysis.stability import stability_limit
 from ...model.systems.aircraft import Aircraft
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...scenes import scene
 from ..charts import run_picture
 from . import Finding, Section
@@ -32,7 +32,7 @@ def _draw(path: Path) -> object:
 )
 def aircraft_turns() -> Finding:
     """The steady turn for a commanded roll of 30°: the controllers have no integral part."""
-    run = integrate(Aircraft(roll=30.0), "false_euler", v=0.0, y=0.0, dt=0.1, steps=600, every=1)
+    run = quietly(Aircraft(roll=30.0), "false_euler", v=0.0, y=0.0, dt=0.1, steps=600, every=1)
     roll, pitch, _ = run.y[-1]
     turn = float(run.y[-1, 2] - run.y[-2, 2]) / 0.1
     holds = abs(roll - 27.17730) < 1e-4 and abs(pitch - 6.66655) < 1e-4 and abs(turn + 29.0658) < 1e-3
@@ -43,7 +43,7 @@ def aircraft_turns() -> Finding:
 def aircraft_controllers() -> Finding:
     """A roll of 10°, with and without controllers."""
     left = [
-        float(integrate(Aircraft(controllers=on), "false_euler", v=0.0, y=[10.0, 0.0, 0.0], dt=0.1, steps=200).y[-1, 0])
+        float(quietly(Aircraft(controllers=on), "false_euler", v=0.0, y=[10.0, 0.0, 0.0], dt=0.1, steps=200).y[-1, 0])
         for on in (True, False)
     ]
     return Finding(
@@ -76,7 +76,7 @@ def aircraft_trap() -> Finding:
     for form in ("euler", "quaternion"):
         system = Aircraft(form, **free)  # type: ignore[arg-type]
         start = system.attitude(pitch=90.0)
-        run = integrate(system, "false_euler", v=[0.0, 0.0, 1.0], y=start, dt=0.1, steps=1)
+        run = quietly(system, "false_euler", v=[0.0, 0.0, 1.0], y=start, dt=0.1, steps=1)
         jumps.append(float(np.abs(run.y[-1] - start).max()))
     holds = jumps[0] > 5e5 and jumps[1] < 0.06
     return Finding(
@@ -93,7 +93,7 @@ def aircraft_trap() -> Finding:
 def aircraft_energy() -> Finding:
     """The energy over 100 s without torques."""
     free = Aircraft(damping=np.zeros(3), gains=np.zeros(3), controllers=False)
-    run = integrate(free, "false_euler", v=[0.02, 0.5, 0.02], y=0.0, dt=0.1, steps=1000, every=1000)
+    run = quietly(free, "false_euler", v=[0.02, 0.5, 0.02], y=0.0, dt=0.1, steps=1000, every=1000)
     first, last = (float(energy) for energy in run.energy)
     return Finding(
         abs(first - 0.1254) < 1e-4 and abs(last - 0.1452) < 1e-4,

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...model.controls import EnergyControl
 from ...scenes import scene
+from ...scenes.base import quiet_run
 from ...scenes.builtin.energy_control import energy_control
 from ..charts import run_picture
 from . import Finding, Section
@@ -40,7 +41,7 @@ def clover() -> Finding:
 @section_c("advice", "The solution is not accurate but stable ad infinitum.", "`sw.scenes.clover()`")
 def clover_stays() -> Finding:
     """Radii over 100 000 steps."""
-    run = scene("clover").run("false_euler", steps=100_000, every=10)
+    run = quiet_run(scene("clover"), "false_euler", steps=100_000, every=10)
     radius = np.linalg.norm(run.y, axis=-1)
     return Finding(
         0.9 < radius.min() < radius.max() < 1.13, f"100 000 steps: radii from {radius.min():.3f} to {radius.max():.3f}"
@@ -49,13 +50,13 @@ def clover_stays() -> Finding:
 
 def _largest(**options: Any) -> float:
     scene = energy_control(pair="printed", form="printed")
-    run = scene.run("standard_euler", steps=100_000, every=100, **options)
+    run = quiet_run(scene, "standard_euler", steps=100_000, every=100, **options)
     return float(np.abs(run.y).max())
 
 
 def _draw_control(path: Path) -> object:
     scene = energy_control(pair="printed", form="printed")
-    free, held = (scene.run("standard_euler", steps=100_000, every=10, **options).y for options in ({"control": None}, {}))
+    free, held = (quiet_run(scene, "standard_euler", steps=100_000, every=10, **options).y for options in ({"control": None}, {}))
     return paths(
         path,
         "Energy control keeps three bodies together",
@@ -87,7 +88,7 @@ def energy_controlled() -> Finding:
 )
 def symmetric_start() -> Finding:
     """How near the three come to the centre within the first turn of the motion."""
-    run = energy_control(eps=0.0).run("leapfrog", dt=1e-4, steps=40_000, every=1, control=None)
+    run = quiet_run(energy_control(eps=0.0), "leapfrog", dt=1e-4, steps=40_000, every=1, control=None)
     radius = np.linalg.norm(run.y[:, 2], axis=-1)
     nearest = float(np.nanmin(radius))
     return Finding(nearest < 0.01, f"nearest to the centre: {nearest:.1e}")
@@ -100,8 +101,8 @@ def control_term() -> Finding:
     """One step by Standard Euler with and without the control, against the formula."""
     scene = energy_control(pair="printed", form="printed")
     control = EnergyControl(0.3, "printed", target=-2.0)
-    free = scene.run("standard_euler", steps=1, control=None)
-    held = scene.run("standard_euler", steps=1, control=control)
+    free = quiet_run(scene, "standard_euler", steps=1, control=None)
+    held = quiet_run(scene, "standard_euler", steps=1, control=control)
     energy = float(scene.system.energy(scene.v, scene.y))
     wanted = free.v[-1] - scene.dt * 0.3 * (energy + 2.0) * scene.v
     off = float(np.abs(held.v[-1] - wanted).max())

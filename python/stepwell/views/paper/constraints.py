@@ -10,7 +10,7 @@ import numpy as np
 
 from ...model.controls import LengthControl, NormControl, Projection
 from ...model.systems import NBody, Oscillator, Pendulum3D, RigidBody, Springs
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...scenes import scene
 from ...studies.advice import advise
 from ..charts import control as control_chart
@@ -30,7 +30,7 @@ section = Section("§12")
 def use_false_euler() -> Finding:
     """One oscillator of 60 Hz frames, near the limit, for an hour."""
     limit = 2.0 * 60.0
-    run = integrate(Oscillator(0.99 * limit), "false_euler", v=0.0, y=1.0, dt=1 / 60, steps=216_000, every=1)
+    run = quietly(Oscillator(0.99 * limit), "false_euler", v=0.0, y=1.0, dt=1 / 60, steps=216_000, every=1)
     largest = float(np.abs(run.y).max())
     return Finding(largest < 10.0, f"ω₀ at 99 % of the limit of 60 frames a second, an hour: largest |y| = {largest:.2f}")
 
@@ -45,7 +45,7 @@ def use_heun() -> Finding:
     grown = []
     for phi in (0.5, 0.1):
         steps = round(100 * 2 * math.pi / phi)
-        run = integrate(Oscillator(), "standard_heun", v=0.0, y=1.0, dt=phi, steps=steps)
+        run = quietly(Oscillator(), "standard_heun", v=0.0, y=1.0, dt=phi, steps=steps)
         grown.append(math.hypot(float(run.v[-1]), float(run.y[-1])))
     return Finding(
         grown[0] > 1000 > 1.1 > grown[1], f"amplitude after 100 periods: {grown[0]:.3g} at Φ = 0.5, {grown[1]:.4f} at Φ = 0.1"
@@ -61,11 +61,11 @@ def use_heun() -> Finding:
 def use_runge_kutta() -> Finding:
     """An eccentric orbit by Merson with a tolerance, and the growth of Fehlberg."""
     kepler = scene("kepler")
-    run = integrate(kepler.system, "merson", v=kepler.v, y=kepler.y, tolerance=1e-9, at=[kepler.horizon])
+    run = quietly(kepler.system, "merson", v=kepler.v, y=kepler.y, tolerance=1e-9, at=[kepler.horizon])
     error = float(kepler.state_error(run)[-1])
     grown = [
         math.hypot(float(r.v[-1]), float(r.y[-1])) - 1
-        for r in (integrate(Oscillator(), name, v=0.0, y=1.0, dt=0.2, steps=10_000) for name in ("merson", "fehlberg"))
+        for r in (quietly(Oscillator(), name, v=0.0, y=1.0, dt=0.2, steps=10_000) for name in ("merson", "fehlberg"))
     ]
     return Finding(
         error < 1e-3 and grown[0] < 0 < grown[1],
@@ -90,9 +90,9 @@ def satellite() -> Finding:
         "steps": 30_000,
     }
     runs = [
-        integrate(system, "rk4", **state),
-        integrate(system, "rk4", control=Projection("nacozy"), **state),
-        integrate(system, "leapfrog", **state),
+        quietly(system, "rk4", **state),
+        quietly(system, "rk4", control=Projection("nacozy"), **state),
+        quietly(system, "leapfrog", **state),
     ]
     radius = [float(np.linalg.norm(run.y[-1, 1] - run.y[-1, 0])) for run in runs]
     holds = abs(radius[0] - 1) > 0.05 and abs(radius[1] - 1) < 0.02 and abs(radius[2] - 1) < 0.02
@@ -119,7 +119,7 @@ def pendulum_in_space() -> Finding:
     for method in ("false_euler", "rk4"):
         for control in (LengthControl(0.5), Projection("length")):
             start: dict[str, Any] = {"v": 0.0, "y": [1.0, 0.0, 0.0], "dt": 0.01, "steps": 7500, "every": 5}
-            run = integrate(Pendulum3D(), method, **start, control=control, record="energy")
+            run = quietly(Pendulum3D(), method, **start, control=control, record="energy")
             errors[method, type(control)] = float(np.abs(run.recorded["energy"] - run.recorded["energy"][0]).max())
     euler, rk4 = ([errors[name, kind] for kind in (LengthControl, Projection)] for name in ("false_euler", "rk4"))
     return Finding(
@@ -145,7 +145,7 @@ def quaternion_norm() -> Finding:
     wrong = []
     start: dict[str, Any] = {"v": [0.0, 0.0, 2.0], "y": [1.0, 0.0, 0.0, 0.0], "dt": 0.1, "steps": 2000, "every": 1}
     for control in (Projection("norm"), NormControl(5.0)):
-        run = integrate(RigidBody([1.0, 1.0, 1.0]), "standard_euler", **start, control=control)
+        run = quietly(RigidBody([1.0, 1.0, 1.0]), "standard_euler", **start, control=control)
         angle = np.unwrap(np.arctan2(run.y[:, 3], run.y[:, 0]))
         wrong.append(float(angle[-1] - angle[-2]) / 0.1 - 1.0)
     phi = 0.1
@@ -172,7 +172,7 @@ def spring_nets() -> Finding:
     net = Springs([(i, i + 1) for i in range(9)], stiffness=100.0, rest=1.0, dim=2)
     y = np.stack([np.arange(10.0), np.zeros(10)], axis=1) + 0.01 * np.random.default_rng(1).normal(size=(10, 2))
     safe = float(net.safe_step("false_euler"))
-    runs = [integrate(net, "false_euler", v=0.0, y=y, dt=share * safe, steps=2000) for share in (0.99, 1.5)]
+    runs = [quietly(net, "false_euler", v=0.0, y=y, dt=share * safe, steps=2000) for share in (0.99, 1.5)]
     largest, bad = float(np.abs(runs[0].y[-1]).max()), int(runs[1].first_bad_step)
     return Finding(
         largest < 20.0 and bad > 0,

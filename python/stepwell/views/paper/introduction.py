@@ -10,7 +10,7 @@ import numpy as np
 from ...analysis.stability import analyse, criteria
 from ...model.surfaces import Floor
 from ...model.systems import LinearSystem, Oscillator, Particles, Sampled
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ...scenes import scene
 from ..charts import run_picture
 from . import Finding, Section
@@ -56,7 +56,7 @@ def elastic_reflection() -> Finding:
         system = Particles(gravity=0.0, floor=floor)
         y = np.stack([np.zeros(100), heights])[np.newaxis]
         v = np.array([0.0, -1.0])[np.newaxis, :, np.newaxis]
-        runs = [integrate(system, name, v=v, y=y, dt=1.0, steps=12) for name in ("false_euler", "leapfrog", "rk4")]
+        runs = [quietly(system, name, v=v, y=y, dt=1.0, steps=12) for name in ("false_euler", "leapfrog", "rk4")]
         grown.append(max(float((run.v[-1, 0, 1] ** 2).max()) for run in runs))
     return Finding(
         grown[0] > 1.4 and abs(grown[1] - 1.0) < 1e-14,
@@ -84,7 +84,7 @@ def angles() -> Finding:
 def state_space() -> Finding:
     """A lead element, whose transfer function (1 + 2s)/(1 + s) has numerator and denominator of the same degree."""
     system = LinearSystem([[-1.0]], [[1.0]], [[-1.0]], [[2.0]], x=[1.0], velocities=0)
-    run = integrate(system, "rk4", v=0.0, y=0.0, dt=0.01, steps=100, every=100)
+    run = quietly(system, "rk4", v=0.0, y=0.0, dt=0.01, steps=100, every=100)
     z = np.asarray(run.z).ravel()
     first, last = float(z[0]), float(z[-1])
     holds = first == 2.0 and abs(last - (1.0 + math.exp(-1.0))) < 1e-9
@@ -98,8 +98,8 @@ def state_space() -> Finding:
 )
 def forms() -> Finding:
     """Both forms, from the same start."""
-    canonical = integrate(Oscillator(2.0, 0.1), "rk4", v=0.5, y=1.0, dt=0.01, steps=500)
-    physical = integrate(Oscillator(2.0, 0.1, form="physical"), "rk4", v=1.0, y=1.0, dt=0.01, steps=500)
+    canonical = quietly(Oscillator(2.0, 0.1), "rk4", v=0.5, y=1.0, dt=0.01, steps=500)
+    physical = quietly(Oscillator(2.0, 0.1, form="physical"), "rk4", v=1.0, y=1.0, dt=0.01, steps=500)
     apart = abs(float(canonical.y[-1] - physical.y[-1]))
     return Finding(apart < 1e-14, "the same y after 500 steps, to rounding")
 
@@ -112,7 +112,7 @@ def forms() -> Finding:
 def overshoot() -> Finding:
     """The largest y of the step response; exact is exp(−π·D/√(1 − D²)) = exp(−π)."""
     system = Oscillator(damping=math.sqrt(0.5), x=1.0)
-    y = integrate(system, "rk4", v=0.0, y=0.0, dt=0.001, steps=8000, every=1).y
+    y = quietly(system, "rk4", v=0.0, y=0.0, dt=0.001, steps=8000, every=1).y
     over = float(y.max()) - 1.0
     return Finding(abs(over - math.exp(-math.pi)) < 1e-6, f"{100 * over:.2f} %")
 
@@ -140,6 +140,6 @@ def two_dampings() -> Finding:
 def inputs() -> Finding:
     """A held input moves the oscillator as a constant does while it lasts."""
     held = Oscillator(x=Sampled([1.0, 1.0], 100.0))
-    one, other = (float(integrate(each, "rk4", v=0.0, y=0.0, dt=0.01, steps=300).y[-1]) for each in (held, Oscillator(x=1.0)))
+    one, other = (float(quietly(each, "rk4", v=0.0, y=0.0, dt=0.01, steps=300).y[-1]) for each in (held, Oscillator(x=1.0)))
     exact = 1.0 - math.cos(3.0)
     return Finding(one == other and abs(one - exact) < 1e-9, f"y(3) = {one:.9f}, exactly 1 − cos 3 = {exact:.9f}")

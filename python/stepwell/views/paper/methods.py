@@ -13,7 +13,7 @@ from ...analysis.stability import Analysis, analyse, criteria, stability_limit
 from ...errors import UnsupportedError
 from ...model.methods import method
 from ...model.systems import Oscillator
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ..charts import figures, verlet_friction
 from . import Finding, Section
 
@@ -60,7 +60,7 @@ section_9, section_10, section_11 = (Section(f"§{n}") for n in (9, 10, 11))
 @section_5("algorithm", "All new values from old ones: v − Φy, y + Φv.", "`standard_euler`")
 def standard_euler() -> Finding:
     """One step by hand and by the method, bit for bit."""
-    run = integrate(Oscillator(), "standard_euler", v=0.3, y=0.7, dt=0.1, steps=1)
+    run = quietly(Oscillator(), "standard_euler", v=0.3, y=0.7, dt=0.1, steps=1)
     same = (float(run.v[-1]), float(run.y[-1])) == (0.3 + -0.1 * 0.7, 0.7 + 0.1 * 0.3)
     return Finding(same, "one step as printed, to the bit")
 
@@ -88,8 +88,8 @@ def damped_euler() -> Finding:
     """Its samples against those of Standard Euler with that damping."""
     phi = 0.3
     options: dict[str, Any] = {"v": 0.3, "y": 0.7, "dt": 0.3, "steps": 200}
-    own = integrate(Oscillator(), "damped_euler", **options)
-    damped = integrate(Oscillator(damping=0.5 * phi), "standard_euler", **options)
+    own = quietly(Oscillator(), "damped_euler", **options)
+    damped = quietly(Oscillator(damping=0.5 * phi), "standard_euler", **options)
     apart = abs(float(own.y[-1] - damped.y[-1]))
     return Finding(apart < 1e-12, "the same samples over 200 steps, to rounding")
 
@@ -130,7 +130,7 @@ figure(section_6, "damped_euler", "Harmonic samples.", "harmonic")
 @section_7("algorithm", "The second equation uses the new v: v − Φy, then y + Φv.", "`false_euler` (semi-implicit Euler)")
 def false_euler() -> Finding:
     """One step by hand and by the method, bit for bit."""
-    run = integrate(Oscillator(), "false_euler", v=0.3, y=0.7, dt=0.1, steps=1)
+    run = quietly(Oscillator(), "false_euler", v=0.3, y=0.7, dt=0.1, steps=1)
     v = 0.3 + -0.1 * 0.7
     return Finding((float(run.v[-1]), float(run.y[-1])) == (v, 0.7 + 0.1 * v), "one step as printed, to the bit")
 
@@ -180,8 +180,8 @@ figure(section_7, "false_euler", "Harmonic samples, a little too fast.", "harmon
 def verlet() -> Finding:
     """The samples of both from the same start."""
     options: dict[str, Any] = {"v": 0.4, "y": 1.0, "dt": 0.3, "steps": 200, "every": 1}
-    one = integrate(Oscillator(), "verlet", start="first_order", **options).y
-    other = integrate(Oscillator(), "false_euler", **options).y
+    one = quietly(Oscillator(), "verlet", start="first_order", **options).y
+    other = quietly(Oscillator(), "false_euler", **options).y
     apart = float(np.abs(one - other).max())
     same = float(np.abs(at("verlet").p - at("false_euler").p).max())
     return Finding(apart < 1e-12 and same < ROUNDING, "the same samples over 200 steps and the same p, to rounding")
@@ -197,7 +197,7 @@ def verlet_start() -> Finding:
     """The error of both starts, with the step halved."""
 
     def error(start: str, steps: int) -> float:
-        run = integrate(Oscillator(), "verlet", v=0.4, y=1.0, dt=5.0 / steps, steps=steps, start=start)
+        run = quietly(Oscillator(), "verlet", v=0.4, y=1.0, dt=5.0 / steps, steps=steps, start=start)
         return abs(float(run.y[-1]) - (math.cos(5.0) + 0.4 * math.sin(5.0)))
 
     orders = [math.log2(error(start, 1000) / error(start, 2000)) for start in ("first_order", "second_order")]
@@ -235,7 +235,7 @@ def verlet_and_friction() -> Finding:
     slides = chart.blocks[0]
     secant, right = float(slides.verlet[-1]), float(slides.false_euler[-1])
     try:
-        integrate(Oscillator(0.0, friction=4.9, form="physical"), "verlet", v=3.0, y=0.0, dt=1 / 60, steps=1)
+        quietly(Oscillator(0.0, friction=4.9, form="physical"), "verlet", v=3.0, y=0.0, dt=1 / 60, steps=1)
         refused = False
     except UnsupportedError:
         refused = True

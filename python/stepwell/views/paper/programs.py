@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...model.systems import Oscillator
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from . import Finding, Section
 
 section = Section("App. B")
@@ -26,9 +26,7 @@ def both_forms() -> Finding:
     options: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 200, "every": 1}
     apart = [
         float(
-            np.abs(
-                integrate(Oscillator(2.0), name, **options).y - integrate(Oscillator(2.0), name, form="matrix", **options).y
-            ).max()
+            np.abs(quietly(Oscillator(2.0), name, **options).y - quietly(Oscillator(2.0), name, form="matrix", **options).y).max()
         )
         for name in METHODS
     ]
@@ -47,6 +45,6 @@ def verlet_program() -> Finding:
     for _ in range(50):
         now, before = 2 * now - before + phi**2 * -now, now
         y.append(now)
-    run = integrate(Oscillator(), "verlet", v=0.0, y=1.0, dt=phi, steps=50, every=1, start="first_order")
+    run = quietly(Oscillator(), "verlet", v=0.0, y=1.0, dt=phi, steps=50, every=1, start="first_order")
     apart = float(np.abs(run.y - y).max())
     return Finding(apart < 1e-13, "the printed recursion and the method: the same samples, to rounding")

@@ -10,7 +10,7 @@ import numpy as np
 from ...analysis.stability import analyse
 from ...analysis.stability.analysis import KINDS
 from ...model.systems import LinearSystem, Oscillator
-from ...runs.integration import integrate
+from ...runs.integration import quietly
 from ..charts import figures
 from . import Finding, Section
 
@@ -105,7 +105,7 @@ def double_eigenvalue() -> Finding:
     """False Euler at Φ = 2 grows linearly; Merson at 2√3 does not grow."""
     phi = (2.0, 2.0 * math.sqrt(3.0))
     runs = [
-        integrate(Oscillator(), name, v=0.3, y=1.0, dt=dt, steps=1000)
+        quietly(Oscillator(), name, v=0.3, y=1.0, dt=dt, steps=1000)
         for name, dt in zip(("false_euler", "merson"), phi, strict=True)
     ]
     grown = [float(np.hypot(run.v[-1], run.y[-1]) / math.hypot(0.3, 1.0)) for run in runs]
