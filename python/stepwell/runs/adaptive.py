@@ -15,8 +15,8 @@ from .result import AdaptiveState, Paces, Run
 
 def adaptive_run(request: Request) -> Run:
     """Make the run; its diagnostics are for others."""
-    assert request.adaptive is not None
-    plan, (pacing, paces, t0, times, going_on, every, start), how = request.plan, request.adaptive, request.plan.method
+    assert request.step_control is not None
+    plan, (pacing, paces, t0, times, going_on, every, start), how = request.plan, request.step_control, request.plan.method
     ended, adapt, keeper = None, engine.adapt, None
     if every is not None:
         from .kept_steps import StepKeeper  # only such runs need it

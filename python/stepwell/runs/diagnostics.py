@@ -85,7 +85,7 @@ def _of_nonsense(run: Run, start: State | None, request: Request, heard: Callabl
     if not isinstance(system, NBody):
         about = system.doubt(run.y)
         if about is None and heard(AccuracyWarning):
-            about = known_energy.told(run, start, None if request.adaptive is None else partial(_visited, request))
+            about = known_energy.told(run, start, None if request.step_control is None else partial(_visited, request))
         return [] if about is None else [Finding(AccuracyWarning, *about)]
     noticed = []
     if run.force is None:
@@ -108,8 +108,8 @@ def _visited(request: Request, index: Whole) -> tuple[Array, Array, Array]:
     """Between which y some members have been at the ends of their steps, and how many attempts were rejected."""
     from .events.attempts import extremes  # only runs beside a barrier need it
 
-    assert request.adaptive is not None
-    return extremes(request.plan, request.adaptive.pacing, request.adaptive.paces, request.v, request.y, index)
+    assert request.step_control is not None
+    return extremes(request.plan, request.step_control.pacing, request.step_control.paces, request.v, request.y, index)
 
 
 def time_of(run: Run, step: int, index: Shape) -> float:

@@ -159,7 +159,7 @@ def integrate(
 
 def step(request: Request) -> Run:
     """The run that was asked for. It is not looked at what it means, and nothing is warned of."""
-    return fixed_run(request) if request.adaptive is None else adaptive_run(request)
+    return fixed_run(request) if request.step_control is None else adaptive_run(request)
 
 
 def noticing(request: Request, heard: Callable[[type[Warning]], bool] = lambda _: True) -> Run:

@@ -84,8 +84,8 @@ class Options(NamedTuple):
     resume: Any = None
 
 
-class Adaptive(NamedTuple):
-    """What a request has of adaptive steps.
+class StepControl(NamedTuple):
+    """What a request with adaptive steps has beside its plan.
 
     Attributes:
         pacing: the times at which states are saved, and how many steps may be made, as the engine takes them.
@@ -121,7 +121,7 @@ class Request(NamedTuple):
         start: how the method was started.
         progress: whether a bar is shown.
         slot: of a world, what the method carries beside ``v``.
-        adaptive: what there is of adaptive steps; None with fixed steps.
+        step_control: what adaptive steps need; None with fixed steps.
     """
 
     plan: engine.Plan
@@ -135,7 +135,7 @@ class Request(NamedTuple):
     start: str | None = None
     progress: bool = False
     slot: Array | None = None
-    adaptive: Adaptive | None = None
+    step_control: StepControl | None = None
 
     @classmethod
     def of(cls, system: System, method: str | Method, options: Options) -> Request:
@@ -144,7 +144,7 @@ class Request(NamedTuple):
         if options.resume is not None:
             options, before = _going_on(options)
         if options.tolerance is not None or options.at is not None or (before is not None and before.adaptive):
-            return cls.adaptive_steps(system, method, options, before)
+            return cls.adaptive(system, method, options, before)
         return cls.fixed(system, method, options, before)
 
     @classmethod
@@ -255,9 +255,7 @@ class Request(NamedTuple):
         return cls(plan, system, v, y, carried, bad, record, watched, started, checks.flag("progress", progress))
 
     @classmethod
-    def adaptive_steps(
-        cls, system: System, method: str | Method, options: Options, before: Continuation | None = None
-    ) -> Request:
+    def adaptive(cls, system: System, method: str | Method, options: Options, before: Continuation | None = None) -> Request:
         """A run in which every member has steps of its own."""
         how, system, v = _stepped(system, method, options.v, options.y)
         fused, single = _arithmetic(options.fused, options.dtype)
@@ -383,8 +381,8 @@ class Request(NamedTuple):
                 paces[engine.MOST_STEP] = most_step
         going_on = {"max_step": options.max_step, "jumps": options.jumps, "positive": options.positive}
         going_on = {name: each for name, each in going_on.items() if each is not None}
-        adaptive = Adaptive(pacing, paces, t0, times, going_on, every, standing)
-        return cls(plan, system, v, y, not pacing.begins, None, record, watched, progress=progress, adaptive=adaptive)
+        step_control = StepControl(pacing, paces, t0, times, going_on, every, standing)
+        return cls(plan, system, v, y, not pacing.begins, None, record, watched, progress=progress, step_control=step_control)
 
     @classmethod
     def in_place(cls, system: System, method: str | Method, options: Options) -> Request:
