@@ -208,7 +208,7 @@ def test_a_step_is_timed_per_member(monkeypatch):
         assert v.shape == y.shape == (3, 2, timing.CHARTS.members)
         clock += 1e-9 * steps * timing.CHARTS.members
 
-    monkeypatch.setattr(timing, "integrate", integrate)
+    monkeypatch.setattr(timing, "quietly", integrate)
     monkeypatch.setattr(timing.time, "perf_counter", lambda: clock)
     times = timing.step_times(sw.scenes.clover(), METHODS[:2])
     assert list(times) == [m.name for m in METHODS[:2]]
@@ -228,7 +228,7 @@ def test_a_tried_step_is_timed_per_member(monkeypatch, fused):
         tolerances.add((v.shape[2:], options["tolerance"]))
         return run
 
-    monkeypatch.setattr(timing, "integrate", integrate)
+    monkeypatch.setattr(timing, "quietly", integrate)
     monkeypatch.setattr(timing.time, "perf_counter", lambda: clock)
     monkeypatch.setattr(timing, "CHARTS", timing.CHARTS._replace(seconds=1e-6))
     scene = dataclasses.replace(sw.scenes.clover(), horizon=0.5)

@@ -411,13 +411,13 @@ def test_a_function_alone_makes_the_run_once(monkeypatch: pytest.MonkeyPatch) ->
     from stepwell.studies.sweeps import task
 
     made: list[int] = []
-    original = task.integrate
+    original = task.quietly
 
     def counted(*args: Any, **options: Any) -> sw.Run:
         made.append(options["steps"])
         return original(*args, **options)
 
-    monkeypatch.setattr(task, "integrate", counted)
+    monkeypatch.setattr(task, "quietly", counted)
 
     def end(run: sw.Run) -> Any:
         return run.y[-1]
