@@ -58,7 +58,7 @@ class Ends(NamedTuple):
 def findings_of(run: Run, request: Request, heard: Callable[[type[Warning]], bool]) -> tuple[Finding, ...]:
     """What is noticed of a run: how it ended, and what means nothing, as far as that is seen at little cost.
 
-    What takes longer than a look at the end is looked for only if its warning is ``heard``.
+    What takes longer than to evaluate the end is computed only if its warning is ``heard``.
     """
     noticed = list(run.findings)
     if run.paces is None:

@@ -306,7 +306,7 @@ def _as_many(run: Run, members: int) -> None:
 class Probed(NamedTuple):
     """What the first steps of a member tell: the system, the state after them, and the names of what is found piece by piece.
 
-    ``findings`` are of its control, which chunks do not look at.
+    ``findings`` are of its control, which chunks do not check.
     """
 
     system: System
