@@ -11,10 +11,11 @@ import pytest
 import stepwell as sw
 from stepwell import _core
 from stepwell.errors import ArgumentError, UnsupportedError
-from stepwell.reference.tape.single import fma
+from stepwell.reference.bits import SINGLE
+from stepwell.reference.tape.fma import fma
 from stepwell.runs import engine
 from stepwell.source.explanation import listing
-from stepwell.source.explanation.formula import ALL_SINGLE_BITS, number
+from stepwell.source.explanation.formula import number
 from stepwell.views import cli
 from support import explain
 from support.cases import SYSTEMS, drawn, fits
@@ -28,7 +29,7 @@ def _as_bits(x: Any) -> Any:
     if isinstance(x, int):
         return np.uint32(x)
     x = np.asarray(x)
-    return np.where(x, np.uint32(ALL_SINGLE_BITS), np.uint32(0)) if x.dtype == bool else x.astype(F).view(np.uint32)
+    return np.where(x, np.uint32(SINGLE.all_bits), np.uint32(0)) if x.dtype == bool else x.astype(F).view(np.uint32)
 
 
 def _on_bits(f: Any) -> Any:

@@ -15,7 +15,7 @@ import pytest
 import stepwell as sw
 from stepwell import _core
 from stepwell.reference import bits, log, trig
-from stepwell.reference.tape.fused import Evaluated
+from stepwell.reference.tape.evaluate import Evaluation
 from stepwell.reference.traced import Tracer
 from stepwell.source.exports.functions import FUNCTIONS, argument
 from stepwell.source.exports.head import STEPS
@@ -316,7 +316,7 @@ def masks() -> list[Journey]:
         tape = _core.Tape()
         tracer = Tracer(each.system, tape)
         symbols = tracer.step(sw.method("rk4"))
-        values = Evaluated.traced(tape, symbols, dict(enumerate(tracer.numbers)), [], fuse=False)([v, y], each.t0, each.dt)
+        values = Evaluation(tape, symbols, dict(enumerate(tracer.numbers)))([v, y], each.t0, each.dt)
         each.expected = [float(x) for x in values]
         made.append(each)
     return made
@@ -371,7 +371,7 @@ def test_bits_of_numbers(language: str, tmp_path: Path, monkeypatch: pytest.Monk
             every.append(Journey(Knot(1.1), method.name, v, y, steps=40, options={"backend": "numpy"}))
     for each in every:
         each.options = {}
-    monkeypatch.setattr("stepwell.reference.tape.fused.fused", lambda tape, roots: (list(tape), list(roots)))
+    monkeypatch.setattr("stepwell.reference.tape.evaluate.fused", lambda tape, roots, **_: (list(tape), list(roots)))
     every += masks()
     assert len({tuple(each.expected) for each in every}) == len(every)
     sources = [each.export(language, f"step_{i}").source for i, each in enumerate(every)]

@@ -17,8 +17,8 @@ from stepwell import _core
 from stepwell.errors import ArgumentError, DTypeError, TraceError, UnsupportedError
 from stepwell.reference import functions, trig
 from stepwell.reference.functions import single as own
-from stepwell.reference.tape.fused import odd_sum
-from stepwell.reference.tape.single import Steps, fma
+from stepwell.reference.tape.evaluate import Evaluation
+from stepwell.reference.tape.fma import fma, odd_sum
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
 from support.cases import SYSTEMS, Case, assert_same, cases, thinned
@@ -306,7 +306,7 @@ def test_where_two_roundings_would_differ() -> None:
 def function(f: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """A function of float32 by its tape."""
     tape = _core.Tape(single=True)
-    run = Steps(tape, [f(tape.state(0))], {}, False)
+    run = Evaluation(tape, [f(tape.state(0))], {})
 
     def of(x: Any) -> Any:
         with np.errstate(all="ignore"):

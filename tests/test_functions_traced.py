@@ -10,8 +10,8 @@ import stepwell as sw
 from stepwell import _core
 from stepwell.errors import TraceError
 from stepwell.reference import functions as fn
-from stepwell.reference.tape.fused import MEANING, Evaluated, fused
-from stepwell.reference.tape.operations import Operation
+from stepwell.reference.tape.evaluate import Evaluation
+from stepwell.reference.tape.replay import Replay
 from support import symbols
 from support.true_functions import COMPARE, OF_ONE, OF_TWO, SPECIALS, TRUE, arguments, errors, same
 
@@ -20,11 +20,8 @@ NAMES = [*OF_ONE, *OF_TWO]
 
 def as_it_stands(tape: Any, made: Any, state: list[np.ndarray]) -> np.ndarray:
     """What a tape makes, one operation after the other, none of them fused."""
-    operations, (root,) = tape.operations([made])
-    values: list[Any] = []
-    for kind, of, given in operations:
-        values.append(state[given] if kind == "state" else MEANING[kind](*(values[each] for each in of), given))
-    return np.broadcast_to(values[root], np.broadcast_shapes(*(each.shape for each in state)))
+    (value,) = Replay(*tape.operations([made]))(state, [])
+    return np.broadcast_to(value, np.broadcast_shapes(*(each.shape for each in state)))
 
 
 def patterns(seed: int, n: int) -> np.ndarray:
@@ -127,11 +124,7 @@ def test_fused_they_are_as_accurate(name: str) -> None:
     """Products that are exact stay so when they are fused, and the others lose a rounding."""
     given = arguments(name, np.random.default_rng(8), 400)
     tape = _core.Tape()
-    operations, roots = tape.operations([getattr(fn, name)(*map(tape.state, range(len(given))))])
-    plain = [Operation(kind, tuple(of), more) for kind, of, more in operations]
-    evaluated = Evaluated(*fused(plain, roots), {}, [])
-    with np.errstate(all="ignore"):
-        (found,) = evaluated(given, 0.0, 1.0)
+    (found,) = Evaluation(tape, [getattr(fn, name)(*map(tape.state, range(len(given))))], {}, fuse=True)(given)
     assert errors(found, name, given).max() < 1.0
 
 

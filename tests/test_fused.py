@@ -14,9 +14,10 @@ import stepwell as sw
 from hypothesis import given
 from hypothesis import strategies as st
 from stepwell import _core
-from stepwell.reference.tape.fused import exact_fma, fma, fused
+from stepwell.reference.tape.fma import exact_fma, fma
+from stepwell.reference.tape.fused import fused
 from stepwell.reference.tape.increments import increments_last
-from stepwell.reference.tape.operations import Operation, needed
+from stepwell.reference.tape.lines import Operation, listed, needed
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
 from support.cases import SOME, SYSTEMS, drawn, fits
@@ -69,11 +70,6 @@ def test_where_sums_cancel_and_halves_are_met() -> None:
     assert (got != a * b + c).mean() > 0.2  # it is another number often enough for this to be a test
 
 
-def operations(tape: Any, symbols: list[Any]) -> tuple[list[Operation], list[int]]:
-    listed, roots = tape.operations(symbols)
-    return [Operation(name, tuple(of), given) for name, of, given in listed], list(roots)
-
-
 @SOME
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_both_fuse_the_same(name: str, some: int | None) -> None:
@@ -84,8 +80,8 @@ def test_both_fuse_the_same(name: str, some: int | None) -> None:
     for method in drawn([each for each in METHODS if fits(system, each)], some and some // 2, name):
         tape = _core.Tape()
         symbols = Tracer(system, tape).step(method)
-        core = operations(*tape.fused(symbols))
-        plain, roots = operations(tape, symbols)
+        core = listed(*tape.fused(symbols))
+        plain, roots = listed(tape, symbols)
         assert core == needed(*fused(plain, roots)), method.name
         counts.append(sum(operation.name.count("multiply ") + (operation.name == "subtract multiply") for operation in core[0]))
     assert max(counts) > 0
@@ -127,7 +123,7 @@ def test_multiplying_increments_last_changes_roundings_alone(name: str) -> None:
         if not fits(system, method):
             continue
         tape = _core.Tape()
-        plain, roots = operations(tape, Tracer(system, tape).step(method))
+        plain, roots = listed(tape, Tracer(system, tape).step(method))
         numbers: dict[tuple[str, int], Fraction] = {}
         want = exactly(plain, roots, numbers)
         last, places = increments_last(plain, roots)
@@ -149,9 +145,9 @@ def test_which_of_two_negated_products_was_met_first_decides_nothing(by_core: bo
         deep = -((c + d) * d) if deep_first else None
         flat = -(a * b)
         total = flat + (-((c + d) * d) if deep is None else deep)
-        lines, roots = operations(tape, [total])
+        lines, roots = listed(tape, [total])
         plain.append(graph(lines, roots))
-        found.append(graph(*(operations(*tape.fused([total])) if by_core else fused(lines, roots))))
+        found.append(graph(*(listed(*tape.fused([total])) if by_core else fused(lines, roots))))
     assert plain[0] != plain[1]
     assert found[0] == found[1]
 
@@ -177,9 +173,9 @@ def test_the_order_of_writing_decides_nothing() -> None:
             products = [z * x, x * y] if turned else [x * y, z * x]
             p, q = products[::-1] if turned else products
             total = q + p if swapped else p + q
-            listed, _ = operations(*tape.fused([total]))
-            [line] = [operation for operation in listed if operation.name == "multiply add"]
-            found.add(frozenset(listed[each].given for each in line.of[:2]))
+            lines, _ = listed(*tape.fused([total]))
+            [line] = [operation for operation in lines if operation.name == "multiply add"]
+            found.add(frozenset(lines[each].extra for each in line.of[:2]))
     assert len(found) == 1
 
 

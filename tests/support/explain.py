@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import stepwell as sw
 from stepwell import _core
-from stepwell.reference.tape.fused import fma
+from stepwell.reference.tape.fma import fma
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
 from stepwell.source.explanation import listing

@@ -158,6 +158,10 @@ class Symbol:
     def __eq__(self, other: object) -> bool:
         raise TypeError("a symbol has no truth value: choose between two numbers")
 
+    def constant(self, bits: int) -> Any:
+        """A number that is known beforehand, by its bits."""
+        return self.tape.write("const", struct.pack("<Q", bits))
+
     def and_bits(self, bits: int) -> Any:
         """Its bits and those of a constant."""
         return self.tape.write("and_bits", self.id, bits)
@@ -166,8 +170,10 @@ class Symbol:
         """Its bits or those of a constant."""
         return self.tape.write("or_bits", self.id, bits)
 
-    def add_bits(self, whole: int) -> Any:
+    def add_bits(self, whole: Any) -> Any:
         """Its bits as a whole number, and another."""
+        if isinstance(whole, Symbol):
+            return self._write("add_both", self, whole)
         return self.tape.write("add_bits", self.id, whole)
 
     def shift_up(self, places: int) -> Any:
@@ -208,7 +214,7 @@ DONE: dict[str, Callable[..., Any]] = {
     "sqrt": np.sqrt,
     "less": operator.lt,
     "at_most": operator.le,
-    "both": operator.and_,
+    "both": lambda a, b: a & b if a.dtype == bool else _on_bits(operator.and_)(a, b),
     "either": _either,
     "floor": np.floor,
     "equal": operator.eq,
@@ -217,6 +223,7 @@ DONE: dict[str, Callable[..., Any]] = {
     "and_bits": _on_bits(operator.and_),
     "or_bits": _on_bits(operator.or_),
     "add_bits": _on_bits(operator.add),
+    "add_both": _on_bits(operator.add),
     "shift_up": _on_bits(operator.lshift),
     "shift_down": _on_bits(operator.rshift),
     "xor_bits": _on_bits(operator.xor),

@@ -11,13 +11,26 @@ import re
 import unicodedata
 from collections.abc import Iterable
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
 from ..base.checks import short
 from ..errors import UnknownNameError
 
-if TYPE_CHECKING:
-    from .methods import Method
+
+class Named(Protocol):
+    """What a method's record says of its names."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def title(self) -> str: ...  # noqa: D102
+    @property
+    def other_names(self) -> tuple[str, ...]: ...  # noqa: D102
+    @property
+    def false_friends(self) -> tuple[str, ...]: ...  # noqa: D102
+
+
+M = TypeVar("M", bound=Named)
 
 #: Below this similarity (``difflib``, 0 to 1) two names are not taken for one with a typing error.
 MIN_SIMILARITY = 0.5
@@ -76,7 +89,7 @@ def spelling(name: str) -> str:
     return "_".join([word for word in words if word not in OPTIONAL_WORDS] or words)
 
 
-def names_of(methods: Iterable[Method]) -> Names:
+def names_of(methods: Iterable[Named]) -> Names:
     """The names in the records of these methods."""
     found = Names({}, {}, {}, {})
     methods = list(methods)
@@ -103,7 +116,7 @@ def names_of(methods: Iterable[Method]) -> Names:
     return found
 
 
-def resolved(name: str, methods: dict[str, Method]) -> Method:
+def resolved(name: str, methods: dict[str, M]) -> M:
     """The method of a name that is not simply its own.
 
     Raises:
@@ -165,5 +178,5 @@ def _without_remark(name: str) -> str:
 
 
 @cache
-def _names(methods: tuple[Method, ...]) -> Names:
+def _names(methods: tuple[Named, ...]) -> Names:
     return names_of(methods)

@@ -1,36 +1,84 @@
-"""What a step does with numbers beside arithmetic and square roots: comparisons, choices, operations on their bits.
+"""Operations on numbers that a step needs beside arithmetic: comparisons, choices, roots, operations on bits.
 
-On numbers NumPy does it. The elements of an array of objects do it themselves: symbols, which write the tape of a step, and
-numbers that count what is done to them. So what a step executes has no ``if`` on a number, and takes all this from here.
+Each takes numbers, NumPy's arrays, symbols of a tape, and arrays of symbols. On numbers NumPy does it; symbols, and whatever else
+stands in an array of objects, do it themselves. So what a step executes has no ``if`` on a number, and takes all this from here.
 """
 
+from __future__ import annotations
+
 import operator
-from typing import Any
+import struct
+from typing import Any, NamedTuple
 
 import numpy as np
 
-
-def _objects(*given: Any) -> bool:
-    """Whether any of these is made of objects."""
-    return any(np.asarray(each).dtype == object for each in given)
+#: Of a number's bits: its sign, and all others. A tape of float32 has its own in their place.
+SIGN, NOT_SIGN = 1 << 63, (1 << 63) - 1
 
 
-def _asked(name: str, given: Any, *more: Any) -> Any:
-    """The method of that name, applied to every element."""
-    return np.frompyfunc(lambda each, *rest: getattr(each, name)(*rest), 1 + len(more), 1)(given, *more)
+class Precision(NamedTuple):
+    """Numbers of one size and their bits.
+
+    Attributes:
+        number: NumPy's type of them.
+        bits: NumPy's type of a whole number of as many bits.
+        all_bits: what is true as a number: all bits are set.
+        sign_place: which bit is the sign.
+        formats: of a number and of its bits, for ``struct``.
+    """
+
+    number: type
+    bits: type
+    all_bits: int
+    sign_place: int
+    formats: tuple[str, str]
+
+    def bits_of(self, x: Any) -> Any:
+        """The bits of numbers, as whole numbers."""
+        return np.asarray(x, dtype=self.number).view(self.bits)
+
+    def number_of(self, bits: Any) -> Any:
+        """The numbers of these bits."""
+        return np.asarray(bits, dtype=self.bits).view(self.number)
+
+    def mask(self, truth: Any) -> Any:
+        """All bits where it is true, none elsewhere."""
+        return self.number_of(np.where(truth, self.bits(self.all_bits), self.bits(0)))
+
+    def pattern(self, x: float) -> int:
+        """The bits of one number, which is rounded to this size."""
+        bits: int = struct.unpack(self.formats[1], struct.pack(self.formats[0], x))[0]
+        return bits
+
+    def constant(self, bits: int) -> float:
+        """The one number of these bits."""
+        x: float = struct.unpack(self.formats[0], struct.pack(self.formats[1], bits))[0]
+        return x
+
+
+DOUBLE = Precision(np.float64, np.uint64, 2**64 - 1, 63, ("<d", "<Q"))
+SINGLE = Precision(np.float32, np.uint32, 2**32 - 1, 31, ("<f", "<I"))
+
+
+def is_symbol(x: Any) -> bool:
+    """Whether this is a value on a tape."""
+    return hasattr(x, "and_bits")
 
 
 def is_single(x: Any) -> bool:
     """Whether these are symbols of a tape of float32."""
-    return bool(_objects(x)) and any(getattr(each, "single", False) for each in np.asarray(x).flat)
+    return _objects(x) and any(getattr(each, "single", False) for each in np.asarray(x).flat)
 
 
-def _bits(x: Any) -> Any:
-    return np.asarray(x, dtype=np.float64).view(np.uint64)
+def _objects(*values: Any) -> bool:
+    return any(is_symbol(each) or np.asarray(each).dtype == object for each in values)
 
 
-def _number(bits: Any) -> Any:
-    return np.asarray(bits).view(np.float64)
+def _call(method: str, x: Any, *others: Any) -> Any:
+    """A method of every element."""
+    if is_symbol(x) and not any(isinstance(each, np.ndarray) for each in others):
+        return getattr(x, method)(*others)
+    return np.frompyfunc(lambda each, *rest: getattr(each, method)(*rest), 1 + len(others), 1)(x, *others)
 
 
 def less(a: Any, b: Any) -> Any:
@@ -43,44 +91,79 @@ def at_most(a: Any, b: Any) -> Any:
     return np.frompyfunc(operator.le, 2, 1)(a, b) if _objects(a, b) else np.less_equal(a, b)
 
 
+def equal(a: Any, b: Any) -> Any:
+    """Whether a = b; false of a NaN, as all comparisons are."""
+    return _call("equals", a, b) if _objects(a) else np.equal(a, b)
+
+
 def where(truth: Any, yes: Any, no: Any) -> Any:
-    """One of two numbers."""
-    return _asked("choose", truth, yes, no) if _objects(truth) else np.where(truth, yes, no)
+    """One of two numbers, chosen by a comparison."""
+    return _call("choose", truth, yes, no) if _objects(truth) else np.where(truth, yes, no)
 
 
 def clamp(x: Any, least: float, most: float) -> Any:
-    """X held between two constants; a NaN stays one."""
+    """The number of these bounds that is nearest to x, or x between them; a NaN stays one."""
     x = where(less(x, least), least, x)
     return where(less(most, x), most, x)
 
 
+def sqrt(x: Any) -> Any:
+    """√x, correctly rounded."""
+    return _call("sqrt", x) if _objects(x) else np.sqrt(x)
+
+
+def floor(x: Any) -> Any:
+    """The largest whole number not above x."""
+    return _call("floor", x) if _objects(x) else np.floor(x)
+
+
 def and_bits(x: Any, bits: int) -> Any:
     """The bits of x that a constant has too."""
-    return _asked("and_bits", x, bits) if _objects(x) else _number(_bits(x) & np.uint64(bits))
+    return _call("and_bits", x, bits) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) & np.uint64(bits))
 
 
 def or_bits(x: Any, bits: int) -> Any:
     """The bits of x and those of a constant."""
-    return _asked("or_bits", x, bits) if _objects(x) else _number(_bits(x) | np.uint64(bits))
+    return _call("or_bits", x, bits) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) | np.uint64(bits))
 
 
 def add_bits(x: Any, whole: int) -> Any:
-    """The bits of x as a whole number, and another added."""
-    return _asked("add_bits", x, whole) if _objects(x) else _number(_bits(x) + np.uint64(whole))
+    """The bits of x as a whole number, and a constant added."""
+    return _call("add_bits", x, whole) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) + np.uint64(whole))
 
 
 def shift_up(x: Any, places: int) -> Any:
     """The bits of x, moved up."""
-    return _asked("shift_up", x, places) if _objects(x) else _number(_bits(x) << np.uint64(places))
+    return _call("shift_up", x, places) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) << np.uint64(places))
 
 
 def shift_down(x: Any, places: int) -> Any:
     """The bits of x, moved down."""
-    return _asked("shift_down", x, places) if _objects(x) else _number(_bits(x) >> np.uint64(places))
+    return _call("shift_down", x, places) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) >> np.uint64(places))
+
+
+def either_bits(x: Any, y: Any) -> Any:
+    """The bits of x and those of y."""
+    return x | y if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) | DOUBLE.bits_of(y))
+
+
+def turn_bits(x: Any, y: Any) -> Any:
+    """The bits that one of x and y has, but not both."""
+    return _call("xor_bits", x, y) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) ^ DOUBLE.bits_of(y))
 
 
 def turn_sign(x: Any, y: Any) -> Any:
     """X, its sign turned where the lowest bit of y is set."""
     if _objects(x, y):
-        return _asked("xor_bits", x, _asked("shift_up", y, 31 if is_single(y) else 63))
-    return _number(_bits(x) ^ (_bits(y) << np.uint64(63)))
+        return _call("xor_bits", x, _call("shift_up", y, 31 if is_single(y) else 63))
+    return turn_bits(x, shift_up(y, 63))
+
+
+def magnitude(x: Any) -> Any:
+    """|x|."""
+    return and_bits(x, NOT_SIGN)
+
+
+def sign_of(x: Any) -> Any:
+    """−0 or +0, as the sign of x is."""
+    return and_bits(x, SIGN)

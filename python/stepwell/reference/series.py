@@ -15,8 +15,7 @@ import numpy as np
 
 from .marks import KINDS, Mark
 from .tape import rules
-from .tape.fused import MEANING
-from .tape.replayed import OF_SYMBOLS
+from .tape.operations import of_numbers, of_symbols
 
 #: A coefficient; None if it is known to be zero.
 Term = Any
@@ -349,17 +348,17 @@ def factors(mark: Mark, value: Any, wanted: list[bool]) -> tuple[Any, ...]:
     return p * (value / x) if wanted[0] else None, by_exponent
 
 
-def operation(book: Book, name: str, of: list[Any], given: int) -> Any:
+def operation(book: Book, name: str, of: list[Any], extra: int) -> Any:
     """An operation of a tape, on series and numbers."""
     if not any(isinstance(each, (Series, Truth)) for each in of):
         if any(hasattr(each, "xor_bits") for each in of):
-            return OF_SYMBOLS[name](*of)
-        return np.asarray(MEANING[name](*of, given))[()]
+            return of_symbols(name, of, extra)
+        return np.asarray(of_numbers(name, of, extra))[()]
     if name == "choose" and not isinstance(of[0], Truth):
         return Truth(book, of[0]).choose(*of[1:])
     if name == "exclusive or":
         return ~of[0] if isinstance(of[0], Truth) else ~of[1]
-    return OF_SYMBOLS[name](*of)
+    return of_symbols(name, of, extra)
 
 
 def of_function(mark: Mark, start: Any, book: Book) -> Series:

@@ -11,7 +11,7 @@ use pyo3::{
 use stepwell_core::{
     step::trace,
     tape::{
-        self, Id, Op,
+        self, Id, OPERATIONS, Op,
         equations::{self, Invariant},
         fuse::fuse,
         print,
@@ -25,16 +25,21 @@ use crate::{
     model::{Equations, ModelSpec, core_error, precision},
 };
 
+/// Of each operation its name, how many operands it has, among which counts it is, and whether these may be exchanged.
+#[pyfunction]
+pub(crate) fn tape_operations() -> Vec<(&'static str, usize, &'static str, bool)> {
+    OPERATIONS.to_vec()
+}
+
 type Shared = Arc<Mutex<tape::Tape>>;
 
-/// A name, the places of operands, and what else is given.
+/// A name, the places of operands, and what else it takes.
 pub(crate) type Operation = (&'static str, Vec<usize>, u64);
 
 /// An operation, whose operands have these places.
 pub(crate) fn operation(op: Op, place: impl Fn(Id) -> usize) -> Operation {
     let (operands, n) = op.operands();
-    let (name, given) = print::named(op);
-    (name, operands[..n].iter().map(|operand| place(*operand)).collect(), given)
+    (op.name(), operands[..n].iter().map(|operand| place(*operand)).collect(), op.extra())
 }
 
 fn lock(tape: &Shared) -> MutexGuard<'_, tape::Tape> {
@@ -82,6 +87,13 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Value<'py> {
     }
 }
 
+/// A symbol, or the bits of a constant.
+#[derive(FromPyObject)]
+enum Bits<'py> {
+    Symbol(PyRef<'py, Symbol>),
+    Pattern(u64),
+}
+
 fn no_truth() -> PyErr {
     PyTypeError::new_err("a symbol has no truth value and is no number yet: choose between two values instead of branching")
 }
@@ -105,9 +117,14 @@ impl Symbol {
         Ok(self.on(|id| op(id, other)))
     }
 
-    fn with_bits(&self, bits: u64, op: impl FnOnce(Id, Id) -> Op) -> Symbol {
-        let bits = lock(&self.tape).bits_of(bits);
-        self.on(|id| op(id, bits))
+    fn with_bits(&self, bits: Bits, op: impl FnOnce(Id, Id) -> Op) -> PyResult<Symbol> {
+        match bits {
+            Bits::Symbol(other) => self.with(&Value::Symbol(other), op),
+            Bits::Pattern(bits) => {
+                let bits = lock(&self.tape).bits_of(bits);
+                Ok(self.on(|id| op(id, bits)))
+            }
+        }
     }
 }
 
@@ -143,8 +160,8 @@ impl Symbol {
     fn __pos__(&self) -> Symbol {
         self.clone()
     }
-    fn __invert__(&self) -> Symbol {
-        self.with_bits(u64::MAX, Op::Xor)
+    fn __invert__(&self) -> PyResult<Symbol> {
+        self.with_bits(Bits::Pattern(u64::MAX), Op::Xor)
     }
     fn __and__(&self, other: Value) -> PyResult<Symbol> {
         self.with(&other, Op::And)
@@ -180,11 +197,11 @@ impl Symbol {
         Ok(self.on(|id| Op::Select(id, yes, no)))
     }
     /// Bits of x and of a constant.
-    fn and_bits(&self, bits: u64) -> Symbol {
+    fn and_bits(&self, bits: Bits) -> PyResult<Symbol> {
         self.with_bits(bits, Op::And)
     }
     /// Bits of x or of a constant.
-    fn or_bits(&self, bits: u64) -> Symbol {
+    fn or_bits(&self, bits: Bits) -> PyResult<Symbol> {
         self.with_bits(bits, Op::Or)
     }
     /// Bits of one and not of both.
@@ -192,13 +209,17 @@ impl Symbol {
         self.with(&other, Op::Xor)
     }
     /// The bits of x as a whole number, and a constant added.
-    fn add_bits(&self, bits: u64) -> Symbol {
+    fn add_bits(&self, bits: Bits) -> PyResult<Symbol> {
         self.with_bits(bits, Op::AddBits)
     }
     /// A number on the tape of this symbol.
     fn number(&self, x: f64) -> Symbol {
         let id = lock(&self.tape).constant(x);
         Symbol { tape: Arc::clone(&self.tape), id }
+    }
+    /// A constant on the tape of this symbol, by its bits.
+    fn constant(&self, bits: u64) -> Symbol {
+        Tape(Arc::clone(&self.tape)).constant(bits)
     }
     /// Whether numbers of its tape have 32 bits.
     #[getter]
@@ -263,6 +284,17 @@ impl Tape {
     fn number(&self, x: f64) -> Symbol {
         let id = lock(&self.0).constant(x);
         Symbol { tape: Arc::clone(&self.0), id }
+    }
+
+    /// A constant, by its bits, of which a tape of 32 bits has the lower half.
+    fn constant(&self, bits: u64) -> Symbol {
+        self.leaf(Op::Const(bits))
+    }
+
+    /// Whether its numbers have 32 bits.
+    #[getter]
+    fn single(&self) -> bool {
+        lock(&self.0).precision() == Precision::Single
     }
 
     /// A sampled input at a time.

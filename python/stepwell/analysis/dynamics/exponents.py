@@ -25,8 +25,7 @@ from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import System
 from ...model.systems.base import a_system
-from ...reference.bits import and_bits, less, where
-from ...reference.functions.operations import NOT_SIGN, sqrt
+from ...reference.bits import NOT_SIGN, and_bits, less, sqrt, where
 from ...reference.log import log
 from ...reference.trig import cos
 from ...runs import engine

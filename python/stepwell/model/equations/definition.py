@@ -101,7 +101,7 @@ class Definition:
             ... def energy(v, y, *, omega):
             ...     return 0.5 * v**2 + omega**2 * (1 - np.cos(y))
         """
-        made = invariant(self, function)
+        made = invariant(self.name, ("v", "y") if self.has_v else ("y",), self.parameters, function)
         self.invariants[made.name] = made
         return function
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cached_property
 from itertools import count
 from math import prod
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,11 +15,8 @@ from ... import _core
 from ...base import checks
 from ...errors import ArgumentError
 from ...reference.marks import recording
-from ...reference.tape.replayed import Operations
-
-if TYPE_CHECKING:
-    from .definition import Definition
-    from .trace import Equations
+from ...reference.tape.replay import Replay
+from .function import TracedFunction
 
 
 class Invariant(NamedTuple):
@@ -38,29 +35,28 @@ class Invariant(NamedTuple):
     takes_time: bool = False
 
 
-def invariant(definition: Definition, function: Any) -> Invariant:
-    """A function of a state as an invariant of a system; see ``Definition.invariant``."""
+def invariant(system: str, state: tuple[str, ...], parameters: Collection[str], function: Any) -> Invariant:
+    """A function as an invariant of a system with this name, state and parameters; see ``Definition.invariant``."""
     if not inspect.isfunction(function):
-        raise ArgumentError(f"{definition.name}: expected a function as an invariant, got {type(function).__name__}")
-    name = f"{definition.name}: {function.__name__}"
-    state = ("v", "y") if definition.has_v else ("y",)
-    given = list(inspect.signature(function).parameters.values())
-    in_place = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
+        raise ArgumentError(f"{system}: expected a function as an invariant, got {type(function).__name__}")
+    name = f"{system}: {function.__name__}"
+    arguments = list(inspect.signature(function).parameters.values())
+    in_place = [each for each in arguments if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
     # With the time there is one argument more before the parameters.
-    takes_time = len(in_place) > len(state) and in_place[len(state)].name not in definition.parameters
+    takes_time = len(in_place) > len(state) and in_place[len(state)].name not in parameters
     n = len(state) + takes_time
     expected = f"({', '.join(state)}, *, …) or (t, {', '.join(state)}, *, …)"
-    if in_place[:n] != given[:n] or len(in_place) < n:
-        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))})")
+    if in_place[:n] != arguments[:n] or len(in_place) < n:
+        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, arguments))})")
     checks.argument_order(name, function, ("t", *state) if takes_time else state)
-    for each in given[n:]:
-        if each.name not in definition.parameters:
-            known = ", ".join(definition.parameters) or "none"
+    for each in arguments[n:]:
+        if each.name not in parameters:
+            known = ", ".join(parameters) or "none"
             raise ArgumentError(
                 f"{name}: expected a function {expected} whose further arguments are parameters of the system, got "
                 f"{each.name!r}. Known: {known}."
             )
-    return Invariant(function.__name__, function, tuple(each.name for each in given[n:]), takes_time)
+    return Invariant(function.__name__, function, tuple(each.name for each in arguments[n:]), takes_time)
 
 
 class Traced:
@@ -72,8 +68,8 @@ class Traced:
         single: whether the operations are those of float32.
     """
 
-    def __init__(self, invariant: Invariant, equations: Equations, *, single: bool = False) -> None:
-        self.invariant, self.equations, self._single = invariant, equations, single
+    def __init__(self, invariant: Invariant, equations: TracedFunction, *, single: bool = False) -> None:
+        self.invariant, self.equations = invariant, equations
         shapes = equations.own_shapes
         if changing := [each for each in invariant.parameters if shapes[each] is None]:
             raise ArgumentError(
@@ -89,7 +85,7 @@ class Traced:
             made = equations.of_state(invariant, self._tape.time(), v, y, parameters)
         self._value = made if isinstance(made, _core.Symbol) else self._tape.number(float(made))
         self._state = [*v.flat, *y.flat]
-        self._of_value = Operations(*self._tape.operations([self._value]), single=single)
+        self._of_value = Replay(*self._tape.operations([self._value]))
         if any(name == "time" for name, *_ in self._of_value.lines):
             raise ArgumentError(
                 f"{equations.name}: {invariant.name}: expected a quantity of the state and the parameters, got one that depends "
@@ -97,14 +93,14 @@ class Traced:
             )
 
     @cached_property
-    def _of_gradient(self) -> Operations:
+    def _of_gradient(self) -> Replay:
         from ...reference.tape.modes import gradient  # slow to import, and only gradients need it
 
         along = gradient(self._tape, self._value, self._state, self._marks)
         square = along[0] * along[0]
         for each in along[1:]:
             square = square + each * each
-        return Operations(*self._tape.operations([*along, square]), single=self._single)
+        return Replay(*self._tape.operations([*along, square]))
 
     @cached_property
     def _in_single(self) -> Traced:
@@ -122,7 +118,7 @@ class Traced:
         n_v = prod(self.equations.v_shape)
         return along[:n_v], along[n_v:], square
 
-    def _made(self, operations: Operations, v: Any, y: Any, given: dict[str, Any]) -> list[Any]:
+    def _made(self, operations: Replay, v: Any, y: Any, given: dict[str, Any]) -> list[Any]:
         equations = self.equations
         state = [*_numbers(v, equations.v_shape), *_numbers(y, equations.y_shape)]
         numbers: list[Any] = []

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import _core
 from ...reference import series
 from ...reference.marks import Marks, recording
-from ...reference.tape.replayed import Operations
-
-if TYPE_CHECKING:
-    from .trace import Equations
+from ...reference.tape.replay import Replay
+from .function import TracedFunction
 
 Functions = list[tuple[Any, list[tuple[Any, Any]], tuple[float, float] | None]]
 
@@ -62,7 +60,7 @@ class Rates:
         given: its parameters by name.
     """
 
-    def __init__(self, equations: Equations, given: dict[str, Any]) -> None:
+    def __init__(self, equations: TracedFunction, given: dict[str, Any]) -> None:
         self.equations = equations
         tape, marks = _core.Tape(), Marks()
         numbers, state = map(tape.param, count()), map(tape.state, count())
@@ -87,7 +85,7 @@ class Rates:
         functions = {id: mark for id, mark in marks.items() if series.has_rule(mark)}
         arguments = [each for mark in functions.values() for each in mark.arguments if isinstance(each, _core.Symbol)]
         lines, places = tape.operations([*roots, *(tape.value(id) for id in functions), *arguments])
-        self.operations = Operations(lines, places[: len(roots)])
+        self.operations = Replay(lines, places[: len(roots)])
         place = dict(zip([*(each.id for each in roots), *functions, *(each.id for each in arguments)], places, strict=True))
         self.functions = {
             place[id]: mark._replace(

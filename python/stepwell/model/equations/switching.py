@@ -19,10 +19,11 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.checks import concatenated
+from ...reference.bits import DOUBLE
 from ...reference.marks import Mark
-from ...reference.tape.fused import Evaluated
-from ...reference.tape.operations import Operation, needed
-from ...reference.tape.rules import COMPARISONS, number
+from ...reference.tape.lines import Operation, needed
+from ...reference.tape.operations import COMPARISONS
+from ...reference.tape.replay import Replay
 from .series import Line
 
 if TYPE_CHECKING:
@@ -148,7 +149,7 @@ class Switches:
         #: The times with which the time itself is compared, where they are constants of the function; and all other switches.
         self.constants = np.unique([time for each in solvable if (time := self._constant_time(each)) is not None])
         self.switches = [each for each in solvable if self._constant_time(each) is None]
-        self._tapes: dict[int, tuple[list[Operation], list[int]]] = {}
+        self._replays: dict[int, Replay] = {}
 
     def _repeating(self, mark: Mark) -> bool:
         return mark.name in REPEATING or any(isinstance(each, Line) and self.repeats[each] for each in mark.arguments)
@@ -160,14 +161,14 @@ class Switches:
             if switch.period is None and isinstance(time, Operation) and time.name == "time":
                 if not isinstance(other, Operation):
                     return float(other)
-                return number(other.given) if other.name == "constant" else None
+                return DOUBLE.constant(other.extra) if other.name == "constant" else None
         return None
 
-    def of_line(self, line: int) -> tuple[list[Operation], list[int]]:
+    def of_line(self, line: int) -> Replay:
         """The operations that a line needs, and its place among them."""
-        if line not in self._tapes:
-            self._tapes[line] = needed(self.tape, [line])
-        return self._tapes[line]
+        if line not in self._replays:
+            self._replays[line] = Replay(*needed(self.tape, [line]))
+        return self._replays[line]
 
     def _of_values(self, roots: Sequence[int]) -> set[int]:
         """Lines whose values reach the rates, and not only the truth of a comparison."""
@@ -222,7 +223,7 @@ class Solving:
     def __init__(self, switches: Switches, numbers: Sequence[Array | None], begin: float, end: float) -> None:
         self.of_line, self.tape, self.functions = switches.of_line, switches.tape, switches.functions
         self.changes, self.powers = switches.changes, switches.powers
-        self.numbers = dict(enumerate(numbers))
+        self.numbers = numbers
         self.axes = max((each.ndim for each in numbers if each is not None), default=0)
         self.samples = np.linspace(begin, end, ARGUMENT_SAMPLES).reshape(-1, *self.axes * (1,))
 
@@ -327,4 +328,4 @@ class Solving:
 
     def _at(self, line: Any, t: Any) -> Array:
         """The value of a line at these times."""
-        return np.asarray(Evaluated(*self.of_line(line), self.numbers, ())([], t, 0.0)[0])
+        return np.asarray(self.of_line(line)([], self.numbers, np.asarray(t))[0])

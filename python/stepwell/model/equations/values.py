@@ -15,8 +15,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ...errors import TraceError
-from ...reference import functions
-from ...reference.functions import operations
+from ...reference import bits, functions
 
 
 def of_shape(text: str) -> TraceError:
@@ -258,7 +257,7 @@ def _floored(a: Any, b: Any) -> Any:
 
 
 def _equal(a: Any, b: Any) -> Any:
-    return operations.equal(b, a) if operations.is_symbol(b) else operations.equal(a, b)
+    return bits.equal(b, a) if bits.is_symbol(b) else bits.equal(a, b)
 
 
 def inverted(mask: Any) -> Any:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ... import _core
 from ...base.immutable import changed
 from ...reference.traced import Tracer
 from ..controls import Projection
-
-if TYPE_CHECKING:
-    from .own import OwnSystem
+from .base import System
 
 
-def digest(system: OwnSystem) -> str:
+def digest(system: System) -> str:
     """What the operations of an own system are known by: of its rates, its invariants, and the gradient of one that is kept."""
-    known: Any = system if system.equations is not None else system.for_state_shapes()
+    known: Any = system
+    if known.equations is None:
+        known = known.for_state_shapes()
     tape = _core.Tape()
     tracer = Tracer(changed(known, around=()), tape)
     v, y, _ = tracer.state()

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import operations
-from .operations import elementary
+from .. import bits
+from .elementary import elementary
 
 
 @elementary
@@ -39,10 +39,10 @@ def greater_equal(x: Any, y: Any) -> Any:
 @elementary
 def equal(x: Any, y: Any) -> Any:
     """Whether x = y; of −0 and 0 it is."""
-    return operations.equal(x, y)
+    return bits.equal(x, y)
 
 
 @elementary
 def not_equal(x: Any, y: Any) -> Any:
     """Whether x ≠ y, or one of both is NaN."""
-    return ~operations.equal(x, y)
+    return ~bits.equal(x, y)

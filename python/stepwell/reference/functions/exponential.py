@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from .operations import either_bits, elementary, sign_of, where
+from ..bits import either_bits, sign_of, where
+from .elementary import elementary
 from .pieces import MAGIC, by_parity, fast_sum, halves, magic, power_of_two, scaled
 
 #: ln 2; n times the first part, of 33 bits, is exact.

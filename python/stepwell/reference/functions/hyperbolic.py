@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..bits import either_bits, magnitude, sign_of, where
+from .elementary import elementary
 from .exponential import LN2, LOG2_E
 from .exponential import reduced as exponential
-from .operations import either_bits, elementary, magnitude, sign_of, where
 from .pieces import MAGIC, fast_sum, halves, polynomial, power_of_two, quotient
 
 #: (sinh r − r)/r³ in powers of r².

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .operations import either_bits, elementary, equal, magnitude, or_bits, sign_of, sqrt, turn_bits, where
+from ..bits import either_bits, equal, magnitude, or_bits, sign_of, sqrt, turn_bits, where
+from .elementary import elementary
 from .pieces import fast_sum, halves, polynomial, quotient
 
 #: (arctan t − t)/t³ in powers of t², up to t = tan(π/8).

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from ..bits import add_bits, and_bits, either_bits, equal, or_bits, shift_down, sign_of, where
+from .elementary import elementary
 from .exponential import LN2
-from .operations import add_bits, and_bits, either_bits, elementary, equal, or_bits, shift_down, sign_of, where
 from .pieces import fast_sum, halves, polynomial, power_of_two
 
 #: 2·(artanh s − s)/s³ in powers of s².

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from .operations import and_bits, shift_up, where
+from ..bits import and_bits, shift_up, where
 
 #: The first 26 bits of a number's 53. A product of two such numbers is exact.
 UPPER = 0xFFFF_FFFF_F800_0000

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from ...base.checks import numbers
+from ..bits import and_bits, either_bits, equal, floor, magnitude, sign_of, turn_bits, where
+from ..bits import sqrt as root
+from .elementary import elementary
 from .exponential import HIGHEST_POWER_OF_TWO, LOWEST_POWER_OF_TWO, exp2_of_sum
 from .logarithms import exponent_and_rest
-from .operations import and_bits, either_bits, elementary, equal, floor, magnitude, sign_of, turn_bits, where
-from .operations import sqrt as root
 from .pieces import UPPER, by_parity, halves
 
 #: 3·(artanh s − s − s³/3)/s⁵ in powers of s².

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .operations import either_bits, elementary, equal, magnitude, or_bits, shift_down, shift_up, sign_of, where
-from .operations import sqrt as root
+from ..bits import either_bits, equal, magnitude, or_bits, shift_down, shift_up, sign_of, where
+from ..bits import sqrt as root
+from .elementary import elementary
 from .pieces import fast_sum, halves
 
 INFINITY = float("inf")

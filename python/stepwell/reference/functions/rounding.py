@@ -8,22 +8,10 @@ import numpy as np
 
 from ...base.checks import numbers, short
 from ...errors import DTypeError
-from . import operations
-from .operations import (
-    as_array,
-    either_bits,
-    elementary,
-    equal,
-    is_symbol,
-    lifted,
-    magnitude,
-    one_by_one,
-    shape_of,
-    sign_of,
-    symbol_of,
-    turn_bits,
-)
-from .operations import where as choose
+from .. import bits
+from ..bits import either_bits, equal, is_symbol, magnitude, sign_of, turn_bits
+from ..bits import where as choose
+from .elementary import as_array, elementary, lifted, one_by_one, shape_of, symbol_of
 from .pieces import halves
 
 INFINITY, NAN = float("inf"), float("nan")
@@ -33,19 +21,19 @@ TWO_52 = 2.0**52
 @elementary
 def floor(x: Any) -> Any:
     """The largest whole number not above x."""
-    return operations.floor(x)
+    return bits.floor(x)
 
 
 @elementary
 def ceil(x: Any) -> Any:
     """The smallest whole number not below x."""
-    return -operations.floor(-x)
+    return -bits.floor(-x)
 
 
 @elementary
 def trunc(x: Any) -> Any:
     """X without its fraction."""
-    return either_bits(operations.floor(magnitude(x)), sign_of(x))
+    return either_bits(bits.floor(magnitude(x)), sign_of(x))
 
 
 @elementary
@@ -101,7 +89,7 @@ def mod(x: Any, y: Any) -> Any:
         2.0
     """
     a, b = magnitude(x), magnitude(y)
-    n = operations.floor(a / b)  # perhaps one too many
+    n = bits.floor(a / b)  # perhaps one too many
     (n1, n2), (b1, b2) = halves(n), halves(b)
     r = (((a - n1 * b1) - n1 * b2) - n2 * b1) - n2 * b2
     r = choose(r < 0.0, r + b, r)

@@ -8,19 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from .operations import (
-    add_bits,
-    and_bits,
-    either_bits,
-    equal,
-    magnitude,
-    or_bits,
-    shift_down,
-    shift_up,
-    sign_of,
-    turn_bits,
-    where,
-)
+from ..bits import add_bits, and_bits, either_bits, equal, magnitude, or_bits, shift_down, shift_up, sign_of, turn_bits, where
 from .pieces import fast_sum, polynomial
 
 #: 1.5·2²³: a number added to it is rounded to a whole one, which then stands in the low bits.

@@ -9,21 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 from ...errors import UnsupportedError
-from .operations import (
-    SINGLE,
-    and_bits,
-    either_bits,
-    equal,
-    floor,
-    magnitude,
-    or_bits,
-    shift_down,
-    shift_up,
-    sign_of,
-    sqrt,
-    turn_bits,
-    where,
-)
+from ..bits import and_bits, either_bits, equal, floor, magnitude, or_bits, shift_down, shift_up, sign_of, sqrt, turn_bits, where
+from .elementary import SINGLE
 from .pieces import by_parity, fast_sum, polynomial
 from .single import (
     BIAS,

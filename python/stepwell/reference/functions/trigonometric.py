@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from .operations import add_bits, and_bits, elementary, equal, magnitude, shift_up, sign_of, turn_bits, where
+from ..bits import add_bits, and_bits, equal, magnitude, shift_up, sign_of, turn_bits, where
+from .elementary import elementary
 from .pieces import MAGIC, fast_sum, halves, polynomial, quotient
 
 #: π/2: three parts of 29 bits, and what then remains to 53.

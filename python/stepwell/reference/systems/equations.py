@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
-from ..functions.operations import where
+from ..bits import where
 
 
 class Equations:

@@ -4,12 +4,12 @@ Methods compute with increments, a factor that depends on the step h times somet
 as c·factor·x, a number, what is known before the step, and a value. So v + ½(h·a₁ + h·a₂) becomes v + (½h)·(a₁ + a₂).
 """
 
-import struct
 from collections.abc import Sequence
 from math import isfinite
 from typing import NamedTuple
 
-from .operations import Operation, needed, of_any, ranks
+from ..bits import DOUBLE, SINGLE
+from .lines import Operation, needed, of_any, ranks
 
 
 class Increment(NamedTuple):
@@ -25,8 +25,7 @@ class Rewriting:
 
     def __init__(self, tape: Sequence[Operation], roots: Sequence[int], single: bool = False) -> None:
         self.tape = tape
-        #: How constants are written: of 32 bits, or of 64.
-        self.bits, self.float = ("<I", "<f") if single else ("<Q", "<d")
+        self.precision = SINGLE if single else DOUBLE
         self.rank = ranks(tape)
         self.reads = [0] * len(tape)
         for line in [*roots, *(line for operation in tape for line in operation.of)]:
@@ -37,9 +36,9 @@ class Rewriting:
         #: Of each line of the old tape its line on the new one, or the increment that it is.
         self.values: list[int | Increment] = []
 
-    def write(self, name: str, *of: int, given: int = 0) -> int:
+    def write(self, name: str, *of: int, extra: int = 0) -> int:
         """A line of the new tape; one that is there already is not written again."""
-        operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, given)
+        operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, extra)
         if operation not in self.known:
             self.known[operation] = len(self.made)
             self.made.append(operation)
@@ -47,7 +46,7 @@ class Rewriting:
 
     def number(self, x: float) -> int:
         """The line of a number."""
-        return self.write("constant", given=struct.unpack(self.bits, struct.pack(self.float, x))[0])
+        return self.write("constant", extra=self.precision.pattern(x))
 
     def signed(self, line: int) -> tuple[bool, int]:
         """Whether there is a minus before a value of the old tape, and the rest of it: (|c|·factor)·x."""
@@ -71,9 +70,9 @@ class Rewriting:
 
     def times(self, increment: Increment, p: int) -> Increment:
         """An increment times what is known before the step: numbers go to c, all else to the factor."""
-        name, _, given = self.tape[p]
+        name, _, extra = self.tape[p]
         if name == "constant":
-            return increment._replace(c=increment.c * struct.unpack(self.float, struct.pack(self.bits, given))[0])
+            return increment._replace(c=increment.c * self.precision.constant(extra))
         return increment._replace(factor=self.write("multiply", self.plain(p), increment.factor))
 
     def product(self, line: int) -> int | Increment:
@@ -116,8 +115,8 @@ class Rewriting:
 
     def same(self, line: int) -> int:
         """The same operation on the new tape."""
-        name, of, given = self.tape[line]
-        return self.write(name, *(self.plain(each) for each in of), given=given)
+        name, of, extra = self.tape[line]
+        return self.write(name, *(self.plain(each) for each in of), extra=extra)
 
     def value(self, line: int) -> int | Increment:
         """What a line of the old tape is on the new one."""
@@ -148,19 +147,19 @@ def negated_sums(tape: Sequence[Operation]) -> tuple[list[Operation], list[int]]
     known: dict[Operation, int] = {}
     place: list[int] = []
 
-    def write(name: str, of: tuple[int, ...], given: int = 0) -> int:
-        operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, given)
+    def write(name: str, of: tuple[int, ...], extra: int = 0) -> int:
+        operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, extra)
         if operation not in known:
             known[operation] = len(made)
             made.append(operation)
         return known[operation]
 
-    for name, of, given in tape:
+    for name, of, extra in tape:
         if name == "subtract" and tape[of[0]].name == "negate":
             x, y = place[tape[of[0]].of[0]], place[of[1]]
             place.append(write("negate", (write("add", (x, y)),)))
         else:
-            place.append(write(name, tuple(place[line] for line in of), given))
+            place.append(write(name, tuple(place[line] for line in of), extra))
     return made, place
 
 

@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from ..._core import Symbol, Tape
 from ...errors import UnsupportedError
+from ..bits import DOUBLE, SINGLE
 from ..marks import Mark, Marks
-from .operations import Operation
-from .rules import MIN_ROUNDING_CONSTANT, MIN_SINGLE_ROUNDING_CONSTANT, NO_RULE, no_derivative, number
+from .lines import Operation, listed
+from .operations import OPERATIONS, no_derivative, of_tape
 
-#: How to write each operation again. Equal operations are on a tape only once, so the result is the symbol that was there.
-AGAIN: dict[str, Callable[..., Any]] = {
-    "add": lambda a, b, _: a + b,
-    "subtract": lambda a, b, _: a - b,
-    "multiply": lambda a, b, _: a * b,
-    "divide": lambda a, b, _: a / b,
-    "square root": lambda a, _: a.sqrt(),
-    "negate": lambda a, _: -a,
-    "floor": lambda a, _: a.floor(),
-    "less": lambda a, b, _: a < b,
-    "at most": lambda a, b, _: a <= b,
-    "equal": lambda a, b, _: a.equals(b),
-    "choose": lambda m, a, b, _: m.choose(a, b),
-    "and": lambda a, b, _: a & b,
-    "or": lambda a, b, _: a | b,
-    "exclusive or": lambda a, b, _: a.xor_bits(b),
-    "shift up": lambda a, n: a.shift_up(n),
-    "shift down": lambda a, n: a.shift_down(n),
-}
+#: Adding a constant of at least this size and subtracting it again rounds: x + 1.5·2⁵² − 1.5·2⁵² is x as a whole number. Of
+#: float64, and of float32.
+MIN_ROUNDING_CONSTANT = 2.0**32, 2.0**20
 
 
 class Listing:
@@ -45,11 +30,10 @@ class Listing:
     """
 
     def __init__(self, tape: Tape, roots: Sequence[Symbol], marks: Marks) -> None:
-        self.tape, self._single = tape, any(root.single for root in roots)
-        asked = list(roots)
+        self.tape, self._precision = tape, SINGLE if tape.single else DOUBLE
+        needed = list(roots)
         while True:  # the argument of a function may be on the tape without being needed for its value
-            operations, places = tape.operations(asked)
-            self.operations = [Operation(name, tuple(of), given) for name, of, given in operations]
+            self.operations, places = listed(tape, needed)
             self.symbols: list[Symbol] = []
             for each in self.operations:
                 self.symbols.append(self._again(each))
@@ -58,7 +42,7 @@ class Listing:
             missing = [each for mark in self.marks.values() for each in mark.arguments if self._unknown(each)]
             if not missing:
                 break
-            asked += missing
+            needed += missing
         self.roots = places[: len(roots)]
         self.passed = [False] * len(self.operations)
         for root in self.roots:
@@ -78,37 +62,14 @@ class Listing:
 
     def _again(self, operation: Operation) -> Symbol:
         """The symbol that an operation makes, by writing it once more."""
-        name, of, given = operation
-        operands = [self.symbols[line] for line in of]
-        made: Symbol
-        match name:
-            case "state":
-                made = self.tape.state(given)
-            case "parameter":
-                made = self.tape.param(given)
-            case "step":
-                made = self.tape.step()
-            case "time":
-                made = self.tape.time()
-            case "constant":
-                made = self.tape.number(number(given, single=self._single))
-            case "sample":
-                made = self.tape.sample(given, *operands)
-            case "add bits":
-                made = self._sum_of_bits(of, operands)
-            case _ if name in AGAIN:
-                made = AGAIN[name](*operands, given)
-            case _:
-                raise no_derivative(name)
-        return made
-
-    def _sum_of_bits(self, of: Sequence[int], operands: list[Any]) -> Symbol:
-        """An integer addition; one operand is usually a constant."""
-        for k in (0, 1):
-            if self.operations[of[k]].name == "constant":
-                made: Symbol = operands[1 - k].add_bits(self.operations[of[k]].given)
-                return made
-        return operands[0].add_bits(operands[1])  # type: ignore[no-any-return]
+        name, of, extra = operation
+        kind = OPERATIONS.get(name)
+        if kind is not None and kind.counted == "fused":
+            raise no_derivative(name)
+        symbol: Symbol | None = of_tape(self.tape, name, [self.symbols[line] for line in of], extra)
+        if symbol is None:
+            raise no_derivative(name)
+        return symbol
 
     def reads(self, line: int) -> tuple[tuple[Any, ...], Mark | None]:
         """The lines from which the derivative of a line is computed: the arguments of a marked function, or else the operands."""
@@ -120,10 +81,10 @@ class Listing:
     def check(self, line: int) -> None:
         """Raise if a line that is no marked function has an operation without a derivative, and an operand that changes."""
         name = self.operations[line].name
-        if name in NO_RULE:
+        if name == "sample" or (name in OPERATIONS and OPERATIONS[name].factors is None):
             raise no_derivative(name)
         added = self._offset(line)
-        if added is None or abs(added[1]) < (MIN_SINGLE_ROUNDING_CONSTANT if self._single else MIN_ROUNDING_CONSTANT):
+        if added is None or abs(added[1]) < MIN_ROUNDING_CONSTANT[self.tape.single]:
             return
         before = self._offset(added[0])
         if before is not None and added[1] == -before[1]:
@@ -139,8 +100,8 @@ class Listing:
             return None
         a, b = of
         if self.operations[b].name == "constant":
-            constant = number(self.operations[b].given, single=self._single)
+            constant = self._precision.constant(self.operations[b].extra)
             return a, constant if name == "add" else -constant
         if name == "add" and self.operations[a].name == "constant":
-            return b, number(self.operations[a].given, single=self._single)
+            return b, self._precision.constant(self.operations[a].extra)
         return None

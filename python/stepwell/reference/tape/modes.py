@@ -16,8 +16,8 @@ from ..._core import Symbol, Tape
 from .. import marks as marking
 from ..marks import Marks
 from .listing import Listing
+from .operations import factors
 from .rules import of_function
-from .rules import operation as factors_of
 
 
 def directional(
@@ -120,7 +120,7 @@ def _factors(listing: Listing, line: int, wanted: list[bool]) -> tuple[Any, ...]
     if mark is not None:
         return of_function(mark, listing.symbols[line], wanted)
     listing.check(line)
-    return factors_of(listing.operations[line].name, list(reads), listing.symbols[line])
+    return factors(listing.operations[line].name, list(reads), listing.symbols[line])
 
 
 def _forward(listing: Listing, seeds: dict[int, dict[int, Symbol]]) -> list[dict[int, Symbol]]:

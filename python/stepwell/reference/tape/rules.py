@@ -1,95 +1,23 @@
-"""Derivatives of the operations of a tape, and of the functions that are marked on it.
+"""Derivatives of the functions that are marked on a tape (``reference/marks.py``).
 
-A rule gives, for each operand, the factor by which a change of it is multiplied: a symbol, 1.0 or -1.0, or None for no change.
-Operations that round to whole numbers or work on bits have no rule: a derivative through them would be wrong, or zero by mistake.
-Functions that consist of such operations are marked (``reference/marks.py``) and have rules of their own, in terms of functions.
+A rule returns, for each argument, the factor by which a change of it is multiplied: a symbol, 1.0 or −1.0, or None for no change.
+The operations of a tape have theirs in ``operations.py``.
 """
 
 from __future__ import annotations
 
 import inspect
-import struct
 from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 from ...errors import UnsupportedError
 from .. import marks
+from .operations import Factor
 
 LN2, LN10 = 0.6931471805599453, 2.302585092994046
 
-#: Adding a constant of at least this size and subtracting it again rounds: x + 1.5·2⁵² − 1.5·2⁵² is x as a whole number. Then the
-#: same in float32.
-MIN_ROUNDING_CONSTANT, MIN_SINGLE_ROUNDING_CONSTANT = 2.0**32, 2.0**20
-
-#: Comparisons: their results are constant except at jumps.
-COMPARISONS = ("less", "at most", "equal")
-
-#: Operations without a derivative, and what to do about it.
-NO_RULE = (
-    "and",
-    "or",
-    "exclusive or",
-    "add bits",
-    "shift up",
-    "shift down",
-    "sample",
-    "multiply add",
-    "multiply subtract",
-    "subtract multiply",
-)
-
-Factor = Any
 Partial = Callable[..., Factor]
-
-
-def operation(name: str, operands: list[Any], value: Any) -> tuple[Factor, ...]:
-    """The factors of an operation of the tape, one for each operand. A choice is not among them: it has no factors.
-
-    Raises:
-        UnsupportedError: if it has no derivative.
-    """
-    match name:
-        case "add":
-            return 1.0, 1.0
-        case "subtract":
-            return 1.0, -1.0
-        case "multiply":
-            return operands[1], operands[0]
-        case "divide":
-            by = 1.0 / operands[1]
-            return by, -(value * by)
-        case "square root":
-            return (0.5 / value,)
-        case "negate":
-            return (-1.0,)
-        case "floor":
-            return (None,)
-        case _ if name in COMPARISONS:
-            return None, None
-    raise no_derivative(name)
-
-
-def no_derivative(name: str) -> UnsupportedError:
-    """The error for an operation without a derivative."""
-    if name == "sample":
-        return UnsupportedError("derivative: a sampled input changes by jumps, so it has none by its time")
-    if name.startswith(("multiply", "subtract ")):
-        return UnsupportedError(f"derivative: expected a tape that is not fused yet, got one with {name!r}")
-    return UnsupportedError(
-        f"derivative: the operation {name!r} of what is differentiated has none. Write it with the functions of "
-        f"stepwell.reference, which tell their derivatives, or decorate the function that it is a part of with "
-        f"reference.marks.differentiable"
-    )
-
-
-def number(bits: int, *, single: bool = False) -> float:
-    """The number of float64, or of float32, that has these bits."""
-    value: float = struct.unpack(*(("<f", struct.pack("<I", bits)) if single else ("<d", struct.pack("<Q", bits))))[0]
-    return value
-
-
-# ---- functions
 
 
 def function(name: str, near: Callable[..., Any] | None = None) -> Callable[..., Any]:

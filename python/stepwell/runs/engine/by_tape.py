@@ -55,7 +55,7 @@ def steps_of_single(plan: Plan, what: str) -> Steps:
 
 def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
     """From the rows of a state, and the time, to the next ones: line by line, for all members at once."""
-    from ...reference.tape.fused import Evaluated
+    from ...reference.tape.evaluate import Evaluation
 
     steps: Callable[..., list[Any]]
     if plan.single:
@@ -63,7 +63,7 @@ def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], 
     else:
         tracer, tape, symbols = traced(plan, what)
         numbers, [(_, _, number_of_budget)] = dict(enumerate(tracer.numbers)), tape.operations([tape.budget()])[0]
-        steps = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fused)
+        steps = Evaluation(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fused)
 
     def made(state: list[Array], t: Any) -> Array:
         rows = steps(state, t, plan.dt)

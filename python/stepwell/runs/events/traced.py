@@ -20,7 +20,7 @@ from ...model.equations.values import Scalar, objects
 from ...model.systems import System
 from ...reference.marks import recording
 from ...reference.tape.modes import directional
-from ...reference.tape.replayed import Operations
+from ...reference.tape.replay import Replay
 from .. import engine
 from .event import Event
 
@@ -76,15 +76,15 @@ class Quantity:
         self._operations = made[0]
         self._slope = self._slope_of()
 
-    def _operations_of(self) -> Operations:
+    def _operations_of(self) -> Replay:
         """The operations of the event; number 0 of their state is the time."""
         tape = _core.Tape()
         numbers, state = map(tape.param, count()), map(tape.state, count())
         t = next(state)
         parameters = {name: _symbols(shape, numbers) for name, shape in self._shapes.items()}
-        return Operations(*tape.operations([self.on(tape, t, state, parameters)]))
+        return Replay(*tape.operations([self.on(tape, t, state, parameters)]))
 
-    def _slope_of(self) -> Operations | None:
+    def _slope_of(self) -> Replay | None:
         """The operations of its change along a change of time and state, which come behind the state; None if it has pieces."""
         tape = _core.Tape()
         numbers = map(tape.param, count())
@@ -97,7 +97,7 @@ class Quantity:
                 slope = directional(tape, [value], zip(state, (tape.state(n + i) for i in range(n)), strict=True))
             except UnsupportedError:
                 return None
-        return Operations(*tape.operations(slope))
+        return Replay(*tape.operations(slope))
 
     def on(self, tape: _core.Tape, t: _core.Symbol, state: Iterator[_core.Symbol], parameters: dict[str, Any]) -> _core.Symbol:
         """The same on a tape."""
@@ -132,7 +132,7 @@ class Quantity:
     def _rows_of(self, t: Array, v: Array, y: Array) -> list[Array]:
         return [t, *(_rows(v, self.v_shape) if self.has_v else []), *_rows(y, self.y_shape)]
 
-    def _by(self, operations: Operations, state: list[Array], y: Array, given: dict[str, Any]) -> Array:
+    def _by(self, operations: Replay, state: list[Array], y: Array, given: dict[str, Any]) -> Array:
         numbers = [each for name in self._parameters for each in _rows(given[name], given[name].shape[:-1])]
         with np.errstate(all="ignore"):
             value = operations(state, numbers)[0]
@@ -159,7 +159,7 @@ class NewState:
         parameters = {name: _symbols(given[name].shape[:-1], numbers) for name in self._parameters}
         blocks = [_symbols(shape, state) for shape in self._shapes]
         result = run_by(rebound(self._function), self._name, quick_sines, Scalar(t), *blocks, **parameters)
-        self._operations = Operations(*tape.operations([each for block in self._blocks(result) for each in symbols(tape, block)]))
+        self._operations = Replay(*tape.operations([each for block in self._blocks(result) for each in symbols(tape, block)]))
 
     def _blocks(self, result: Any) -> list[Any]:
         """The blocks that the function returned, each of its shape."""

@@ -13,7 +13,7 @@ from ...reference import contact, series_pace, tableau
 from ...reference.adaptive import Attempted, longer
 from ...reference.series import expanded
 from ...reference.signal import of_slot, over
-from ...reference.tape.replayed import Operations
+from ...reference.tape.replay import Replay
 from ...reference.traced import Tracer
 from .. import engine
 from ..engine import by_tape
@@ -46,7 +46,7 @@ class Trials:
 
     def __init__(self, plan: engine.Plan, members: Members) -> None:
         self._plan, self._members = plan, members
-        self._operations: Operations | None = None
+        self._operations: Replay | None = None
         self._numbers: list[Array] = []
         #: Whether there is no other way, however long the step is.
         self._always_traced = False
@@ -55,7 +55,7 @@ class Trials:
         #: Of float32: what makes steps, one part after the other.
         self._singles: list[Steps] = []
         self._plans: dict[int, engine.Plan] = {}
-        self._rates: tuple[Operations, list[Array]] | None = None
+        self._rates: tuple[Replay, list[Array]] | None = None
         self._rates_traced = False
 
     def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
@@ -113,7 +113,7 @@ class Trials:
         n = len(changes) - y[..., 0].size
         return _block(changes[:n], v), _block(changes[n:], y)
 
-    def _traced_rates(self) -> tuple[Operations, list[Array]] | None:
+    def _traced_rates(self) -> tuple[Replay, list[Array]] | None:
         """Rates of an own system as operations, likewise."""
         plan = self._members.plan(np.arange(self._plan.members))
         if not isinstance(plan.system, OwnSystem):
@@ -127,7 +127,7 @@ class Trials:
         if tracer.tables:
             return None
         wide = (np.broadcast_to(s.dv(t, v, y), v.shape), np.broadcast_to(s.dy(t, v, y), y.shape))
-        operations = Operations(*tape.operations(tracer.flat(*wide)))
+        operations = Replay(*tape.operations(tracer.flat(*wide)))
         if len(operations.lines) > MOST_OPERATIONS:
             return None
         return operations, [np.atleast_1d(each) for each in tracer.numbers]
@@ -166,7 +166,7 @@ class Trials:
         made = self._on(tracer, plan, t, h, v, y)
         if tracer.tables:
             return
-        operations = Operations(*tape.operations(tracer.flat(*made)))
+        operations = Replay(*tape.operations(tracer.flat(*made)))
         if len(operations.lines) <= MOST_OPERATIONS or self._always_traced:
             self._operations, self._numbers = operations, [np.atleast_1d(each) for each in tracer.numbers]
 

@@ -5,20 +5,16 @@ A formula is read as in Python: · − √ ≤ are its multiplication, subtracti
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from ...reference.bits import DOUBLE, SINGLE, Precision
+from ...reference.tape.operations import ON_BITS, OPERATIONS
+
 #: How strongly a formula holds together, by what it does last.
 CHOICE, EITHER, BOTH, NOT, COMPARISON, SUM, PRODUCT, SIGN, ATOM = range(9)
-
-#: Operations on bits, whose constants are bits.
-ON_BITS = ("and", "or", "exclusive or", "add bits", "shift up", "shift down")
-
-#: All bits of a number of float64, and of one of float32.
-ALL_BITS, ALL_SINGLE_BITS = 2**64 - 1, 2**32 - 1
 
 
 class Formula(NamedTuple):
@@ -45,18 +41,12 @@ class Formula(NamedTuple):
 
 def number(bits: int, single: bool = False) -> Formula:
     """A constant: the shortest text that is this number, of float64 or of float32."""
-    x = number_of(bits, single)
+    precision = SINGLE if single else DOUBLE
+    x = precision.constant(bits)
     if x != x:
         return bit_pattern(bits)
     text = shortest(abs(x), single).removesuffix(".0").replace("inf", "∞")
-    return Formula(f"−{text}", SIGN) if bits >> (31 if single else 63) else Formula(text)
-
-
-def number_of(bits: int, single: bool) -> float:
-    """The number of these bits."""
-    kinds = ("<I", "<f") if single else ("<Q", "<d")
-    (x,) = struct.unpack(kinds[1], struct.pack(kinds[0], bits))
-    return float(x)
+    return Formula(f"−{text}", SIGN) if bits >> precision.sign_place else Formula(text)
 
 
 def shortest(x: float, single: bool) -> str:
@@ -69,7 +59,7 @@ def bit_pattern(bits: int) -> Formula:
     return Formula(hex(bits))
 
 
-def formula(name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None], all_bits: int = ALL_BITS) -> Formula:
+def formula(name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | None], all_bits: int = DOUBLE.all_bits) -> Formula:
     """An operation of these; ``bits`` are those of the operands that are constants, ``all_bits`` those of what is true."""
     if name in ON_BITS:
         if all(each.is_truth or known in (0, all_bits) for each, known in zip(of, bits, strict=True)):
@@ -101,28 +91,21 @@ def formula(name: str, of: Sequence[Formula], given: int, bits: Sequence[int | N
         case "subtract multiply":
             a, b, c = of
             return Formula(f"fma({_minus(a).text}, {b.text}, {c.text})")
-        case "square root":
-            return Formula(f"√({of[0].text})")
-        case "less" | "at most" | "equal":
-            a, b = of
-            sign = {"less": "<", "at most": "≤", "equal": "="}[name]
-            return Formula(f"{a.within(SUM)} {sign} {b.within(SUM)}", COMPARISON, True)
         case "choose":
             truth, a, b = of
             return Formula(
                 f"{a.within(EITHER)} if {truth.within(EITHER)} else {b.within(CHOICE)}", CHOICE, a.is_truth and b.is_truth
             )
-        case "shift up" | "shift down":
-            return Formula(f"{name.replace(' ', '_')}({of[0].text}, {given})")
-        case "and" | "or" | "exclusive or" | "add bits":
-            word = {"and": "and_bits", "or": "or_bits", "exclusive or": "xor_bits", "add bits": "add_bits"}[name]
-            return Formula(f"{word}({of[0].text}, {of[1].text})")
         case "gather":
             return Formula(f"sample({of[0].text})")
         case "copy":
             return of[0]
-        case _:  # floor, and what is to come
-            return Formula(f"{name}({', '.join(each.text for each in of)})")
+    kind = OPERATIONS.get(name)
+    if kind is None:  # a function that is written by its name
+        return Formula(f"{name}({', '.join(each.text for each in of)})")
+    if kind.result == "truth":
+        return Formula(f"{of[0].within(SUM)} {kind.sign} {of[1].within(SUM)}", COMPARISON, True)
+    return Formula(f"{kind.sign}({', '.join([*(each.text for each in of), *[str(extra)] * kind.has_extra])})")
 
 
 class Notation:
@@ -141,17 +124,22 @@ class Notation:
         self.single = single
 
     @property
+    def precision(self) -> Precision:
+        """The numbers of the formulas."""
+        return SINGLE if self.single else DOUBLE
+
+    @property
     def all_bits(self) -> int:
         """The bits of what is true."""
-        return ALL_SINGLE_BITS if self.single else ALL_BITS
+        return self.precision.all_bits
 
     def number(self, bits: int) -> Formula:
         """A constant."""
         return number(bits, self.single)
 
-    def formula(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
+    def formula(self, name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | None]) -> Formula:
         """An operation of these; ``bits`` are those of the operands that are constants."""
-        return formula(name, of, given, bits, self.all_bits)
+        return formula(name, of, extra, bits, self.all_bits)
 
     def named(self, name: str, value: Formula) -> Formula:
         """A value that has a line of its own, where it is used."""

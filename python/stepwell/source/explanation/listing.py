@@ -22,29 +22,16 @@ from ...reference import adaptive
 from ...reference.acceptance import Acceptance
 from ...reference.signal import COMPOSED, Held
 from ...reference.tape import increments
-from ...reference.tape.operations import Operation, in_order, needed
+from ...reference.tape.lines import in_order, listed, needed
+from ...reference.tape.operations import OPERATIONS, of_tape
 from ...reference.traced import Tracer
 from ...runs import engine
 from ...runs.engine import Plan
 from ...runs.engine.counted import traced
-from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number, number_of
+from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number
 
 #: Characters of an increment of its own line; shorter ones stand where they are used.
 SHORT = 12
-
-#: The kind of each operation that is counted. Changes of sign, copies and the lookup of samples are not arithmetic.
-KINDS = {
-    "add": "additions",
-    "subtract": "additions",
-    "multiply": "multiplications",
-    "multiply add": "fused",
-    "multiply subtract": "fused",
-    "subtract multiply": "fused",
-    "divide": "divisions",
-    "square root": "square_roots",
-    **dict.fromkeys(("less", "at most", "equal", "choose"), "choices"),
-    **dict.fromkeys(("and", "or", "exclusive or", "add bits", "shift up", "shift down", "floor"), "bits"),
-}
 
 #: A body: names of operations, their operands and other arguments; and the indices of the results.
 Body = tuple[list[tuple[str, list[int], int]], list[int]]
@@ -202,75 +189,10 @@ def coefficients(plan: Plan) -> list[str]:
 # ---- values on a tape
 
 
-def again(tape: Any, name: str, of: Sequence[Any], given: int, bits: Sequence[int | None], single: bool = False) -> Any:
-    """The same operation on another tape, where products that were fused into sums stand by themselves; None if it has none."""
-    if any(each is None for each in of):
-        return None
-    match name:
-        case "state" | "parameter" | "constant" | "step" | "time":
-            return _leaf(tape, name, given, single)
-        case "add" | "subtract" | "multiply" | "divide" | "less" | "at most" | "and" | "or":
-            return ARITHMETIC[name](*of)
-        case "multiply add" | "multiply subtract" | "subtract multiply":
-            a, b, c = of
-            return {"multiply add": a * b + c, "multiply subtract": a * b - c, "subtract multiply": c - a * b}[name]
-        case "square root":
-            return of[0].sqrt()
-        case "negate":
-            return -of[0]
-        case "floor":
-            return of[0].floor()
-        case "equal":
-            return of[0].equals(of[1])
-        case "choose":
-            return of[0].choose(of[1], of[2])
-        case "exclusive or":
-            return of[0].xor_bits(of[1])
-        case "add bits":
-            known = next((i for i, each in enumerate(bits) if each is not None), None)
-            return None if known is None else of[1 - known].add_bits(bits[known])
-        case "shift up":
-            return of[0].shift_up(given)
-        case "shift down":
-            return of[0].shift_down(given)
-        case "sample":
-            return tape.sample(given, of[0])
-        case "copy" | "same":
-            return of[0]
-        case _:
-            return None
-
-
-ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
-    "add": lambda a, b: a + b,
-    "subtract": lambda a, b: a - b,
-    "multiply": lambda a, b: a * b,
-    "divide": lambda a, b: a / b,
-    "less": lambda a, b: a < b,
-    "at most": lambda a, b: a <= b,
-    "and": lambda a, b: a & b,
-    "or": lambda a, b: a | b,
-}
-
-
-def _leaf(tape: Any, name: str, given: int, single: bool) -> Any:
-    match name:
-        case "state":
-            return tape.state(given)
-        case "parameter" | "force":
-            return tape.param(given)
-        case "constant":
-            return tape.number(number_of(given, single))
-        case "step":
-            return tape.step()
-        case _:
-            return tape.time()
-
-
 def increments_last(tracer: Named, roots: Sequence[Any], single: bool = False) -> tuple[Any, dict[int, str], dict[int, str]]:
     """The tape of a step in which increments are multiplied last; names of its values, and which increments they are left of."""
-    listed, places = tracer.tape.operations([*roots, *(symbol for symbol, _ in tracer.called)])
-    lines, place = increments.negated_sums([Operation(name, tuple(of), given) for name, of, given in listed])
+    lines, places = listed(tracer.tape, [*roots, *(symbol for symbol, _ in tracer.called)])
+    lines, place = increments.negated_sums(lines)
     places = [place[each] for each in places]
     order = in_order(lines, places[: len(roots)])
     kept, moved = needed(lines, places[: len(roots)])
@@ -278,13 +200,12 @@ def increments_last(tracer: Named, roots: Sequence[Any], single: bool = False) -
     work.run()
     tape = _core.Tape(single=single)
     symbols: list[Any] = []
-    for name, of, given in work.made:
-        bits = [work.made[each].given if work.made[each].name == "constant" else None for each in of]
-        symbols.append(again(tape, name, [symbols[each] for each in of], given, bits, single))
+    for name, of, extra in work.made:
+        symbols.append(of_tape(tape, name, [symbols[each] for each in of], extra))
     names: dict[int, str] = {}
     left: dict[int, str] = {}
-    for (_, name), place in zip(tracer.called, places[len(roots) :], strict=True):
-        value = work.values[order[place]] if place in order else None
+    for (_, name), at in zip(tracer.called, places[len(roots) :], strict=True):
+        value = work.values[order[at]] if at in order else None
         if isinstance(value, increments.Increment):
             left.setdefault(symbols[value.x].id, f"{name} but for its factor")
         elif value is not None:
@@ -331,15 +252,15 @@ class Writer:
         self._numbers: Counter[str] = Counter()
         self._used: set[str] = set()
 
-    def symbol(self, name: str, of: Sequence[Any], given: int, bits: Sequence[int | None]) -> Any:
+    def symbol(self, name: str, of: Sequence[Any], extra: int) -> Any:
         """An operation on the tape, which has a name there; None if the tape has none."""
-        if name in self.notation.called:
-            return None if of[0] is None else self.notation.called[name](of[0])
-        return again(self.tape, name, of, given, bits, self.notation.single)
+        if any(each is None for each in of):
+            return None
+        return self.notation.called[name](of[0]) if name in self.notation.called else of_tape(self.tape, name, of, extra)
 
-    def source(self, name: str, given: int) -> Any:
+    def source(self, name: str, extra: int) -> Any:
         """What a tape has without an operation."""
-        return _leaf(self.tape, name, given, self.notation.single)
+        return of_tape(self.tape, name, (), extra)
 
     def called(self, symbol: Any) -> str:
         """The name of a value in the method's text if it is free, which it then no longer is; else ""."""
@@ -388,7 +309,7 @@ class Writer:
 
         def made(name: str, of: list[int], given: int) -> _Value:
             parts = [values[place] for place in of]
-            symbol = self.symbol(name, [each.symbol for each in parts], given, [each.bits for each in parts])
+            symbol = self.symbol(name, [each.symbol for each in parts], given)
             if name.startswith("multiply") or name == "subtract multiply":  # what changes least stands first
                 parts[:2] = sorted(parts[:2], key=lambda each: (each.rank, each.text.holds != PRODUCT))
             elif name == "add" and all(each.text.holds == ATOM for each in parts):  # and here last
@@ -400,13 +321,13 @@ class Writer:
             else:
                 text = self.notation.formula(name, [each.text for each in parts], given, [each.bits for each in parts])
             count = sum((Counter(each.operations) for each in parts), Counter[str]())
-            if name in KINDS:
-                count[KINDS[name]] += 1
+            if name in OPERATIONS and (counted := OPERATIONS[name].counted):
+                count[counted] += 1
             return _Value(text, symbol, max(each.rank for each in parts), None, count, True)
 
         for place, (name, of, given) in enumerate(operations):
             if name == "constant":
-                values.append(_Value(self.notation.number(given), _leaf(self.tape, name, given, self.notation.single), 0, given))
+                values.append(_Value(self.notation.number(given), self.source(name, given), 0, given))
                 continue
             if not of:
                 text, symbol, rank_of_leaf = leaf(name, given)

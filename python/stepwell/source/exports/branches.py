@@ -13,15 +13,16 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from ...reference.tape.operations import COMPARISONS, ON_BITS, OPERATIONS
+
 #: Cycles that a branch costs where it was predicted wrongly: a side that takes fewer is computed always.
 WORTH = 16
 
-#: Cycles of operations, about; others take one.
-COST = {"divide": 8, "square root": 12, "sine": 20, "cosine": 20, "logarithm": 30, "constant": 0}
+#: Cycles of functions, about, and of constants.
+CYCLES = {"sine": 20, "cosine": 20, "logarithm": 30, "constant": 0}
 
-TRUTHS = ("less", "at most", "equal")
+#: Operations on bits that truths have, too.
 ON_TRUTHS = ("and", "or", "exclusive or")
-ON_BITS = ("add bits", "shift up", "shift down")
 
 #: Names, operands and other arguments.
 Operations = Sequence[tuple[str, tuple[int, ...], int]]
@@ -128,7 +129,7 @@ class Branched:
             costs: dict[Path, int] = defaultdict(int)
             for line, path in self._paths.items():
                 for depth in range(1, len(path) + 1):
-                    costs[path[:depth]] += COST.get(self.nodes[line].name, 1)
+                    costs[path[:depth]] += _cycles(self.nodes[line].name)
             cheap = {path for path, cost in costs.items() if cost < WORTH}
             both = {line for line in self.order if line not in self._joint and all(self._are_dear(line))}
             if not cheap and not both:
@@ -346,6 +347,10 @@ class Branched:
                         branch.keeps.append(of)
 
 
+def _cycles(name: str) -> int:
+    return OPERATIONS[name].cycles if name in OPERATIONS else CYCLES.get(name, 1)
+
+
 def kind_of(
     node: tuple[str, tuple[int, ...], int], kind: Callable[[int], str], constant: Callable[[int], int | None], all_bits: int
 ) -> str:
@@ -354,13 +359,13 @@ def kind_of(
     kinds = {kind(each) for each in of}
     if name == "constant":
         return "any" if given in (0, all_bits) else "number"
-    if name in TRUTHS:
+    if name in COMPARISONS:
         return "truth"
-    if name in ON_BITS:
-        return "bits"
     if name in ON_TRUTHS:
         is_magnitude = name == "and" and any(constant(each) == all_bits >> 1 for each in of)
         return "truth" if kinds <= {"truth", "any"} else "number" if is_magnitude and kinds == {"number"} else "bits"
+    if name in ON_BITS:
+        return "bits"
     if name == "choose":
         kinds = {kind(each) for each in of[1:]}
         if kind(of[0]) != "truth" or "bits" in kinds or {"truth", "number"} <= kinds:

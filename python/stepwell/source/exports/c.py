@@ -119,7 +119,8 @@ class C(Skeleton):
 
     title = "C"
     endings = (".c", ".h")
-    infinity, root, floor, magnitude, fma = "INFINITY", "sqrt", "floor", "fabs", "fma"
+    infinity, magnitude, fma = "INFINITY", "fabs", "fma"
+    writes: ClassVar[dict[str, str]] = {"square root": "sqrt({})", "floor": "floor({})"}
     bits_literal = "UINT64_C({})"
     truths = ("0", "1")
     samples = "{name}, {count}"
@@ -166,8 +167,7 @@ int main(void) {
     return 0;
 }"""
     of_single: ClassVar[dict[str, Any]] = {
-        "root": "sqrtf",
-        "floor": "floorf",
+        "writes": {"square root": "sqrtf({})", "floor": "floorf({})"},
         "magnitude": "fabsf",
         "fma": "fmaf",
         "bits_literal": "UINT32_C({})",

@@ -74,7 +74,8 @@ class JavaScript(Skeleton):
     title = "JavaScript"
     array_type = "Float64Array"
     endings = (".js", ".mjs")
-    infinity, root, floor, magnitude, fma = "Infinity", "Math.sqrt", "Math.floor", "Math.abs", None
+    infinity, magnitude, fma = "Infinity", "Math.abs", None
+    writes: ClassVar[dict[str, str]] = {"square root": "Math.sqrt({})", "floor": "Math.floor({})"}
     bits_literal = "{}n"
     me = "this."
     step_in = "  "

@@ -7,11 +7,11 @@ are never kept as a number, since not every language would preserve the bits of 
 from __future__ import annotations
 
 import re
-import struct
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from ...errors import UnsupportedError
+from ...reference.tape.operations import COMPARISONS, ON_BITS, OPERATIONS
 from ..explanation import formula as plain
 from ..explanation.formula import ATOM, BOTH, CHOICE, COMPARISON, EITHER, NOT, SIGN, SUM, Formula, Notation
 from ..explanation.listing import Line
@@ -19,12 +19,8 @@ from .functions import FUNCTIONS
 from .names import Field, Names
 from .program import Assignment, Table
 
-#: Operations whose result is a number.
-ARITHMETIC = ("add", "subtract", "multiply", "divide", "negate")
-
-#: Operations that become calls of functions on bits.
-BIT_FUNCTIONS = {"and": "and_bits", "or": "or_bits", "exclusive or": "xor_bits", "add bits": "add_bits"}
-BIT_FUNCTIONS |= {"shift up": "shift_up", "shift down": "shift_down"}
+#: Comparisons whose sign is another one than in a formula.
+SIGNS = {"at most": "<=", "equal": "=="}
 
 #: Values that are named after a rate evaluation: the state at which it is made, and the increments.
 EVALUATION = re.compile(r"−?d?[vy](\d+)")
@@ -43,6 +39,7 @@ class Language(Notation):
         of_single: the attributes that differ in float32.
         truths: how false and true are written.
         words: how "not", "and" and "or" are written.
+        writes: how operations are written that are no sums, products, comparisons or operations on bits; {} is the operand.
         me: the prefix of a field and a parameter.
         samples: how a table of samples is passed to a function; {name} is the table, {count} its length.
         kinds: the kind of each value with a name of its own, by that name: "number", "truth" or "bits".
@@ -53,9 +50,8 @@ class Language(Notation):
     truths: ClassVar[tuple[str, str]] = ("false", "true")
     words: ClassVar[tuple[str, str, str]] = ("!", "&&", "||")
     infinity: ClassVar[str]
-    root: ClassVar[str]
-    floor: ClassVar[str]
     magnitude: ClassVar[str]
+    writes: ClassVar[dict[str, str]]
     fma: ClassVar[str | None]
     types: ClassVar[dict[str, str]] = {}
     of_single: ClassVar[dict[str, Any]]
@@ -79,16 +75,11 @@ class Language(Notation):
 
     def number(self, bits: int) -> Formula:
         """A constant; one that is not finite is made from its bits."""
-        x = plain.number_of(bits, self.single)
+        x = self.precision.constant(bits)
         if x != x:
             return Formula(self.call("number_of", self.whole(bits)))
         text = self.infinity if abs(x) == float("inf") else self.literal(abs(x))
-        return Formula(f"−{text}", SIGN) if bits >> self.sign_place else Formula(text)
-
-    @property
-    def sign_place(self) -> int:
-        """Which bit is the sign."""
-        return 31 if self.single else 63
+        return Formula(f"−{text}", SIGN) if bits >> self.precision.sign_place else Formula(text)
 
     def literal(self, x: float) -> str:
         """A finite number: the shortest text that is read as it."""
@@ -128,10 +119,10 @@ class Language(Notation):
 
     # ---- operations
 
-    def formula(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
+    def formula(self, name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | None]) -> Formula:
         """An operation of these; ``bits`` are those of the operands that are constants."""
-        if name in BIT_FUNCTIONS:
-            return self._on_bits(name, of, given, bits)
+        if name in ON_BITS:
+            return self._on_bits(name, of, extra, bits)
         if name == "choose":
             return self._choice(of, bits)
         numbers = [self.as_number(each) for each in of]
@@ -140,24 +131,22 @@ class Language(Notation):
                 return numbers[0]
             case "same":
                 return of[0]
-            case "less" | "at most" | "equal":
-                sign = {"less": "<", "at most": "<=", "equal": "=="}[name]
+            case _ if name in COMPARISONS:
                 a, b = numbers
+                sign = SIGNS.get(name, OPERATIONS[name].sign)
                 return Formula(f"{a.within(SUM)} {sign} {b.within(SUM)}", COMPARISON, is_truth=True)
-            case "square root":
-                return Formula(f"{self.root}({numbers[0].text})")
-            case "floor":
-                return Formula(f"{self.floor}({numbers[0].text})")
             case "divide":
                 return self.quotient(numbers[0], numbers[1], bits[1])
             case "sample":
-                return self._sample(self.tables[given], numbers[0].text)
+                return self._sample(self.tables[extra], numbers[0].text)
             case "multiply add" | "multiply subtract" | "subtract multiply":
-                return Formula(f"{self.fma}{plain.formula(name, numbers, given, bits).text.removeprefix('fma')}")
+                return Formula(f"{self.fma}{plain.formula(name, numbers, extra, bits).text.removeprefix('fma')}")
             case _ if name in FUNCTIONS:
                 return Formula(self.call(name, numbers[0].text))
-            case _ if name in ARITHMETIC:
-                return plain.formula(name, numbers, given, bits)
+            case "add" | "subtract" | "multiply" | "negate":
+                return plain.formula(name, numbers, extra, bits)
+            case _ if name in self.writes:
+                return Formula(self.writes[name].format(*(each.text for each in numbers)))
             case _:
                 raise UnsupportedError(f"language: there is nothing in {self.title} for the operation {name!r} of this step")
 
@@ -194,21 +183,21 @@ class Language(Notation):
         """One of two values."""
         return f"{truth.within(EITHER)} ? {a.within(EITHER)} : {b.within(EITHER)}"
 
-    def _on_bits(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
+    def _on_bits(self, name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | None]) -> Formula:
         alike = all(each.is_truth or known in (0, self.all_bits) for each, known in zip(of, bits, strict=True))
         if name in ("and", "or", "exclusive or") and alike and any(each.is_truth for each in of):
             return self._of_truths(name, of, bits)
         if name == "exclusive or":
             for x, turning in (of, of[::-1]):
-                if (last := LAST_BIT.fullmatch(turning.text)) and int(last[2]) == self.sign_place and not x.is_truth:
+                if (last := LAST_BIT.fullmatch(turning.text)) and int(last[2]) == self.precision.sign_place and not x.is_truth:
                     return Formula(self.call("turn_sign", self.as_number(x).text, last[1]))
         if name == "and":
             for value, known in zip(of, reversed(bits), strict=True):
                 if known == self.all_bits >> 1 and not (value.is_bits or value.is_truth):
                     return Formula(f"{self.magnitude}({value.text})")
         operands = [self.as_bits(each, known).text for each, known in zip(of, bits, strict=True)]
-        more = [str(given)] if name.startswith("shift") else []
-        return Formula(self.call(BIT_FUNCTIONS[name], *operands, *more), is_bits=True)
+        kind = OPERATIONS[name]
+        return Formula(self.call(kind.sign, *operands, *[str(extra)] * kind.has_extra), is_bits=True)
 
     def _of_truths(self, name: str, of: Sequence[Formula], bits: Sequence[int | None]) -> Formula:
         negation, both, either = self.words
@@ -246,9 +235,7 @@ class Language(Notation):
 
     def signed(self, x: float) -> str:
         """A finite number, of either sign."""
-        kinds = ("<I", "<f") if self.single else ("<Q", "<d")
-        (bits,) = struct.unpack(kinds[0], struct.pack(kinds[1], x))
-        return self.text(self.number(bits).text)
+        return self.text(self.number(self.precision.pattern(x)).text)
 
     def value(self, field: Field) -> str:
         """The number of a field that is one number."""

@@ -97,7 +97,8 @@ class Python(Skeleton):
     title = "Python"
     endings = (".py",)
     comment, gap, end = "#", "  ", ""
-    infinity, root, floor, magnitude, fma = "math.inf", "square_root", "floor", "abs", "fused"
+    infinity, magnitude, fma = "math.inf", "abs", "fused"
+    writes: ClassVar[dict[str, str]] = {"square root": "square_root({})", "floor": "floor({})"}
     bits_literal = "{}"
     truths = ("False", "True")
     words = ("not ", "and", "or")
@@ -137,8 +138,7 @@ for _ in range($steps):
 print(s.$shown[0])"""
     of_single: ClassVar[dict[str, Any]] = {
         "infinity": "float32(numpy.inf)",
-        "root": "numpy.sqrt",
-        "floor": "numpy.floor",
+        "writes": {"square root": "numpy.sqrt({})", "floor": "numpy.floor({})"},
         "fma": None,
         "time": "float32(self.t0 + s.step * float(self.dt))",
         "rounding": "float32($text)",

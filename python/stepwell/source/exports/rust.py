@@ -61,7 +61,8 @@ class Rust(Skeleton):
     title = "Rust"
     endings = (".rs",)
     doc = "///"
-    infinity, root, floor, magnitude, fma = "f64::INFINITY", "f64::sqrt", "f64::floor", "f64::abs", "f64::mul_add"
+    infinity, magnitude, fma = "f64::INFINITY", "f64::abs", "f64::mul_add"
+    writes: ClassVar[dict[str, str]] = {"square root": "f64::sqrt({})", "floor": "f64::floor({})"}
     bits_literal = "{}u64"
     samples = "&{name}"
     me = "self."
@@ -106,8 +107,7 @@ fn main() {
 }"""
     of_single: ClassVar[dict[str, Any]] = {
         "infinity": "f32::INFINITY",
-        "root": "f32::sqrt",
-        "floor": "f32::floor",
+        "writes": {"square root": "f32::sqrt({})", "floor": "f32::floor({})"},
         "magnitude": "f32::abs",
         "fma": "f32::mul_add",
         "bits_literal": "{}u32",

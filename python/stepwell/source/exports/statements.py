@@ -83,8 +83,7 @@ class Statements:
         for line in sorted(needed):
             name, of, given = operations[line]
             if of:
-                bits = [self._branched.constant(each) for each in of]
-                symbols[line] = self._writer.symbol(name, [symbols[each] for each in of], given, bits)
+                symbols[line] = self._writer.symbol(name, [symbols[each] for each in of], given)
             else:
                 symbols[line] = self._writer.source(name, given)
         return symbols

@@ -14,6 +14,7 @@ from ...base.arrays import Shape
 from ...errors import UnsupportedError
 from ...model.parameters import aligned
 from ...reference.signal import Held
+from ...reference.tape.operations import COMPARISONS, ON_BITS
 from ...runs import engine
 from ..explanation.listing import Body, Named, increments_last, indexed, parameters
 from .functions import named
@@ -28,7 +29,7 @@ MAX_IN_LOOPS = 400_000
 NEVER, RUN, STEP, STATE = range(4)
 
 #: Operations whose value is bits or a truth and not a number, so that it cannot be part of a state or a field.
-NO_NUMBER = ("less", "at most", "equal", "and", "or", "exclusive or", "add bits", "shift up", "shift down")
+NO_NUMBER = (*COMPARISONS, *ON_BITS)
 
 
 class Part(NamedTuple):

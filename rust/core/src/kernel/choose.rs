@@ -3,11 +3,8 @@
 //! A vector unit is busy when there are enough independent operations. One vector has few of them: a step is mostly one long
 //! dependency chain. So several vectors are interleaved: the longer the chain in comparison with the work, the more.
 
-use super::shape::Shape;
-use crate::{
-    isa::Level,
-    tape::{Op, split::Body},
-};
+use super::{shape::Shape, timing::timing};
+use crate::{isa::Level, tape::split::Body};
 
 /// The most operations of a kernel, about, so that its code stays in the instruction cache.
 const MAX_CODE_OPERATIONS: usize = 2000;
@@ -72,7 +69,10 @@ fn fastest(body: &Body, level: Level, members: usize) -> Shape {
     }
     let most = (MAX_CODE_OPERATIONS / body.work()).max(1);
     let interleaving = interleaving(body, level).min(most);
-    if interleaving <= MAX_SIDE_BY_SIDE_AROUND_SLOW && most >= VECTORS_AROUND_SLOW && body.ops.iter().any(|op| is_slow(*op)) {
+    if interleaving <= MAX_SIDE_BY_SIDE_AROUND_SLOW
+        && most >= VECTORS_AROUND_SLOW
+        && body.ops.iter().any(|op| timing(*op).is_slow())
+    {
         // One after the other: see `schedule`, where each fills the waits of the one before it.
         let fit = MAX_ROW_BYTES / row_bytes(body, width).max(1);
         let block_vectors = evenly(vectors, VECTORS_AROUND_SLOW.min(fit).max(1));
@@ -113,10 +113,13 @@ fn interleaving(body: &Body, level: Level) -> usize {
     let (mut work, mut longest) = (0.0, 0.0f64);
     let mut after = vec![0.0; body.ops.len()];
     for (id, op) in body.ops.iter().enumerate() {
-        let (wait, cost) = timing(*op);
+        if op.is_leaf() {
+            continue;
+        }
+        let timing = timing(*op);
         let (operands, n) = op.operands();
-        after[id] = wait + operands[..n].iter().map(|operand| after[*operand as usize]).fold(0.0, f64::max);
-        work += cost;
+        after[id] = f64::from(timing.latency) + operands[..n].iter().map(|operand| after[*operand as usize]).fold(0.0, f64::max);
+        work += timing.interval();
         longest = longest.max(after[id]);
     }
     // Fitted to the fastest numbers on the scenes of the benchmarks. With 16 registers more than five vectors cause spills. NEON
@@ -124,28 +127,5 @@ fn interleaving(body: &Body, level: Level) -> usize {
     match level {
         Level::Avx2 => (2.2 * longest / work).ceil().clamp(1.0, 5.0) as usize,
         _ => (3.8 * longest / work - 1.3).round().clamp(1.0, 6.0) as usize,
-    }
-}
-
-/// Whether its unit cannot begin one in every cycle: roots and quotients.
-pub(super) fn is_slow(op: Op) -> bool {
-    keeps_its_unit(timing(op).1)
-}
-
-/// Whether a unit that is busy for so many cycles cannot begin an operation in every one.
-pub(super) fn keeps_its_unit(busy: f64) -> bool {
-    busy > 1.0
-}
-
-/// Latency and reciprocal throughput of an operation on a vector of 512 bits, in cycles.
-pub(super) fn timing(op: Op) -> (f64, f64) {
-    match op {
-        _ if op.is_leaf() => (0.0, 0.0),
-        Op::Add(..) | Op::Sub(..) | Op::Mul(..) => (3.0, 0.5),
-        Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..) => (4.0, 0.5),
-        Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) | Op::Floor(_) => (4.0, 0.5),
-        Op::Div(..) => (13.0, 8.0),
-        Op::Sqrt(_) => (20.0, 13.0),
-        _ => (1.0, 0.5),
     }
 }

@@ -17,6 +17,7 @@ mod registers;
 pub(crate) mod runner;
 mod schedule;
 mod shape;
+mod timing;
 mod write;
 mod written;
 mod x86;

@@ -7,11 +7,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{
-    choose::{is_slow, keeps_its_unit, timing},
-    plan::KernelPlan,
-    shape::Shape,
-};
+use super::{plan::KernelPlan, shape::Shape, timing::timing};
 use crate::tape::Op;
 
 /// The operations in their order: the index of each among those of the plan, and its vector.
@@ -108,8 +104,8 @@ impl Waits {
         // Half a vector is done in half the time where a unit makes a few numbers after the other.
         let share = if shape.width * shape.bytes < 64 { 0.5 } else { 1.0 };
         let time = |op: Op| {
-            let (latency, busy) = timing(op);
-            [latency, if is_slow(op) { busy * share } else { busy }]
+            let timing = timing(op);
+            [timing.latency.into(), if timing.is_slow() { timing.interval() * share } else { timing.interval() }]
         };
         let mut maker = vec![None; plan.sources.len()];
         plan.steps.iter().enumerate().for_each(|(i, step)| maker[step.id as usize] = Some(i));
@@ -204,8 +200,8 @@ impl Waits {
         made
     }
 
-    /// As [`is_slow`].
+    /// Whether its unit cannot begin one in every cycle.
     fn is_slow(&self, i: usize) -> bool {
-        keeps_its_unit(self.time[i][1])
+        self.time[i][1] > 1.0
     }
 }

@@ -229,5 +229,5 @@ impl Equations {
 /// Whether its value is constant but for jumps, or is made bit by bit: outside of a function there is no smooth value of such an
 /// operation.
 fn rounds_or_works_on_bits(op: Op) -> bool {
-    matches!(op, Op::Floor(_) | Op::And(..) | Op::Or(..) | Op::Xor(..) | Op::AddBits(..) | Op::ShiftUp(..) | Op::ShiftDown(..))
+    op.counted() == "bits"
 }

@@ -23,7 +23,7 @@ mod uses;
 
 use std::collections::BTreeSet;
 
-pub use self::op::{Counts, Id, Op};
+pub use self::op::{Counts, Id, OPERATIONS, Op};
 use self::{fast_hash::FastHashMap, real::Precision};
 
 /// Operations in the order in which they were first requested, each once.
@@ -211,7 +211,7 @@ impl Tape {
                         return self.shorten(Add(x, y));
                     }
                 }
-                self.keep(Add(a.min(b), a.max(b)))
+                self.keep(op.in_order())
             }
             Sub(a, b) => {
                 if self.bits(b) == zero {
@@ -244,21 +244,16 @@ impl Tape {
                         let product = self.shorten(Mul(a, y));
                         self.shorten(Neg(product))
                     }
-                    _ => self.keep(Mul(a.min(b), a.max(b))),
+                    _ => self.keep(op.in_order()),
                 }
             }
             Div(a, b) if self.bits(b) == one => a,
-            Equal(a, b) => self.keep(Equal(a.min(b), a.max(b))),
-            And(a, b) => self.keep(And(a.min(b), a.max(b))),
-            Or(a, b) => self.keep(Or(a.min(b), a.max(b))),
-            Xor(a, b) => self.keep(Xor(a.min(b), a.max(b))),
-            AddBits(a, b) => self.keep(AddBits(a.min(b), a.max(b))),
             Select(_, a, b) if a == b => a,
             Select(truth, a, _) if self.bits(truth) == Some(self.precision.all_bits()) => a,
             Select(truth, _, b) if self.bits(truth) == zero => b,
             Copy(a) => a,
             ShiftUp(a, 0) | ShiftDown(a, 0) => a,
-            _ => self.keep(op),
+            _ => self.keep(op.in_order()),
         }
     }
 
@@ -271,9 +266,7 @@ impl Tape {
         let bits = |id: Id| self.bits(id);
         let (x, y, z) = (bits(a)?, if n > 1 { bits(b)? } else { 0 }, if n > 2 { bits(c)? } else { 0 });
         let made = self.precision.apply(op, x, y, z);
-        let is_sum = matches!(op, Op::Add(..) | Op::Sub(..) | Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..));
-        let is_number = is_sum || matches!(op, Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) | Op::Floor(_));
-        (!is_number || !self.precision.number(made).is_nan()).then_some(made)
+        (!op.rounds() || !self.precision.number(made).is_nan()).then_some(made)
     }
 
     /// The same operations in the same places, with some replaced by others of the same operands or earlier ones.

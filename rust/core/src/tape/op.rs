@@ -3,99 +3,184 @@
 /// A value on a tape, by the index of its operation.
 pub type Id = u32;
 
-/// An operation. Comparisons set all bits of a number where they are true, and none where they are false.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Op {
+/// The table of operations, one a line: its fields, which of them are operands, what it takes besides, its name, its text in a
+/// listing, among which [`Counts`] it is counted, and whether its two operands may be exchanged.
+macro_rules! operations {
+    ($($(#[$doc:meta])* $op:ident $(($($field:ident: $type:ty),*))?, [$($operand:ident),*], $extra:expr, $name:literal,
+       $text:literal, $counted:ident $(, $commutes:ident)?;)*) => {
+        /// An operation. Comparisons set all bits of a number where they are true, and none where they are false.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Op {
+            $($(#[$doc])* $op $(($($type),*))?,)*
+        }
+
+        /// Of each operation its name, how many operands it has, among which counts it is, and whether they may be exchanged.
+        pub const OPERATIONS: &[(&str, usize, &str, bool)] =
+            &[$(($name, <[&str]>::len(&[$(stringify!($operand)),*]), stringify!($counted), commutes!($($commutes)?))),*];
+
+        #[allow(unused_variables)]
+        impl Op {
+            /// Its operands: the first so many of the three.
+            #[inline]
+            pub fn operands(self) -> ([Id; 3], usize) {
+                match self {
+                    $(Op::$op $(($($field),*))? => first([$($operand),*]),)*
+                }
+            }
+
+            /// The same operation over the first so many of three operands.
+            fn over(self, operands: [Id; 3]) -> Op {
+                let mut operands = operands.into_iter();
+                match self {
+                    $(Op::$op $(($($field),*))? => {
+                        $(let $operand = operands.next().unwrap_or_default();)*
+                        Op::$op $(($($field),*))?
+                    })*
+                }
+            }
+
+            /// Its name.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Op::$op { .. } => $name,)*
+                }
+            }
+
+            /// Among which [`Counts`] it is.
+            pub(super) fn counted(self) -> &'static str {
+                match self {
+                    $(Op::$op { .. } => stringify!($counted),)*
+                }
+            }
+
+            /// What it takes besides the operands: the index of a leaf, the bits of a constant, a number of places.
+            pub fn extra(self) -> u64 {
+                match self {
+                    $(Op::$op $(($($field),*))? => $extra.into(),)*
+                }
+            }
+
+            /// Its text in a listing.
+            pub(super) fn text(self) -> String {
+                match self {
+                    $(Op::$op $(($($field),*))? => format!($text),)*
+                }
+            }
+
+            /// Whether its two operands may be exchanged.
+            pub(crate) fn commutes(self) -> bool {
+                match self {
+                    $(Op::$op { .. } => commutes!($($commutes)?),)*
+                }
+            }
+        }
+
+        impl Counts {
+            /// Counts one more.
+            pub fn note(&mut self, op: Op) {
+                match op {
+                    $(Op::$op { .. } => count!(self, $counted),)*
+                }
+            }
+        }
+    };
+}
+
+macro_rules! commutes {
+    () => {
+        false
+    };
+    (commutes) => {
+        true
+    };
+}
+
+macro_rules! count {
+    ($counts:expr, none) => {{}};
+    ($counts:expr, $kind:ident) => {
+        $counts.$kind += 1
+    };
+}
+
+operations! {
     /// A number of the state, as it is at the start of the step.
-    State(u32),
+    State(i: u32), [], i, "state", "state[{i}]", none;
     /// A parameter of the member.
-    Param(u32),
+    Param(i: u32), [], i, "parameter", "param[{i}]", none;
     /// The step h.
-    Step,
+    Step, [], 0u32, "step", "h", none;
     /// The time at the start of the step.
-    Time,
+    Time, [], 0u32, "time", "t", none;
     /// A number, by its bits; of 32 bits the lower half.
-    Const(u64),
+    Const(bits: u64), [], bits, "constant", "bits {bits:#018x}", none;
     /// A sampled input at a time.
-    Sample(u32, Id),
+    Sample(i: u32, t: Id), [t], i, "sample", "input[{i}] at %{t}", none;
     /// a + b
-    Add(Id, Id),
+    Add(a: Id, b: Id), [a, b], 0u32, "add", "%{a} + %{b}", additions, commutes;
     /// a − b
-    Sub(Id, Id),
+    Sub(a: Id, b: Id), [a, b], 0u32, "subtract", "%{a} - %{b}", additions;
     /// a · b
-    Mul(Id, Id),
+    Mul(a: Id, b: Id), [a, b], 0u32, "multiply", "%{a} * %{b}", multiplications, commutes;
     /// a / b
-    Div(Id, Id),
+    Div(a: Id, b: Id), [a, b], 0u32, "divide", "%{a} / %{b}", divisions;
     /// a · b + c, rounded once
-    MulAdd(Id, Id, Id),
+    MulAdd(a: Id, b: Id, c: Id), [a, b, c], 0u32, "multiply add", "fused %{a} * %{b} + %{c}", fused;
     /// a · b − c, rounded once
-    MulSub(Id, Id, Id),
+    MulSub(a: Id, b: Id, c: Id), [a, b, c], 0u32, "multiply subtract", "fused %{a} * %{b} - %{c}", fused;
     /// c − a · b, rounded once
-    SubMul(Id, Id, Id),
+    SubMul(a: Id, b: Id, c: Id), [a, b, c], 0u32, "subtract multiply", "fused %{c} - %{a} * %{b}", fused;
     /// √a
-    Sqrt(Id),
+    Sqrt(a: Id), [a], 0u32, "square root", "sqrt %{a}", square_roots;
     /// −a
-    Neg(Id),
+    Neg(a: Id), [a], 0u32, "negate", "- %{a}", none;
     /// The largest whole number not above a.
-    Floor(Id),
+    Floor(a: Id), [a], 0u32, "floor", "floor %{a}", bits;
     /// a < b; false of a NaN, as all comparisons are.
-    Less(Id, Id),
+    Less(a: Id, b: Id), [a, b], 0u32, "less", "%{a} < %{b}", choices;
     /// a ≤ b
-    LessEqual(Id, Id),
+    LessEqual(a: Id, b: Id), [a, b], 0u32, "at most", "%{a} <= %{b}", choices;
     /// a = b
-    Equal(Id, Id),
+    Equal(a: Id, b: Id), [a, b], 0u32, "equal", "%{a} = %{b}", choices, commutes;
     /// Of bits: where the first is set the second, else the third. A mask comes from a comparison.
-    Select(Id, Id, Id),
+    Select(m: Id, a: Id, b: Id), [m, a, b], 0u32, "choose", "%{m} ? %{a} : %{b}", choices;
     /// Bits of both.
-    And(Id, Id),
+    And(a: Id, b: Id), [a, b], 0u32, "and", "%{a} and %{b}", bits, commutes;
     /// Bits of either.
-    Or(Id, Id),
+    Or(a: Id, b: Id), [a, b], 0u32, "or", "%{a} or %{b}", bits, commutes;
     /// Bits of one and not of both.
-    Xor(Id, Id),
+    Xor(a: Id, b: Id), [a, b], 0u32, "exclusive or", "%{a} xor %{b}", bits, commutes;
     /// The sum of both as whole numbers of as many bits, without a carry out.
-    AddBits(Id, Id),
+    AddBits(a: Id, b: Id), [a, b], 0u32, "add bits", "%{a} plus %{b}", bits, commutes;
     /// Bits moved up by so many places, zeros after them.
-    ShiftUp(Id, u32),
+    ShiftUp(a: Id, n: u32), [a], n, "shift up", "%{a} << {n}", bits;
     /// Bits moved down by so many places, zeros before them.
-    ShiftDown(Id, u32),
+    ShiftDown(a: Id, n: u32), [a], n, "shift down", "%{a} >> {n}", bits;
     /// The same value again: where the next state is a number of the present one, or a constant.
-    Copy(Id),
+    Copy(a: Id), [a], 0u32, "copy", "%{a}", none;
     /// Of a body ([`super::split::Body`]): a number of the member that is the same in every step.
-    Row(u32),
+    Row(i: u32), [], i, "row", "row[{i}]", none;
     /// Of a body: a number that is the same for all members and steps. Of a tape that is being cut: a fact of an input, see
     /// `split`.
-    Uniform(u32),
+    Uniform(i: u32), [], i, "uniform", "uniform[{i}]", none;
     /// Of a body: a number of the step, the same for all members.
-    PerStep(u32),
+    PerStep(i: u32), [], i, "of the step", "step[{i}]", none;
     /// Of a body: a number of the member that its sampled inputs have at the step.
-    Held(u32),
+    Held(i: u32), [], i, "held", "held[{i}]", none;
     /// Of a body: a sample, by its place, where members are at times of their own.
-    Gather(Id),
+    Gather(a: Id), [a], 0u32, "gather", "sample %{a}", none;
+}
+
+/// So many operands in three places.
+const fn first<const N: usize>(operands: [Id; N]) -> ([Id; 3], usize) {
+    let (mut three, mut i) = ([0; 3], 0);
+    while i < N {
+        three[i] = operands[i];
+        i += 1;
+    }
+    (three, N)
 }
 
 impl Op {
-    /// Its operands: the first so many of the three.
-    #[inline]
-    pub fn operands(self) -> ([Id; 3], usize) {
-        use Op::*;
-        match self {
-            State(_) | Param(_) | Step | Time | Const(_) | Row(_) | Uniform(_) | PerStep(_) | Held(_) => ([0; 3], 0),
-            Sample(_, a) | Sqrt(a) | Neg(a) | Floor(a) | ShiftUp(a, _) | ShiftDown(a, _) | Copy(a) | Gather(a) => ([a, 0, 0], 1),
-            Add(a, b)
-            | Sub(a, b)
-            | Mul(a, b)
-            | Div(a, b)
-            | Less(a, b)
-            | LessEqual(a, b)
-            | Equal(a, b)
-            | And(a, b)
-            | Or(a, b)
-            | Xor(a, b)
-            | AddBits(a, b) => ([a, b, 0], 2),
-            MulAdd(a, b, c) | MulSub(a, b, c) | SubMul(a, b, c) | Select(a, b, c) => ([a, b, c], 3),
-        }
-    }
-
     /// The same operation with other operands.
     #[must_use]
     pub fn with(self, mut f: impl FnMut(Id) -> Id) -> Op {
@@ -106,41 +191,19 @@ impl Op {
         self.over(operands)
     }
 
-    /// The same operation over the first so many of three operands.
-    fn over(self, [a, b, c]: [Id; 3]) -> Op {
-        use Op::*;
-        match self {
-            State(_) | Param(_) | Step | Time | Const(_) | Row(_) | Uniform(_) | PerStep(_) | Held(_) => self,
-            Sample(i, _) => Sample(i, a),
-            Sqrt(_) => Sqrt(a),
-            Neg(_) => Neg(a),
-            Floor(_) => Floor(a),
-            ShiftUp(_, n) => ShiftUp(a, n),
-            ShiftDown(_, n) => ShiftDown(a, n),
-            Copy(_) => Copy(a),
-            Gather(_) => Gather(a),
-            Add(..) => Add(a, b),
-            Sub(..) => Sub(a, b),
-            Mul(..) => Mul(a, b),
-            Div(..) => Div(a, b),
-            Less(..) => Less(a, b),
-            LessEqual(..) => LessEqual(a, b),
-            Equal(..) => Equal(a, b),
-            MulAdd(..) => MulAdd(a, b, c),
-            MulSub(..) => MulSub(a, b, c),
-            SubMul(..) => SubMul(a, b, c),
-            Select(..) => Select(a, b, c),
-            And(..) => And(a, b),
-            Or(..) => Or(a, b),
-            Xor(..) => Xor(a, b),
-            AddBits(..) => AddBits(a, b),
-        }
+    /// The same operation with its operands in order, if they may be exchanged.
+    #[must_use]
+    pub(super) fn in_order(self) -> Op {
+        let ([a, b, c], _) = self.operands();
+        if self.commutes() { self.over([a.min(b), a.max(b), c]) } else { self }
     }
 
-    /// Whether its two operands may be exchanged.
-    pub(crate) fn commutes(self) -> bool {
+    /// Whether it makes a number, rounded, and not the bits of its operands or a mask.
+    pub(super) fn rounds(self) -> bool {
         use Op::*;
-        matches!(self, Add(..) | Mul(..) | Equal(..) | And(..) | Or(..) | Xor(..) | AddBits(..))
+        let is_mask = matches!(self, Less(..) | LessEqual(..) | Equal(..));
+        let of_bits = matches!(self, And(..) | Or(..) | Xor(..) | AddBits(..) | ShiftUp(..) | ShiftDown(..));
+        !(self.is_leaf() || is_mask || of_bits || matches!(self, Neg(_) | Copy(_) | Select(..) | Sample(..) | Gather(_)))
     }
 
     /// Whether it is an input of the tape, without operands.
@@ -169,22 +232,6 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts one more.
-    pub fn note(&mut self, op: Op) {
-        use Op::*;
-        match op {
-            Add(..) | Sub(..) => self.additions += 1,
-            Mul(..) => self.multiplications += 1,
-            MulAdd(..) | MulSub(..) | SubMul(..) => self.fused += 1,
-            Div(..) => self.divisions += 1,
-            Sqrt(_) => self.square_roots += 1,
-            Less(..) | LessEqual(..) | Equal(..) | Select(..) => self.choices += 1,
-            And(..) | Or(..) | Xor(..) | AddBits(..) | ShiftUp(..) | ShiftDown(..) | Floor(_) => self.bits += 1,
-            State(_) | Param(_) | Step | Time | Const(_) | Sample(..) | Neg(_) | Copy(_) | Row(_) | Uniform(_) | PerStep(_)
-            | Held(_) | Gather(_) => {}
-        }
-    }
-
     /// All of them.
     pub(crate) fn total(&self) -> usize {
         let kinds =

@@ -1,6 +1,6 @@
 //! How the values of a tape are used: what decides which of them are fused.
 
-use super::{Id, Op, Tape, print::named};
+use super::{Id, Op, Tape};
 
 /// Use counts, ranks and step dependence of the values needed for the roots.
 pub(super) struct UseCounts {
@@ -52,7 +52,7 @@ fn ranks(ops: &[Op], needed: &[bool]) -> Vec<u32> {
             if op.commutes() {
                 of[..n].sort_unstable();
             }
-            (named(op), of, n)
+            (op.name(), op.extra(), of, n)
         });
         for id in level {
             ranks[id as usize] = next;

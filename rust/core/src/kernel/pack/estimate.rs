@@ -1,13 +1,12 @@
 //! How many cycles a step of one member takes, by a model of a CPU that executes out of order.
 //!
 //! Each operation begins when its operands are there and a unit for it is free. Several steps are gone through, since a step
-//! begins before the one before it has ended. The numbers were measured on Zen 4, within 5 % of what the kernels take; Intel's
-//! CPUs have other numbers of the same order.
+//! begins before the one before it has ended. On Zen 4 the numbers are within 5 % of what the kernels take.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 use super::packed::{Make, Move, Packed};
-use crate::tape::Op;
+use crate::kernel::timing::{Timing, UNITS, Unit, timing};
 
 /// Operations that a CPU begins in a cycle.
 const ISSUED: usize = 6;
@@ -17,44 +16,28 @@ const WINDOW: usize = 256;
 const STEPS: usize = 6;
 const WARM: usize = 3;
 
-/// Units: how many there are of each kind.
-const UNITS: [u8; 5] = [2, 2, 1, 2, 2];
-const SUM: usize = 0;
-const PRODUCT: usize = 1;
-const DIVIDER: usize = 2;
-const MOVES: usize = 3;
-const BITS: usize = 4;
-
-/// The unit of an operation, for how many cycles it is busy, and after how many the result is there.
-fn timing(make: &Make) -> Option<(usize, u64, u64)> {
-    Some(match make {
+/// The times of an operation; none of what is there before.
+fn time_of(make: &Make) -> Option<Timing> {
+    let latency = match make {
         Make::State(_) | Make::Fixed(_) | Make::Now(_) => return None,
-        Make::Move(Move::Pick(_)) => (MOVES, 1, 1),
-        Make::Move(Move::Join) => (MOVES, 1, 2),
-        Make::Move(Move::High) => (MOVES, 1, 3),
-        Make::Move(Move::Permute(_)) => (MOVES, 1, 4),
-        Make::Op(op) => match op {
-            Op::Add(..) | Op::Sub(..) => (SUM, 1, 3),
-            Op::Mul(..) => (PRODUCT, 1, 3),
-            Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..) => (PRODUCT, 1, 4),
-            Op::Div(..) => (DIVIDER, 5, 13),
-            Op::Sqrt(_) => (DIVIDER, 8, 20),
-            Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) => (SUM, 1, 4),
-            Op::Floor(_) => (SUM, 1, 3),
-            _ => (BITS, 1, 1),
-        },
-    })
+        Make::Op(op) => return Some(timing(*op)),
+        Make::Move(Move::Pick(_)) => 1,
+        Make::Move(Move::Join) => 2,
+        Make::Move(Move::High) => 3,
+        Make::Move(Move::Permute(_)) => 4,
+    };
+    Some(Timing::quick(Unit::Moves, latency))
 }
 
 /// Cycles in which units are busy.
-struct Unit {
+struct Occupied {
     busy: Vec<u8>,
     units: u8,
     /// No request will start before this cycle: operations ask in the order in which they are ready.
     from: u64,
 }
 
-impl Unit {
+impl Occupied {
     /// The first cycle from `ready` on at which a unit is free for so long, which it then is not any more.
     fn take(&mut self, ready: u64, cycles: u64) -> u64 {
         self.from = self.from.max(ready);
@@ -81,7 +64,7 @@ impl Unit {
 /// Cycles of a step, with the units that there are (`limited`) or with as many as there are operations.
 pub(crate) fn cycles(packed: &Packed, limited: bool) -> f64 {
     let count = packed.vectors.len();
-    let timings: Vec<_> = packed.vectors.iter().map(|vector| timing(&vector.make)).collect();
+    let timings: Vec<_> = packed.vectors.iter().map(|vector| time_of(&vector.make)).collect();
     let made: Vec<usize> = (0..count).filter(|at| timings[*at].is_some()).collect();
     let mut users: Vec<Vec<usize>> = vec![Vec::new(); count];
     let mut waits: Vec<u32> = vec![0; count];
@@ -102,15 +85,17 @@ pub(crate) fn cycles(packed: &Packed, limited: bool) -> f64 {
         ready[*node] = (n / ISSUED) as u64;
         waits[*node] += u32::from(n >= WINDOW);
     }
-    let mut units = UNITS.map(|units| Unit { busy: Vec::new(), units, from: 0 });
+    let mut units = UNITS.map(|unit| Occupied { busy: Vec::new(), units: unit.count(), from: 0 });
     let mut next: BinaryHeap<Reverse<(u64, usize)>> =
         (0..STEPS * count).filter(|node| waits[*node] == 0).map(|node| Reverse((ready[node], node))).collect();
     let mut ends = [0u64; STEPS];
     while let Some(Reverse((time, node))) = next.pop() {
         let (step, at) = (node / count, node % count);
         let done = match timings[at] {
-            Some((unit, busy, wait)) if limited => units[unit].take(time, busy) + wait,
-            Some((_, _, wait)) => time + wait,
+            Some(Timing { unit, latency, busy, .. }) if limited => {
+                units[unit as usize].take(time, busy.into()) + u64::from(latency)
+            }
+            Some(timing) => time + u64::from(timing.latency),
             None => time,
         };
         ends[step] = ends[step].max(done);
@@ -129,5 +114,5 @@ pub(crate) fn cycles(packed: &Packed, limited: bool) -> f64 {
 
 /// After how many cycles a vector is there, when what it is made of is.
 pub(crate) fn wait(make: &Make) -> u64 {
-    timing(make).map_or(0, |(_, _, wait)| wait)
+    time_of(make).map_or(0, |timing| timing.latency.into())
 }
