@@ -112,7 +112,6 @@ def test_import_is_quick_and_small() -> None:
         "stepwell._core",
         "stepwell.base",
         "stepwell.base.registry",
-        "stepwell.errors",
     }
 
 
@@ -132,19 +131,19 @@ def test_a_run_imports_no_more_than_it_needs() -> None:
 
 
 def test_names_are_those_that_type_checkers_see() -> None:
-    """What is imported on first use stands in ``__init__.py`` once for Python and once for type checkers and editors."""
-    tree = ast.parse(Path(sw.__file__).read_text(encoding="utf-8"))
-    (block,) = (node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
-    seen: dict[str, str] = {}
-    for node in block.body:
-        assert isinstance(node, ast.ImportFrom)
-        seen |= {name.name: node.module or "" for name in node.names}
-    eager = {name for name in sw.__all__ if name in ("__version__", "errors", "isa", "isa_levels") or hasattr(sw.errors, name)}
-    assert set(seen) | eager == set(sw.__all__)
-    for name, module in seen.items():
-        found = getattr(sw, name)
+    """They stand once, in ``__init__.pyi``, in the plain form that ``__init__.py`` reads: each imports what its line says."""
+    tree = ast.parse(Path(sw.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+    imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    assert all(len(node.names) == 1 and node.names[0].asname == node.names[0].name for node in imports)
+    aliases = [(node.module or "", node.names[0].name) for node in imports]
+    own = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)} | {"__version__"}
+    assert {name for _, name in aliases} | own == set(sw.__all__)
+    assert len(imports) + len(own) == len(sw.__all__)
+    for module, name in aliases:
         expected = importlib.import_module(f"stepwell.{module or name}")
-        assert found is (getattr(expected, name) if module else expected)
+        assert getattr(sw, name) is (getattr(expected, name) if module else expected)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = sw.nothing  # type: ignore[attr-defined]
 
 
 def test_a_fork_can_still_use_threads() -> None:

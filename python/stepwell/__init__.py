@@ -9,54 +9,10 @@ runs, and ``solve_ivp`` is called as SciPy's is.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from . import _core, errors
+from . import _core
 from .base import registry
-from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, EventWarning, StepwellError, ToleranceWarning
-
-if TYPE_CHECKING:
-    from . import scenes
-    from .analysis import derivatives, dynamics, stability
-    from .analysis.dynamics import equilibria, jacobian, lyapunov
-    from .analysis.stability import analyse, criteria, stability_along, stability_limit
-    from .interop.saving import load
-    from .interop.solve_ivp import solve_ivp
-    from .model import equations, quaternion
-    from .model.controls import Control, EnergyControl, LengthControl, NormControl, Projection
-    from .model.equations import system
-    from .model.methods import Method, method, methods
-    from .model.surfaces import Floor, Sphere
-    from .model.systems import (
-        Aircraft,
-        Chain,
-        LinearSystem,
-        NBody,
-        Oscillator,
-        Particles,
-        Pendulum,
-        Pendulum3D,
-        RestrictedThreeBody,
-        RigidBody,
-        Rods,
-        Sampled,
-        Sinusoid,
-        Springs,
-        System,
-    )
-    from .runs.events import Event
-    from .runs.integration import integrate
-    from .runs.result import Run, Status
-    from .runs.world import World
-    from .scenes import Scene
-    from .source import explanation, exports
-    from .source.explanation import Explanation, explain
-    from .source.exports import ExportedStep, export
-    from .studies import advice, sweeps
-    from .studies.advice import advise
-    from .studies.sweeps import sweep
-    from .views import charts, explorer, paper
-    from .views.explorer import Explorer, explore
 
 registry.register(
     animate_run="stepwell.views.charts.runs_animation:animate",
@@ -90,81 +46,6 @@ registry.register(
 
 __version__: str = _core.__version__
 
-__all__ = [
-    "AccuracyWarning",
-    "Aircraft",
-    "Chain",
-    "Control",
-    "ControlWarning",
-    "DivergenceWarning",
-    "EnergyControl",
-    "Event",
-    "EventWarning",
-    "Explanation",
-    "Explorer",
-    "ExportedStep",
-    "Floor",
-    "LengthControl",
-    "LinearSystem",
-    "Method",
-    "NBody",
-    "NormControl",
-    "Oscillator",
-    "Particles",
-    "Pendulum",
-    "Pendulum3D",
-    "Projection",
-    "RestrictedThreeBody",
-    "RigidBody",
-    "Rods",
-    "Run",
-    "Sampled",
-    "Scene",
-    "Sinusoid",
-    "Sphere",
-    "Springs",
-    "Status",
-    "StepwellError",
-    "System",
-    "ToleranceWarning",
-    "World",
-    "__version__",
-    "advice",
-    "advise",
-    "analyse",
-    "charts",
-    "criteria",
-    "derivatives",
-    "dynamics",
-    "equations",
-    "equilibria",
-    "errors",
-    "explain",
-    "explanation",
-    "explore",
-    "explorer",
-    "export",
-    "exports",
-    "integrate",
-    "isa",
-    "isa_levels",
-    "jacobian",
-    "load",
-    "lyapunov",
-    "method",
-    "methods",
-    "paper",
-    "quaternion",
-    "scenes",
-    "solve_ivp",
-    "stability",
-    "stability_along",
-    "stability_limit",
-    "sweep",
-    "sweeps",
-    "system",
-]
-
 
 def isa() -> str:
     """The CPU level in use: the best of this machine, or the one that ``STEPWELL_KERNELS`` names. All give the same bits.
@@ -188,63 +69,30 @@ def isa_levels() -> list[str]:
     return _core.isa_levels()
 
 
-#: Modules that are attributes, and are imported on first use, so that importing stepwell stays fast. ``gym`` needs gymnasium, so
-#: it is not among the names that are listed.
-_MODULES = {
-    "advice": "studies.advice",
-    "charts": "views.charts",
-    "derivatives": "analysis.derivatives",
-    "dynamics": "analysis.dynamics",
-    "equations": "model.equations",
-    "explanation": "source.explanation",
-    "explorer": "views.explorer",
-    "exports": "source.exports",
-    "gym": "interop.gym",
-    "paper": "views.paper",
-    "quaternion": "model.quaternion",
-    "scenes": "scenes",
-    "stability": "analysis.stability",
-    "sweeps": "studies.sweeps",
-}
+with open(f"{__path__[0]}/__init__.pyi", encoding="utf-8") as _stub:
+    #: Of each public name the module from which the stub beside this file imports it.
+    _SOURCES = {words[3]: words[1][1:] for words in map(str.split, _stub) if words[:1] == ["from"]}
 
-#: The other names that are imported on first use, by the modules that define them; those that are not here are of ``systems``.
-_NAMES = {
-    "studies.advice": "advise",
-    "model.surfaces": "Floor Sphere",
-    "model.controls": "Control EnergyControl LengthControl NormControl Projection",
-    "analysis.dynamics": "equilibria jacobian lyapunov",
-    "model.equations": "system",
-    "runs.events": "Event",
-    "source.explanation": "Explanation explain",
-    "views.explorer": "Explorer explore",
-    "source.exports": "ExportedStep export",
-    "runs.integration": "integrate",
-    "interop.saving": "load",
-    "interop.solve_ivp": "solve_ivp",
-    "model.methods": "Method method methods",
-    "runs.result": "Run Status",
-    "scenes": "Scene",
-    "analysis.stability": "analyse criteria stability_along stability_limit",
-    "studies.sweeps": "sweep",
-    "runs.world": "World",
-}
-_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = sorted([*_SOURCES, "__version__", "isa", "isa_levels"])
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return __all__
 
 
-if not TYPE_CHECKING:  # to which any name would else be one of the package
+def __getattr__(name: str) -> Any:
+    """A public name, imported when it is first used, so that importing stepwell stays fast."""
+    import importlib
 
-    def __getattr__(name: str) -> Any:
-        import importlib
-
-        if name in _MODULES:
-            return importlib.import_module(f"stepwell.{_MODULES[name]}")
-        if name not in __all__:
-            raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
-        module = importlib.import_module(f"stepwell.{_MODULE_OF.get(name, 'model.systems')}")
-        # Kept, so that the next use is as quick as that of any attribute.
-        found = globals()[name] = getattr(module, name)
-        return found
+    if name == "gym":  # not among the names that are listed, since it needs gymnasium
+        return importlib.import_module("stepwell.interop.gym")
+    if name not in _SOURCES:
+        raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
+    source = _SOURCES[name]
+    module = importlib.import_module(f"stepwell.{source}") if source else None
+    if module is None or not hasattr(module, name):  # a module itself
+        value = importlib.import_module(".".join(filter(None, ["stepwell", source, name])))
+    else:
+        value = getattr(module, name)
+    globals()[name] = value  # so that the next use is as quick as that of any attribute
+    return value

@@ -1,0 +1,75 @@
+# The public names, each once: type checkers and editors read them here, and so does __init__.py.
+from . import errors as errors
+from . import scenes as scenes
+from .analysis import derivatives as derivatives
+from .analysis import dynamics as dynamics
+from .analysis import stability as stability
+from .analysis.dynamics import equilibria as equilibria
+from .analysis.dynamics import jacobian as jacobian
+from .analysis.dynamics import lyapunov as lyapunov
+from .analysis.stability import analyse as analyse
+from .analysis.stability import criteria as criteria
+from .analysis.stability import stability_along as stability_along
+from .analysis.stability import stability_limit as stability_limit
+from .errors import AccuracyWarning as AccuracyWarning
+from .errors import ControlWarning as ControlWarning
+from .errors import DivergenceWarning as DivergenceWarning
+from .errors import EventWarning as EventWarning
+from .errors import StepwellError as StepwellError
+from .errors import ToleranceWarning as ToleranceWarning
+from .interop.saving import load as load
+from .interop.solve_ivp import solve_ivp as solve_ivp
+from .model import equations as equations
+from .model import quaternion as quaternion
+from .model.controls import Control as Control
+from .model.controls import EnergyControl as EnergyControl
+from .model.controls import LengthControl as LengthControl
+from .model.controls import NormControl as NormControl
+from .model.controls import Projection as Projection
+from .model.equations import system as system
+from .model.methods import Method as Method
+from .model.methods import method as method
+from .model.methods import methods as methods
+from .model.surfaces import Floor as Floor
+from .model.surfaces import Sphere as Sphere
+from .model.systems import Aircraft as Aircraft
+from .model.systems import Chain as Chain
+from .model.systems import LinearSystem as LinearSystem
+from .model.systems import NBody as NBody
+from .model.systems import Oscillator as Oscillator
+from .model.systems import Particles as Particles
+from .model.systems import Pendulum as Pendulum
+from .model.systems import Pendulum3D as Pendulum3D
+from .model.systems import RestrictedThreeBody as RestrictedThreeBody
+from .model.systems import RigidBody as RigidBody
+from .model.systems import Rods as Rods
+from .model.systems import Sampled as Sampled
+from .model.systems import Sinusoid as Sinusoid
+from .model.systems import Springs as Springs
+from .model.systems import System as System
+from .runs.events import Event as Event
+from .runs.integration import integrate as integrate
+from .runs.result import Run as Run
+from .runs.result import Status as Status
+from .runs.world import World as World
+from .scenes import Scene as Scene
+from .source import explanation as explanation
+from .source import exports as exports
+from .source.explanation import Explanation as Explanation
+from .source.explanation import explain as explain
+from .source.exports import ExportedStep as ExportedStep
+from .source.exports import export as export
+from .studies import advice as advice
+from .studies import sweeps as sweeps
+from .studies.advice import advise as advise
+from .studies.sweeps import sweep as sweep
+from .views import charts as charts
+from .views import explorer as explorer
+from .views import paper as paper
+from .views.explorer import Explorer as Explorer
+from .views.explorer import explore as explore
+
+__version__: str
+
+def isa() -> str: ...
+def isa_levels() -> list[str]: ...
