@@ -385,7 +385,7 @@ def pairs(n: int) -> tuple[Any, Any]:
 @pytest.mark.parametrize("name", ["arctan2", "hypot", "mod", "power"])
 def test_no_result_of_two_numbers_is_further_than_an_ulp_from_the_truth(name: str) -> None:
     tape = _core.Tape(single=True)
-    run = Steps(tape, [getattr(functions, name)(tape.state(0), tape.state(1))], {}, False)
+    run = Evaluation(tape, [getattr(functions, name)(tape.state(0), tape.state(1))], {})
     a, b = pairs(100_000)
     with np.errstate(all="ignore"):
         if name == "mod":  # NaN beyond, and NumPy's has as many digits as it takes
