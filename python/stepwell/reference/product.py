@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.arrays import Array
-from .tape.fused import fma
+from .tape.fma import double_fma as fma
 
 
 def times(matrix: Array, columns: "Sequence[Array] | Array", *, fused: bool = False) -> Array:
