@@ -197,7 +197,7 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool, some: int | 
         if fused:
             following, v1, y1 = evaluated_attempt(plan, 9)(pace, 9, v, y)
         else:
-            s = adaptive.Attempted(system.scaled(1.0, system.batch))
+            s = adaptive.Attempted(system.reference_at_step(1.0, system.batch), system.parts(system.batch))
             with np.errstate(all="ignore"):
                 following, v1, y1 = engine.attempts(plan, s)(pace, 9.0, v, y)
         assert_computes(after, v1, y1, *following.numbers)

@@ -126,7 +126,7 @@ def test_every_attempt(name: str) -> None:
         symbols = Tracer(system, tape).attempt(method)
         if method.has_series and has_branches(system):
             continue  # with numbers, which member a branch is of is not known; runs evaluate the tape
-        s = adaptive.Attempted(system.scaled(1.0, system.batch))
+        s = adaptive.Attempted(system.reference_at_step(1.0, system.batch), system.parts(system.batch))
         with np.errstate(all="ignore"):
             attempt = engine.attempts(engine.Plan(system, method, (MEMBERS,), H), s)
             outcomes = [attempt(each, 9.0, v, y) for each in paces]
