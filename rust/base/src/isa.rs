@@ -4,24 +4,21 @@
 //! are therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA by itself or
 //! reorders, so all give the same bits.
 
-use std::{ffi::OsString, fmt};
+use std::{ffi::OsStr, fmt};
 
-/// An environment variable names a level that is unknown or that this machine does not have.
+/// `STEPWELL_KERNELS` names a level that is unknown or that this machine does not have.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownLevel {
-    /// Which variable.
-    pub variable: &'static str,
-    /// What was given.
-    pub given: String,
-    /// What the machine has.
+    /// The name.
+    pub name: String,
+    /// The names of the levels that this machine has.
     pub known: String,
 }
 
 impl fmt::Display for UnknownLevel {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let UnknownLevel { variable, given, known } = self;
-        let wrong = if *variable == KERNELS { "names no kernels" } else { "is not a CPU level" };
-        write!(f, "{variable}={given:?} {wrong} of this machine; it has {known}")
+        let UnknownLevel { name, known } = self;
+        write!(f, "{KERNELS}={name:?} names no kernels of this machine; it has {known}")
     }
 }
 
@@ -29,8 +26,6 @@ impl std::error::Error for UnknownLevel {}
 
 /// Forces the kernels: `interpret`, or a level whose machine code is written.
 const KERNELS: &str = "STEPWELL_KERNELS";
-/// The older name for that, which takes the names of levels.
-const ISA: &str = "STEPWELL_ISA";
 
 /// What the hot loop may use, in ascending order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,7 +50,7 @@ impl Level {
     /// Every level, ascending.
     pub const ALL: [Level; 4] = [Level::Baseline, Level::Neon, Level::Avx2, Level::Avx512];
 
-    /// Its name, which `STEPWELL_KERNELS` and `STEPWELL_ISA` take.
+    /// Its name, which `STEPWELL_KERNELS` takes.
     pub fn name(self) -> &'static str {
         match self {
             Level::Baseline => "interpret",
@@ -104,22 +99,20 @@ impl Level {
         Level::ALL.into_iter().filter(|l| l.here()).collect()
     }
 
-    /// The level whose kernels `STEPWELL_KERNELS` names, or else the one that `STEPWELL_ISA` does, or else the best of this
-    /// machine.
+    /// The level whose kernels `STEPWELL_KERNELS` names, or else the best of this machine.
     pub fn choose() -> Result<Level, UnknownLevel> {
-        Level::asked(std::env::var_os(KERNELS), std::env::var_os(ISA))
+        Level::named(std::env::var_os(KERNELS).as_deref())
     }
 
-    /// As `choose`, with what the two variables hold; an empty one counts as none.
-    pub fn asked(kernels: Option<OsString>, isa: Option<OsString>) -> Result<Level, UnknownLevel> {
+    /// The level of a name; without a name, or with an empty one, the best of this machine.
+    pub fn named(name: Option<&OsStr>) -> Result<Level, UnknownLevel> {
         let available = Level::available();
-        let given = [(KERNELS, kernels), (ISA, isa)]
-            .into_iter()
-            .find_map(|(variable, given)| given.filter(|given| !given.is_empty()).map(|given| (variable, given)));
-        let Some((variable, given)) = given else { return Ok(available.last().copied().unwrap_or(Level::Baseline)) };
-        available.iter().copied().find(|level| given == level.name()).ok_or_else(|| {
+        let Some(name) = name.filter(|name| !name.is_empty()) else {
+            return Ok(available.last().copied().unwrap_or(Level::Baseline));
+        };
+        available.iter().copied().find(|level| name == level.name()).ok_or_else(|| {
             let known = available.iter().map(|level| level.name()).collect::<Vec<_>>().join(", ");
-            UnknownLevel { variable, given: given.to_string_lossy().into_owned(), known }
+            UnknownLevel { name: name.to_string_lossy().into_owned(), known }
         })
     }
 }

@@ -168,10 +168,8 @@ def _why(word: str) -> str:
     """Why a step is interpreted, in words."""
     if word == "level":
         better = _core.isa_levels()[1:]
-        asked = "STEPWELL_KERNELS or STEPWELL_ISA asks for it"
-        return (
-            asked if better else "there is no machine code for this CPU, which has neither AVX2 nor AVX-512, nor NEON under Linux"
-        )
+        missing = "there is no machine code for this CPU, which has neither AVX2 nor AVX-512, nor NEON under Linux"
+        return "STEPWELL_KERNELS asks for it" if better else missing
     if word == "pages":
         return "this system does not let a program execute code that it has written"
     return "there is no machine code for this step"

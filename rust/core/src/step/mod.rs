@@ -1,12 +1,15 @@
 //! A model and a method become tapes.
 
+mod acceptance;
 mod attempts;
 pub mod cache;
+mod controller;
 pub mod key;
 mod leaves;
 pub mod pace;
 mod properties;
 mod series_pace;
+mod sizes;
 pub mod tapes;
 pub mod trace;
 mod watch;

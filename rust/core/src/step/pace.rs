@@ -1,7 +1,17 @@
-//! Adaptive steps: a member's own time and step, and the decision after each attempt.
+//! Adaptive steps: an attempt of a member's own step, and the decision after it.
 //!
 //! The increments of a step h are h times those of a step of 1. So a system is scaled once, to 1, and stretched to every step.
 
+pub use super::{acceptance::Acceptance, controller::Pace};
+pub(crate) use super::{
+    acceptance::Scales,
+    controller::{MAX_FACTOR, Outlook},
+    sizes::{largest, longer, total},
+};
+use super::{
+    controller::{MIN_FACTOR, MOVES},
+    sizes::absolute,
+};
 use crate::{
     model::{
         program::Program,
@@ -14,8 +24,6 @@ use crate::{
 /// (PI control, Gustafsson 1988), held between MIN_FACTOR and MAX_FACTOR; after a rejected step there is no p and no growth.
 /// Where the error is estimated in a higher order than [`LOW`], it is SAFETY·r^(−3/32)·p^(1/32).
 const SAFETY: f64 = 0.9;
-const MIN_FACTOR: f64 = 0.2;
-pub(crate) const MAX_FACTOR: f64 = 5.0;
 /// r below this counts as this.
 const TINY: f64 = 1e-10;
 /// The sixteenth root of the least p, 1e-4, and its thirty-second.
@@ -36,7 +44,6 @@ pub(crate) const ONSET: f64 = 1.0 / (1u64 << 40) as f64;
 /// short than too long, since it then grows by MAX_FACTOR a step. It is at least MOVES times the time of the start, 2¹²
 /// roundings. After a jump it is MIN_FACTOR times the step before.
 const FIRST: f64 = 0.01;
-const MOVES: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of the length that the push would
 /// have made in this part of the time since the start: it must be long beside the roundings of time, and short beside the motion
@@ -55,256 +62,7 @@ const CHANCE: f64 = 1024.0;
 /// The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
 const OUTSIDE: f64 = 16.0;
 
-/// What a step must satisfy to be accepted.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Acceptance {
-    /// For each number of v, then of y, the group to which it belongs, counted from 0 without gaps, those of v first. The error
-    /// of a group is the length of its numbers. Empty if v is one group and y is another.
-    pub groups: Vec<u32>,
-    /// Whether each group has tolerances of its own.
-    pub own: bool,
-    /// Numbers of v, then of y, by their places, that must not become negative.
-    pub positive: Vec<u32>,
-}
-
-impl Acceptance {
-    /// How many groups v and y have, of so many numbers.
-    pub(crate) fn counts(&self, v: usize, y: usize) -> [usize; 2] {
-        if self.groups.is_empty() {
-            return [v, y].map(|numbers| usize::from(numbers > 0));
-        }
-        let counted = |groups: &[u32]| groups.iter().max().map_or(0, |last| *last as usize + 1);
-        let of_v = counted(self.groups.get(..v).unwrap_or_default());
-        [of_v, counted(&self.groups) - of_v]
-    }
-
-    /// How many numbers stand behind those of the pace: the largest sizes, and the tolerances of their own.
-    pub fn numbers(&self, v: usize, y: usize) -> usize {
-        let [of_v, of_y] = self.counts(v, y);
-        (of_v + of_y) * if self.own { 3 } else { 1 }
-    }
-
-    /// The size of each group of components: of one number its absolute value, of several their length.
-    pub(crate) fn sizes<N: Number>(&self, v: &[N], y: &[N]) -> Vec<N> {
-        if self.groups.is_empty() {
-            return [v, y].into_iter().filter(|block| !block.is_empty()).map(|block| length(block.iter())).collect();
-        }
-        let [of_v, of_y] = self.counts(v.len(), y.len());
-        let mut members = vec![Vec::new(); of_v + of_y];
-        for (group, number) in self.groups.iter().zip(v.iter().chain(y)) {
-            members[*group as usize].push(number);
-        }
-        members.into_iter().map(|numbers| length(numbers.into_iter())).collect()
-    }
-}
-
-/// The length of some numbers; of one number its absolute value.
-fn length<'a, N: Number>(mut numbers: impl ExactSizeIterator<Item = &'a N>) -> N {
-    match numbers.len() {
-        1 => numbers.next().map_or_else(|| N::of(0.0), |number| absolute(*number)),
-        _ => numbers.fold(N::of(0.0), |total, number| total + *number * *number).sqrt(),
-    }
-}
-
-/// Sizes of the groups of components, and what is tolerated of them. They stand behind the pace, in this order.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Scales<N> {
-    /// The largest size so far of each group.
-    pub longest: Vec<N>,
-    /// Tolerances of their own: the relative one of each group, then the absolute one of each; empty if there are none.
-    pub own: Vec<N>,
-}
-
-impl<N: Number> Scales<N> {
-    /// From its numbers.
-    pub(crate) fn of(numbers: &[N], own: bool) -> Self {
-        let (longest, own) = numbers.split_at(if own { numbers.len() / 3 } else { numbers.len() });
-        Scales { longest: longest.to_vec(), own: own.to_vec() }
-    }
-
-    /// The relative and the absolute tolerance of a group.
-    pub(crate) fn tolerances(&self, group: usize, pace: &Pace<N>) -> [N; 2] {
-        match self.own.get(group).zip(self.own.get(self.longest.len() + group)) {
-            Some((relative, absolute)) => [*relative, *absolute],
-            None => [pace.relative, pace.absolute],
-        }
-    }
-}
-
-/// The time of a member and the state of its step-size controller. Steps do not depend on the saved times: a step that passes the
-/// next of them is held, not taken, until the states within it are saved. Each is computed by an extra step from the start of the
-/// held one. An extra step whose error is not tolerated shows that the held one missed something: that one is then rejected.
-#[derive(Clone, Copy, Debug)]
-pub struct Pace<N> {
-    /// Its time.
-    pub t: N,
-    /// The step that it will try next.
-    pub h: N,
-    /// The next output time.
-    pub target: N,
-    /// Above zero: the length of the extra step that comes next, to a saved time.
-    pub extra: N,
-    /// 1 if the next step is held: it was accepted, but passes the target.
-    pub held: N,
-    /// Tolerated error of a step, relative to the size of a group of components.
-    pub relative: N,
-    /// Tolerated error in addition to the relative one.
-    pub absolute: N,
-    /// 1 if errors are relative to the largest size of a group so far, 0 if they are relative to its present size.
-    pub lasts: N,
-    /// The time of the start.
-    pub begin: N,
-    /// The longest step while inputs change from sample to sample: it skips no sample.
-    pub interval: N,
-    /// The time until which inputs change from sample to sample.
-    pub until: N,
-    /// The longest step.
-    pub most_step: N,
-    /// The time that no step crosses, just before the next jump.
-    pub wall: N,
-    /// The sixteenth root of the last accepted error, or its thirty-second.
-    pub before: N,
-    /// How much the next step may grow.
-    pub most: N,
-    /// Accepted attempts.
-    pub accepted: N,
-    /// Rejected attempts.
-    pub rejected: N,
-    /// Steps for saved states: the extra ones, and those that were held and are made once more.
-    pub extra_steps: N,
-    /// The last error over the tolerance.
-    pub error: N,
-    /// The energy that a control or projection added in accepted steps; for a control the sum over their evaluations.
-    pub work: N,
-}
-
-/// The next attempt.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Outlook<N: Number> {
-    /// How long the step is.
-    pub step: N,
-    /// Whether it is an extra one.
-    pub is_extra: N::Truth,
-    /// Whether it ends at the wall.
-    pub ends: N::Truth,
-    /// Whether it is a step of the run: not at the target, not held, not out of attempts, and the time moves.
-    pub runs: N::Truth,
-}
-
-impl Pace<f64> {
-    /// Whether there is a step of the run to try.
-    pub(crate) fn runs(&self, budget: f64) -> bool {
-        self.outlook(budget).runs
-    }
-
-    /// The same of many members, from rows of their numbers: without moving what is not needed, for this is asked after every
-    /// attempt.
-    pub(crate) fn find_running<'a>(row: impl Fn(usize) -> &'a [f64], budget: f64, runs: &mut [bool]) {
-        let places = Pace::of(std::array::from_fn(|i| i as f64));
-        let row = |place: f64| row(place as usize);
-        let (t, h, target, wall, held) = (row(places.t), row(places.h), row(places.target), row(places.wall), row(places.held));
-        let (extra, accepted, rejected) = (row(places.extra), row(places.accepted), row(places.rejected));
-        let times = t.iter().zip(h).zip(target.iter().zip(wall));
-        let counts = held.iter().zip(extra).zip(accepted.iter().zip(rejected));
-        for (runs, (((t, h), (target, wall)), ((held, extra), (accepted, rejected)))) in runs.iter_mut().zip(times.zip(counts)) {
-            let moves = (*t < *target) & (*t < *wall) & (*t < *t + *h);
-            *runs = moves & (*accepted + *rejected < budget) & (*held <= 0.0) & (*extra <= 0.0);
-        }
-    }
-
-    /// How many steps of the present length are left to the next output times, in the mean of those members that are not there.
-    pub(crate) fn steps_left<'a>(row: impl Fn(usize) -> &'a [f64]) -> f64 {
-        let places = Pace::of(std::array::from_fn(|i| i as f64));
-        let [t, h, target] = [places.t, places.h, places.target].map(|place| row(place as usize));
-        let left = t.iter().zip(h).zip(target).filter(|((t, _), target)| t < target).map(|((t, h), target)| (target - t) / h);
-        let (count, sum) = left.fold((0.0, 0.0), |(n, sum), left| (n + 1.0, sum + left));
-        if count > 0.0 { sum / count } else { 0.0 }
-    }
-
-    /// Whether the next output time is within the held step.
-    pub(crate) fn holds(&self) -> bool {
-        self.held > 0.0 && self.target < self.reach().0
-    }
-
-    /// Where a member goes on that has come to a wall: from a time just after the jump, to the next wall, with a step that is
-    /// chosen anew. A series chooses its step by itself.
-    #[must_use]
-    pub(crate) fn crossed(self, after: f64, wall: f64, series: bool) -> Self {
-        let (least, first) = (MOVES * after.abs(), MIN_FACTOR * self.h);
-        let h = if series { self.h } else { longer(first, least) };
-        let before = if series { MIN_FACTOR * self.before } else { 1.0 };
-        Pace { t: after, wall, h, before, most: MAX_FACTOR, ..self }
-    }
-
-    /// The same where nothing runs.
-    #[must_use]
-    pub(crate) fn idle(self) -> Self {
-        Pace { target: self.t, extra: 0.0, held: 0.0, ..self }
-    }
-}
-
 impl<N: Number> Pace<N> {
-    /// How many numbers it has.
-    pub const NUMBERS: usize = 20;
-    /// Places of the time and of the step to try next among them.
-    pub(crate) const PLACES: [usize; 2] = [0, 1];
-
-    /// From its numbers.
-    pub fn of(numbers: [N; 20]) -> Self {
-        let [t, h, target, extra, held, relative, absolute, lasts, begin, interval, rest @ ..] = numbers;
-        let [until, most_step, wall, before, most, accepted, rejected, extra_steps, error, work] = rest;
-        Pace {
-            t,
-            h,
-            target,
-            extra,
-            held,
-            relative,
-            absolute,
-            lasts,
-            begin,
-            interval,
-            until,
-            most_step,
-            wall,
-            before,
-            most,
-            accepted,
-            rejected,
-            extra_steps,
-            error,
-            work,
-        }
-    }
-
-    /// Its numbers.
-    pub fn numbers(&self) -> [N; 20] {
-        let Pace { t, h, target, extra, held, relative, absolute, lasts, begin, interval, .. } = *self;
-        let Pace { until, most_step, wall, before, most, accepted, rejected, extra_steps, error, work, .. } = *self;
-        [
-            t,
-            h,
-            target,
-            extra,
-            held,
-            relative,
-            absolute,
-            lasts,
-            begin,
-            interval,
-            until,
-            most_step,
-            wall,
-            before,
-            most,
-            accepted,
-            rejected,
-            extra_steps,
-            error,
-            work,
-        ]
-    }
-
     /// Where a member stands at the start, and the sizes of its groups. A step to try first that is below zero is chosen here: a
     /// share of the shortest time in which a group changes by its size. `s` is scaled to a step of 1; `series` says whether the
     /// method is one.
@@ -353,31 +111,6 @@ impl<N: Number> Pace<N> {
         }
         let h = self.shortened(N::choose(zero.below(self.h), self.h, longer(h, least)), self.t);
         (Pace { h, before: if series { h } else { self.before }, ..self }, longest)
-    }
-
-    /// Where the next step ends, and whether that is at the wall.
-    fn reach(&self) -> (N, N::Truth) {
-        let ends = self.wall.below(self.t + self.h);
-        (N::choose(ends, self.wall, self.t + self.h), ends)
-    }
-
-    /// What comes next.
-    pub(crate) fn outlook(&self, budget: N) -> Outlook<N> {
-        let zero = N::of(0.0);
-        let is_extra = zero.below(self.extra);
-        let ends = self.reach().1;
-        let moves = self.t.below(self.t + self.h);
-        let left = (self.accepted + self.rejected).below(budget);
-        let waits = self.t.below(self.target) & self.t.below(self.wall);
-        let runs = waits & moves & left & self.held.at_most(zero) & !is_extra;
-        let step = N::choose(is_extra, self.extra, N::choose(ends, self.wall - self.t, self.h));
-        Outlook { step, is_extra, ends, runs }
-    }
-
-    /// A step from t, no longer than is allowed there.
-    pub(crate) fn shortened(&self, h: N, t: N) -> N {
-        let most = N::choose(t.below(self.until) & self.interval.below(self.most_step), self.interval, self.most_step);
-        N::choose(most.below(h), most, h)
     }
 }
 
@@ -521,26 +254,6 @@ pub(crate) fn over<N: Number>(error: &[N], bound: &[N]) -> N {
     let zero = N::of(0.0);
     let shares = error.iter().zip(bound).map(|(error, bound)| N::choose(error.at_most(zero), zero, *error / *bound));
     shares.reduce(longer).unwrap_or(zero)
-}
-
-/// |x|
-fn absolute<N: Number>(x: N) -> N {
-    x.and_bits(u64::MAX >> 1)
-}
-
-/// The larger of two sizes.
-pub(crate) fn longer<N: Number>(a: N, b: N) -> N {
-    N::choose(a.below(b), b, a)
-}
-
-/// The largest of some sizes.
-pub(crate) fn largest<N: Number>(sizes: &[N]) -> N {
-    sizes.iter().copied().reduce(longer).unwrap_or_else(|| N::of(0.0))
-}
-
-/// The sum of some sizes.
-pub(crate) fn total<N: Number>(sizes: &[N]) -> N {
-    sizes.iter().copied().reduce(|total, size| total + size).unwrap_or_else(|| N::of(0.0))
 }
 
 impl<N: Number> Pace<N> {

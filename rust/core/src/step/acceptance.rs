@@ -1,0 +1,80 @@
+//! What is tolerated of a step: the sizes of groups of components, and their tolerances.
+
+use super::{controller::Pace, sizes::absolute};
+use crate::tape::number::Number;
+
+/// What a step must satisfy to be accepted.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Acceptance {
+    /// For each number of v, then of y, the group to which it belongs, counted from 0 without gaps, those of v first. The error
+    /// of a group is the length of its numbers. Empty if v is one group and y is another.
+    pub groups: Vec<u32>,
+    /// Whether each group has tolerances of its own.
+    pub own: bool,
+    /// Numbers of v, then of y, by their places, that must not become negative.
+    pub positive: Vec<u32>,
+}
+
+impl Acceptance {
+    /// How many groups v and y have, of so many numbers.
+    pub(crate) fn counts(&self, v: usize, y: usize) -> [usize; 2] {
+        if self.groups.is_empty() {
+            return [v, y].map(|numbers| usize::from(numbers > 0));
+        }
+        let counted = |groups: &[u32]| groups.iter().max().map_or(0, |last| *last as usize + 1);
+        let of_v = counted(self.groups.get(..v).unwrap_or_default());
+        [of_v, counted(&self.groups) - of_v]
+    }
+
+    /// How many numbers stand behind those of the pace: the largest sizes, and the tolerances of their own.
+    pub fn numbers(&self, v: usize, y: usize) -> usize {
+        let [of_v, of_y] = self.counts(v, y);
+        (of_v + of_y) * if self.own { 3 } else { 1 }
+    }
+
+    /// The size of each group of components: of one number its absolute value, of several their length.
+    pub(crate) fn sizes<N: Number>(&self, v: &[N], y: &[N]) -> Vec<N> {
+        if self.groups.is_empty() {
+            return [v, y].into_iter().filter(|block| !block.is_empty()).map(|block| length(block.iter())).collect();
+        }
+        let [of_v, of_y] = self.counts(v.len(), y.len());
+        let mut members = vec![Vec::new(); of_v + of_y];
+        for (group, number) in self.groups.iter().zip(v.iter().chain(y)) {
+            members[*group as usize].push(number);
+        }
+        members.into_iter().map(|numbers| length(numbers.into_iter())).collect()
+    }
+}
+
+/// The length of some numbers; of one number its absolute value.
+fn length<'a, N: Number>(mut numbers: impl ExactSizeIterator<Item = &'a N>) -> N {
+    match numbers.len() {
+        1 => numbers.next().map_or_else(|| N::of(0.0), |number| absolute(*number)),
+        _ => numbers.fold(N::of(0.0), |total, number| total + *number * *number).sqrt(),
+    }
+}
+
+/// Sizes of the groups of components, and what is tolerated of them. They stand behind the pace, in this order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scales<N> {
+    /// The largest size so far of each group.
+    pub longest: Vec<N>,
+    /// Tolerances of their own: the relative one of each group, then the absolute one of each; empty if there are none.
+    pub own: Vec<N>,
+}
+
+impl<N: Number> Scales<N> {
+    /// From its numbers.
+    pub(crate) fn of(numbers: &[N], own: bool) -> Self {
+        let (longest, own) = numbers.split_at(if own { numbers.len() / 3 } else { numbers.len() });
+        Scales { longest: longest.to_vec(), own: own.to_vec() }
+    }
+
+    /// The relative and the absolute tolerance of a group.
+    pub(crate) fn tolerances(&self, group: usize, pace: &Pace<N>) -> [N; 2] {
+        match self.own.get(group).zip(self.own.get(self.longest.len() + group)) {
+            Some((relative, absolute)) => [*relative, *absolute],
+            None => [pace.relative, pace.absolute],
+        }
+    }
+}
