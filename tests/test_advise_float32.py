@@ -130,8 +130,6 @@ def test_of_equal_costs_float64_comes_first(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_what_float32_does_not_go_with_is_refused_in_words() -> None:
-    sampled = Scene(sw.Oscillator(1.0, a=sw.Sampled([0.0, 1.0, 0.5], 0.5)), v=0.0, y=1.0, horizon=1.0)
-
     def turning(t: Any) -> Any:
         return -np.sin(t), np.cos(t)
 
@@ -139,7 +137,6 @@ def test_what_float32_does_not_go_with_is_refused_in_words() -> None:
     far = Scene(sw.Oscillator(1.0, a=sw.Sinusoid(0.0, 1e6)), v=0.0, y=1.0, horizon=10.0, exact=turning)
     large = Scene(sw.Oscillator(1.0), v=0.0, y=1e39, horizon=10.0, exact=lambda t: (-1e39 * np.sin(t), 1e39 * np.cos(t)))
     for scene, said in (
-        (sampled, "float32 does not go with samples"),
         (far, "in float32 a sinusoid's angle may grow to"),
         (large, "y: expected numbers up to 3.4e38, the largest of float32"),
     ):

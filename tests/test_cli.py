@@ -143,9 +143,9 @@ def test_run_takes_float32(capsys):
     wide, narrow = (json.loads(run_command(capsys, *words, *more)[1]) for more in ((), ("--float32",)))
     run = sw.scenes.kepler().run("rk4", 0.02, steps=50, dtype="float32")
     assert narrow["last_y"] == run.y[-1].tolist() != wide["last_y"]
-    code, out, err = run_command(capsys, "run", "kepler", "--method", "dop853", "--tolerance", "1e-6", "--float32")
+    code, out, err = run_command(capsys, "run", "kepler", "--method", "dop853", "--tolerance", "1e-8", "--float32")
     assert (code, out) == (2, "")
-    assert "float32 goes with fixed steps only" in err
+    assert "tolerance: in float32 a step rounds the state" in err
 
 
 def test_run_takes_a_control(capsys):

@@ -58,6 +58,8 @@ OUTSIDE = 16.0
 #: short than too long, since it then grows by MAX_FACTOR a step. It is at least MOVES times the time of the start, 2¹² roundings.
 #: After a jump it is MIN_FACTOR times the step before.
 FIRST, MOVES = 0.01, 1.0 / (1 << 40)
+#: The same of float32, 2⁸ of its roundings: a state at an event is known to them only, and the next step must lead away from it.
+SINGLE_MOVES = 1.0 / (1 << 16)
 
 OK, BUDGET, UNDERFLOW, NOT_FINITE = 0, 2, 3, 4
 
@@ -358,18 +360,27 @@ def waiting(
 
 
 def begin(
-    s: Any, pace: Pace, v: Array, y: Array, block_axes: tuple[int, int], groups: tuple[int, ...] = (), *, series: bool = False
+    s: Any,
+    pace: Pace,
+    v: Array,
+    y: Array,
+    block_axes: tuple[int, int],
+    groups: tuple[int, ...] = (),
+    *,
+    series: bool = False,
+    moves: float = MOVES,
 ) -> Pace:
     """Where members stand at the start, from their time and tolerance; a step to try first that is below zero is chosen here.
 
     It is a share of the shortest time in which a group changes by its size: |v|/|v̇|, |y|/|ẏ| and, from rest, √(|y|/|v̇|), times
     that do not depend on the units of v and y. As the rates at one time may be small by chance, they are looked at twice more,
-    in the middle and at the end of the step. ``s`` is scaled to a step of 1; ``series`` says whether the method is one.
+    in the middle and at the end of the step. ``s`` is scaled to a step of 1; ``series`` says whether the method is one; ``moves``
+    is ``MOVES`` or that of float32.
     """
     with np.errstate(all="ignore"):
         rates = s.dv(pace.t, v, y), s.dy(pace.t, v, y)
         longest = sizes(v, y, block_axes, groups)
-        least = MOVES * longer(pace.t, -pace.t)
+        least = moves * longer(pace.t, -pace.t)
         counts = Acceptance(groups).counts(*numbers_in(v, y, block_axes))
         changes = sizes(*rates, block_axes, groups)
         time = shortest(longest, changes, counts)

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 def check(system: System, method: Method, form: str = "direct") -> None:
     """Raise if nothing of float32 goes with what is asked for."""
-    if form == "matrix":
-        raise UnsupportedError(f"dtype: float32 goes with form='direct' only, got form={form!r}")
     if form == "power":
         raise UnsupportedError(
             "dtype: float32 does not go with form='power': each squaring of a matrix doubles the error of the power, which is "
@@ -91,14 +89,19 @@ def rounded_state(*blocks: Array) -> tuple[Array, ...]:
     return tuple(block.astype(np.float32).astype(np.float64) for block in blocks)
 
 
-def check_inputs(system: System, last: float) -> None:
-    """Raise if an input is not defined in float32 up to a time."""
+def check_written(system: System, what: str) -> None:
+    """Raise if a step that is written out would need numbers of both widths."""
     for name, each in system.all_inputs().items():
         if isinstance(each, Sampled) and not each.constant:
             raise UnsupportedError(
-                f"dtype: float32 does not go with samples, whose times take more digits than it has, and {name} has some; use "
-                f"float64, or a force that is constant over each of several runs"
+                f"dtype: {what} has numbers of one width, but which sample of {name} holds is found at a time of float64; use "
+                f"dtype='float64'"
             )
+
+
+def check_inputs(system: System, last: float) -> None:
+    """Raise if an input is not defined in float32 up to a time."""
+    for name, each in system.all_inputs().items():
         if isinstance(each, Sinusoid):
             angle = float(np.abs(each.omega).max() * abs(last) + np.abs(each.phase).max())
             if angle > LAST_SINGLE_ANGLE:

@@ -34,6 +34,7 @@ from ..model.methods import methods as every_method
 from ..model.systems import Sinusoid, System
 from ..model.systems.base import TINY, a_system
 from ..reference.acceptance import Acceptance
+from ..reference.adaptive import sizes
 from . import continuation, engine, positive
 from .result import AdaptiveState
 from .tolerance import order_of_series, tolerances_of
@@ -261,13 +262,13 @@ class Request(NamedTuple):
         fused, single = _arithmetic(options.fused, options.dtype)
         if before is not None:
             continuation.changes_on(before, options.events)
-        if single:
-            raise UnsupportedError(
-                "dtype: float32 goes with fixed steps only, and tolerance= or at= was given; use dt= and steps="
-            )
         _goes_with_times(options, before)
         watched = None if options.events is None else _events(options.events, "direct")
         control = _goes_with_a_tolerance(system, how, a_control(options.control), options, before)
+        if single:
+            from . import float32  # only such runs need it
+
+            float32.check(system, how)
         t0 = checks.numbers("t0", 0.0 if options.t0 is None else options.t0, unit="units of time")
         times = checks.numbers("at", options.at, unit="units of time")
         if times.ndim == 0 or times.size == 0:
@@ -333,6 +334,8 @@ class Request(NamedTuple):
             raise ShapeError(f"resume: expected a run of batch {batch}, got one of batch {pace.shape[1:]}")
         for end in (t0, times):
             system.check_time(float(np.abs(end).max()))
+            if single:
+                float32.check_inputs(system, float(np.abs(end).max()))
         every = None if options.every is None else checks.count("every", options.every, 1)
         if every is not None and len(times) > 1:
             raise ShapeError(
@@ -358,6 +361,11 @@ class Request(NamedTuple):
         since = sign * t0 if pace is None else np.maximum(pace[engine.TARGET], sign * t0)
         _ascending(sign * times, since, sign, pace is not None)
         v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)
+        if single:
+            v, y = float32.rounded_state(v, y)
+            if tolerances is not None:
+                lengths = sizes(v, y, (len(system.v_shape), len(system.y_shape)), acceptance.groups)
+                float32.check_tolerance(tolerances.relative, tolerances.absolute, lengths)
         progress = checks.flag("progress", options.progress)
         if control is not None:
             system = system.controlled(control, v, y, TINY)
@@ -366,7 +374,7 @@ class Request(NamedTuple):
         begin: Any = sign * t0 if t0.ndim else float(sign * t0)
         plan = engine.Plan(
             system, how, batch, 1.0, begin, threads=workers, backend=backend, fused=fused, order=order, acceptance=acceptance,
-            backward=backward, force=None if force is None else spread(force, system.v_shape, batch),
+            backward=backward, force=None if force is None else spread(force, system.v_shape, batch), single=single,
         )  # fmt: skip
         at = np.ascontiguousarray(sign * times)
         pacing = engine.Pacing(at, budget, pace is None, None if jumps is None else np.sort(sign * jumps, axis=0))

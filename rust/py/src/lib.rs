@@ -334,6 +334,7 @@ fn split_of<'py>(py: Python<'py>, split: &Split) -> PyResult<Bound<'py, PyDict>>
         split::UniformSource::Last(table) => ("last", table),
         split::UniformSource::First(table) => ("first", table),
         split::UniformSource::Lanes => ("lanes", 0),
+        split::UniformSource::Slack => ("slack", 0),
     };
     let entry = |entry: &split::Entry| match *entry {
         split::Entry::Value => ("value", 0),
@@ -344,7 +345,9 @@ fn split_of<'py>(py: Python<'py>, split: &Split) -> PyResult<Bound<'py, PyDict>>
     d.set_item("given", split.sources.iter().map(source).collect::<Vec<_>>())?;
     d.set_item("params", &split.params)?;
     d.set_item("entries", split.entries.iter().map(entry).collect::<Vec<_>>())?;
-    for (name, body) in [("run", &split.run), ("member", &split.member), ("step", &split.step), ("body", &split.body)] {
+    let bodies =
+        [("run", &split.run), ("member", &split.member), ("step", &split.step), ("clock", &split.clock), ("body", &split.body)];
+    for (name, body) in bodies {
         d.set_item(name, body_of(body))?;
     }
     Ok(d)

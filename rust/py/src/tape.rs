@@ -316,7 +316,7 @@ impl Tape {
     /// or a "record".
     fn trace(&self, model: &ModelSpec, what: &str) -> PyResult<Vec<Symbol>> {
         let before = std::mem::take(&mut *lock(&self.0));
-        let how = if what == "attempt" || what == "begin" { model.attempts() } else { model.how.clone() };
+        let how = if matches!(what, "attempt" | "judged" | "begin") { model.attempts() } else { model.how.clone() };
         let traced = trace::trace(before.clone(), &model.signature, &how, what);
         let (tape, next) = traced.inspect_err(|_| *lock(&self.0) = before).map_err(core_error)?;
         *lock(&self.0) = tape;

@@ -93,6 +93,17 @@ class Steps:
             operations, roots = needed(operations, roots)
         self._run = compiled(operations, roots, single=True)
 
+    def fuse_products_of(self, parameters: int) -> None:
+        """Let products with one of so many first parameters be added by fused multiply-adds, as the matrix form does."""
+        tape = list(self._lines.tape)
+        factors = {line for line, each in enumerate(tape) if each.name == "parameter" and each.given < parameters}
+        products = {line for line, each in enumerate(tape) if each.name == "multiply" and not factors.isdisjoint(each.of)}
+        for line, each in enumerate(tape):
+            if each.name == "add" and (of_sum := products.intersection(each.of)):
+                product = max(of_sum)  # of two the later one is added
+                tape[line] = Operation("multiply add", (*tape[product].of, *(other for other in each.of if other != product)), 0)
+        self._lines.tape = tape
+
     def __call__(
         self, state: Sequence[Any], t: Any, h: Any, numbers: Mapping[int, Any] | None = None, tables: Sequence[Any] | None = None
     ) -> list[Any]:

@@ -211,7 +211,9 @@ def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
     from ...reference import adaptive
 
     system, pace = attempted_system(plan), pace_of(plan, paces)
-    return adaptive.begin(system.unit, pace, v, y, plan.block_axes, plan.acceptance.groups, series=plan.method.has_series)
+    moves = adaptive.SINGLE_MOVES if plan.single else adaptive.MOVES
+    groups, series = plan.acceptance.groups, plan.method.has_series
+    return adaptive.begin(system.unit, pace, v, y, plan.block_axes, groups, series=series, moves=moves)
 
 
 def begun_again(plan: Plan, numbers: Array, t: Array, v: Array, y: Array) -> Array:

@@ -132,6 +132,8 @@ def _matrix_step(plan: Plan, P: Array, Q: Array) -> Callable[[float, Array], Arr
     symbols = tracer.matrix(plan.method.nodes, len(P), inputs, carries)
     numbers = [*P.reshape(-1, *plan.batch), *Q.reshape(-1, *plan.batch), *tracer.numbers]
     lines = single.Steps(tape, symbols, dict(enumerate(numbers)), False, tracer.tables, tracer.times)
+    if plan.fused:
+        lines.fuse_products_of(len(numbers) - len(tracer.numbers))
     return lambda t, s: np.stack(np.broadcast_arrays(*lines(list(s), t, plan.dt)))
 
 
@@ -165,6 +167,7 @@ def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> O
         spec = matrix_model(plan, p, q)
 
         def by_core(plan: Plan, v: Array, y: Array, before: Whole) -> Outcome:
+            v, y = (block.astype(np.float64, copy=False) for block in (v, y))
             return run_by_core(plan, spec, v, y, before.copy(), carried=True, carries=False)
 
         out = by_core(plan, flat_v, flat_y, before)

@@ -90,7 +90,9 @@ def explain(
     single = checks.is_single(dtype)
     control = a_control(control)
     if single and attempt:
-        raise UnsupportedError("attempt: float32 goes with fixed steps only; explain the attempt in float64")
+        raise UnsupportedError(
+            "attempt: one of float32 is two lists, the stages in float32 and the decision in float64; explain it in float64"
+        )
     if attempt and how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"attempt: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
@@ -107,6 +109,7 @@ def explain(
     if single:
         float32.step(system, how, form, 1.0)
         float32.check_inputs(system, 0.0)
+        float32.check_written(system, "a listing")
     choice = how.start_choice(start)
     given = [record] if isinstance(record, str) else [] if record is None else checks.several("record", record, "quantities")
     if given and not system.quantities:

@@ -118,6 +118,7 @@ def export(
     if single:
         dt = float32.step(system, how, "direct", dt)
         float32.check_inputs(system, t0)
+        float32.check_written(system, "an exported step")
     choice = how.start_choice(start)
     control = a_control(control)
     called = prefix(f"{snake(system.kind_name)}_{how.name}" if name is None else name)

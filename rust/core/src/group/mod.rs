@@ -2,6 +2,7 @@
 
 pub mod adaptive_lanes;
 pub mod lanes;
+pub mod single_lanes;
 
 use crate::{
     model::spec::Spec,

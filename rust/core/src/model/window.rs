@@ -88,8 +88,24 @@ pub(crate) fn over<T>(signature: &Signature, window: impl FnOnce() -> Window<Sym
     made
 }
 
+thread_local! {
+    /// The values of all sampled inputs, where they are known and no time is asked for.
+    static VALUES: RefCell<Vec<Symbol>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Runs a function in which sampled inputs have these values at all times.
+pub(crate) fn held<T>(values: Vec<Symbol>, f: impl FnOnce() -> T) -> T {
+    let outer = VALUES.replace(values);
+    let made = f();
+    VALUES.replace(outer);
+    made
+}
+
 /// A sampled input: its mean over the window if there is one, or else its value at a time.
 pub(crate) fn sample(table: u32, t: Symbol) -> Symbol {
+    if let Some(value) = VALUES.with_borrow(|values| values.get(table as usize).copied()) {
+        return value;
+    }
     let at = |table: u32, t: Symbol| Symbol::new(Op::Sample(table, t.0));
     let now = NOW.with_borrow(|now| now.as_ref().map(|(window, lookups)| (*window, lookups[table as usize])));
     let Some((window @ [from, to, _], lookup)) = now.filter(|(_, lookup)| *lookup != Lookup::AtTime) else { return at(table, t) };

@@ -111,7 +111,7 @@ impl Model<'_> {
         Ok(Some(Compiled {
             written: tapes.written,
             computed: counts(&split.body),
-            before: [&split.run, &split.member, &split.step].map(Body::work),
+            before: [split.run.work(), split.member.work(), split.step.work() + split.clock.work()],
             split: split.clone(),
             layout,
             lanes: runner.lanes(),

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use crate::{
     error::Error,
-    group::{AdaptiveBatch, Group, adaptive_lanes::AdaptiveLanes, lanes::Lanes},
+    group::{AdaptiveBatch, Group, adaptive_lanes::AdaptiveLanes, lanes::Lanes, single_lanes::SingleLanes},
     large::{
         adaptive::LargeAdaptive,
         blocks::Schedules,
@@ -147,6 +147,9 @@ impl Model<'_> {
         let (spec, level) = (&self.spec, machine.level);
         let signature = &self.key.signature;
         let rates: Box<dyn Rates> = match self.way(traced, machine, members, 0.0) {
+            StepStrategy::Tape if self.key.precision == Precision::Single => {
+                return Ok(Box::new(SingleLanes::new(traced, spec, level, members, budget)?));
+            }
             StepStrategy::Tape | StepStrategy::Matrix => {
                 return Ok(Box::new(AdaptiveLanes::new(traced, spec, level, members, budget)?));
             }

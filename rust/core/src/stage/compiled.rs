@@ -39,6 +39,8 @@ pub(crate) struct CompiledStage<T: Real = f64> {
     pub(super) single: Interpreter,
     /// Once for each step.
     pub(super) step: Runner<T>,
+    /// Once for each step, what of a step of float32 is computed in float64.
+    pub(super) clock: Option<Runner<f64>>,
     /// Once for each time that comes alone.
     pub(super) moment: Runner<T>,
     /// Several steps at once; none where that does not pay.
@@ -90,6 +92,7 @@ impl<T: Real> CompiledStage<T> {
             member: Interpreter::new(&split.member, runner.lanes(), level),
             single: Interpreter::new(&split.member, 1, Level::Baseline),
             step: Runner::long(&split.step, level, STEPS_AT_ONCE as usize),
+            clock: (!split.clock.next.is_empty()).then(|| Runner::long(&split.clock, level, STEPS_AT_ONCE as usize)),
             moment: Runner::long(&split.step, Level::Baseline, 1),
             unrolled: OnceLock::new(),
             runner,
@@ -113,7 +116,7 @@ impl<T: Real> Stage<T> {
     /// Operations of all its bodies.
     pub(crate) fn size(&self) -> usize {
         let split = &self.split;
-        [&split.run, &split.member, &split.step, &split.body].iter().map(|body| body.ops.len()).sum::<usize>()
+        [&split.run, &split.member, &split.step, &split.clock, &split.body].iter().map(|body| body.ops.len()).sum::<usize>()
     }
 
     /// What makes its steps in a run of so many members.

@@ -20,7 +20,7 @@ use crate::{
     tape::{
         real::Real,
         reserved::BUDGET,
-        split::{Entry, UniformSource},
+        split::{Entry, HOLD_SLACK, UniformSource},
     },
 };
 
@@ -35,6 +35,8 @@ pub struct PreparedStage<T: Real = f64> {
     /// The same as the kernel for entries of steps wants them, and whether that kernel is machine code.
     shared_pool: Vec<T>,
     shared_pool_for: Option<KernelKind>,
+    /// What of a step of float32 is computed in float64.
+    clock: Option<ClockNumbers>,
     /// The uniforms of the hot loop.
     uniforms: Vec<T>,
     /// The same as the kernel wants them, and whether that kernel is machine code.
@@ -64,6 +66,18 @@ pub struct PreparedStage<T: Real = f64> {
     unrolled_pool_for: Option<KernelKind>,
 }
 
+/// Numbers of 64 bits for entries of a step of float32: what all members have in common, the same as a kernel wants it, times, and
+/// the values that entries are made of.
+#[derive(Default)]
+struct ClockNumbers {
+    shared: Vec<f64>,
+    pool: Vec<f64>,
+    pool_for: Option<KernelKind>,
+    times: Vec<f64>,
+    values: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
 impl<T: Real> PreparedStage<T> {
     /// For a run of so many members. `budget` is the most attempts of a member, for those.
     pub fn new(stage: &Stage<T>, spec: &Spec, level: Level, members: usize, clock: &Clock, budget: f64) -> PreparedStage<T> {
@@ -90,8 +104,10 @@ impl<T: Real> PreparedStage<T> {
             UniformSource::Last(input) => last(input),
             UniformSource::First(input) => (before(input) * lanes) as f64,
             UniformSource::Lanes => lanes as f64,
+            UniformSource::Slack => HOLD_SLACK,
         };
-        let shared: Vec<T> = split.sources.iter().map(|source| T::of(number(source))).collect();
+        let wide: Vec<f64> = split.sources.iter().map(number).collect();
+        let shared: Vec<T> = wide.iter().map(|number| T::of(*number)).collect();
         let mut uniforms = vec![T::default(); split.run.next.len()];
         let mut scratch = Vec::new();
         let tile = &mut Tile { state: &mut uniforms, rows: &[], pool: &shared, steps: 1, per_step: &[], held: &[] };
@@ -101,6 +117,7 @@ impl<T: Real> PreparedStage<T> {
             shared,
             shared_pool: Vec::new(),
             shared_pool_for: None,
+            clock: compiled.clock.as_ref().map(|_| ClockNumbers { shared: wide, ..ClockNumbers::default() }),
             uniforms,
             pool: Aligned::new(0),
             pool_for: None,
@@ -305,6 +322,10 @@ impl<T: Real> PreparedStage<T> {
         let (mut times, mut table) = (std::mem::take(&mut self.times), std::mem::take(&mut self.tables[at].1));
         times.clear();
         times.extend((first..first + STEPS_AT_ONCE).map(|k| T::of(clock.at(k))));
+        if let Some(wide) = &mut self.clock {
+            wide.times.clear();
+            wide.times.extend((first..first + STEPS_AT_ONCE).map(|k| clock.at(k)));
+        }
         let compiled = Arc::clone(&self.compiled);
         self.fill(stage, &compiled.step, &times, times.len(), &mut table);
         (self.times, self.tables[at].1) = (times, table);
@@ -314,7 +335,7 @@ impl<T: Real> PreparedStage<T> {
     /// The entries of steps at these times, as many as the interpreter has lanes. Behind one time there may be its window.
     fn fill(&mut self, stage: &Stage<T>, step: &Runner<T>, times: &[T], steps: usize, table: &mut Vec<u64>) {
         let (entries, lanes) = (&stage.split.entries, self.lanes());
-        self.values.resize(entries.len() * steps, T::default()); // all overwritten below
+        self.values.resize(stage.split.step.next.len() * steps, T::default()); // all overwritten below
         let (kernel, by) = step.kernel(1);
         if self.shared_pool_for != Some(by) {
             (self.shared_pool, self.shared_pool_for) = (kernel.pool(&self.shared), Some(by));
@@ -323,20 +344,47 @@ impl<T: Real> PreparedStage<T> {
         let tile = &mut Tile { state: values, rows: times, pool, steps: 1, per_step: &[], held: &[] };
         kernel.run(tile, &mut self.scratch);
         table.resize(entries.len() * steps, 0);
+        let of_step = stage.split.step.next.len();
         for (e, (entry, values)) in entries.iter().zip(self.values.chunks_exact(steps)).enumerate() {
             let places = table[e..].iter_mut().step_by(entries.len());
-            let each = places.zip(values);
-            match *entry {
-                Entry::Value => each.for_each(|(place, value)| *place = value.pattern()),
-                Entry::Sample(input) => {
-                    let samples = &self.common[input as usize];
-                    each.for_each(|(place, value)| *place = samples[value.wide() as usize].pattern());
-                }
-                Entry::Row(input) => {
-                    let first = self.inputs[input as usize];
-                    each.for_each(|(place, value)| *place = (first + value.wide() as usize * lanes) as u64);
-                }
+            enter(*entry, places, values, &self.common, &self.inputs, lanes);
+        }
+        if let (Some(wide), Some(runner)) = (&mut self.clock, &self.compiled.clock) {
+            wide.values.resize(stage.split.clock.next.len() * steps, 0.0);
+            let (kernel, by) = runner.kernel(1);
+            if wide.pool_for != Some(by) {
+                (wide.pool, wide.pool_for) = (kernel.pool(&wide.shared), Some(by));
             }
+            let ClockNumbers { values, times, pool, scratch, .. } = wide;
+            kernel.run(&mut Tile { state: values, rows: times, pool, steps: 1, per_step: &[], held: &[] }, scratch);
+            for (e, (entry, values)) in entries[of_step..].iter().zip(wide.values.chunks_exact(steps)).enumerate() {
+                let places = table[of_step + e..].iter_mut().step_by(entries.len());
+                enter(*entry, places, values, &self.common, &self.inputs, lanes);
+            }
+        }
+    }
+}
+
+/// Writes an entry of some steps: a value in the precision of the lanes, or what holds the sample of that number.
+fn enter<'a, T: Real, N: Real>(
+    entry: Entry,
+    places: impl Iterator<Item = &'a mut u64>,
+    values: &[N],
+    common: &[Vec<T>],
+    inputs: &[usize],
+    lanes: usize,
+) {
+    let each = places.zip(values);
+    match entry {
+        Entry::Value if N::PRECISION == T::PRECISION => each.for_each(|(place, value)| *place = value.pattern()),
+        Entry::Value => each.for_each(|(place, value)| *place = T::of(value.wide()).pattern()),
+        Entry::Sample(input) => {
+            let samples = &common[input as usize];
+            each.for_each(|(place, value)| *place = samples[value.wide() as usize].pattern());
+        }
+        Entry::Row(input) => {
+            let first = inputs[input as usize];
+            each.for_each(|(place, value)| *place = (first + value.wide() as usize * lanes) as u64);
         }
     }
 }

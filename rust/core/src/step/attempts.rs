@@ -2,7 +2,7 @@
 
 use super::{
     leaves::{block, ids, parameters},
-    pace::{Acceptance, Attempted, Backward, Pace, Scales, Stretched, attempt},
+    pace::{Acceptance, Attempted, Backward, Made, Pace, SINGLE_ROUNDING, Scales, Stretched, attempt, judge, taken},
     series_pace,
 };
 use crate::{
@@ -11,6 +11,7 @@ use crate::{
         program::Program,
         spec::Signature,
         system::{Block, Kind, Shape, System},
+        window,
     },
     tape::{
         Id, Op,
@@ -18,6 +19,26 @@ use crate::{
         reserved::BUDGET,
     },
 };
+
+/// Where the rows of an attempt of float32 stand that is made in two parts: see [`AttemptsOf::tried`] and [`AttemptsOf::judged`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TriedRows {
+    /// Numbers of v and y, which come first.
+    pub state: usize,
+    /// Sampled inputs: their values stand behind the state, the time and the step.
+    pub tables: usize,
+    /// Numbers behind those: what the first part makes, and the second reads.
+    pub results: usize,
+    /// Numbers of the second part before those: the state, the pace and the sizes.
+    pub judged: usize,
+}
+
+impl TriedRows {
+    /// Of the first part: where its results begin.
+    pub(crate) fn first_result(&self) -> usize {
+        self.state + 2 + self.tables
+    }
+}
 
 /// What attempts at adaptive steps are traced of.
 pub(super) struct AttemptsOf<'a> {
@@ -78,20 +99,78 @@ impl AttemptsOf<'_> {
         next
     }
 
-    pub(crate) fn attempts(&self, program: &Program, order: u32) -> Vec<Id> {
-        let (signature, (v, y), (pace, scales)) = (self.signature, self.state(), self.pace());
-        let rates = |step: Symbol| -> Box<dyn System<Symbol>> {
-            if signature.equations.is_some() {
-                return self.forced(step, self.scaled(step)); // the push of their control depends on the step
-            }
-            let stretched = Box::new(Stretched { s: self.scaled(Symbol::of(1.0)), h: step });
-            let pushed = match controls::pushes(signature) {
-                true => around::wrap_without_forces(&parameters(signature, step), stretched, Symbol::of(0.0)),
-                false => stretched,
-            };
-            self.forced(step, pushed)
+    /// The system under its control and the force, for a step of that length.
+    fn rates(&self, step: Symbol) -> Box<dyn System<Symbol>> {
+        let signature = self.signature;
+        if signature.equations.is_some() {
+            return self.forced(step, self.scaled(step)); // the push of their control depends on the step
+        }
+        let stretched = Box::new(Stretched { s: self.scaled(Symbol::of(1.0)), h: step });
+        let pushed = match controls::pushes(signature) {
+            true => around::wrap_without_forces(&parameters(signature, step), stretched, Symbol::of(0.0)),
+            false => stretched,
         };
-        let projected = if controls::pushes(signature) { self.scaled(Symbol::of(1.0)) } else { self.projected() };
+        self.forced(step, pushed)
+    }
+
+    /// What acts on the state after a step.
+    fn after(&self) -> Box<dyn System<Symbol>> {
+        if controls::pushes(self.signature) { self.scaled(Symbol::of(1.0)) } else { self.projected() }
+    }
+
+    /// Where the rows of both parts of an attempt of float32 stand.
+    pub(crate) fn rows(&self, program: &Program) -> TriedRows {
+        let state = self.shape.v + self.shape.y;
+        TriedRows {
+            state,
+            tables: self.signature.tables.len(),
+            results: state * (program.results.len() / 2 + 1) + 1,
+            judged: state + Pace::<Symbol>::NUMBERS + self.acceptance.numbers(self.shape.v, self.shape.y),
+        }
+    }
+
+    /// The first part of an attempt of float32: from the state, the time, the step and the values of sampled inputs in it to the
+    /// state after the step, the estimates of its error, the state that is projected, and what a control did. Nothing is decided.
+    pub(crate) fn tried(&self, program: &Program) -> Vec<Id> {
+        let ((v, y), rows) = (self.state(), self.rows(program));
+        let given = block(rows.state, rows.first_result() - rows.state);
+        let (t, step) = (given[0], given[1]);
+        let values = given.iter().skip(2).copied().collect();
+        let (made, projected, work) = window::held(values, || {
+            let (s, after) = (self.rates(step), self.after());
+            let made = program.run(s.as_ref(), t, step, &v, &y);
+            let (new_v, new_y) = after.project(made[0].clone(), made[1].clone());
+            let pushed = s.tally().map(|tally| tally / step);
+            (made, [new_v, new_y], pushed.or(after.tally()).unwrap_or(Symbol::of(0.0)))
+        });
+        let mut next = ids([&v, &y, &given]);
+        next.extend(ids(made.iter().chain(&projected)));
+        next.push(work.0);
+        next
+    }
+
+    /// The second part, of float64: the decision, by the sizes of the state and of the errors.
+    pub(crate) fn judged(&self, program: &Program, order: u32) -> Vec<Id> {
+        let ((v, y), (pace, scales), rows) = (self.state(), self.pace(), self.rows(program));
+        let (p, q) = (self.shape.v, self.shape.y);
+        let pair = |i: usize| [block(rows.judged + i * rows.state, p), block(rows.judged + i * rows.state + p, q)];
+        let pairs: Vec<[Block<Symbol>; 2]> = (0..program.results.len() / 2 + 1).map(pair).collect();
+        let (tried, projected) = pairs.split_at(pairs.len() - 1);
+        let blocks: Vec<&[Symbol]> = tried.iter().flatten().map(Block::as_slice).collect();
+        let sizes = Made::of(self.acceptance, [v.as_slice(), y.as_slice()], &blocks);
+        let sizes = Made { rounding: SINGLE_ROUNDING, ..sizes };
+        let outlook = pace.outlook(Symbol::new(Op::Param(BUDGET)));
+        let (next, longest, took) = judge(&pace, &scales, order, self.acceptance.counts(p, q), &sizes, outlook);
+        let work = Symbol::new(Op::State((rows.judged + rows.results - 1) as u32));
+        let next = Pace { work: Symbol::choose(took & !outlook.is_extra, pace.work + work, pace.work), ..next };
+        let mut next = self.next(&next, &longest, &taken(took, &projected[0][0], &v), &taken(took, &projected[0][1], &y));
+        next.extend(ids([&block(rows.judged, rows.results)]));
+        next
+    }
+
+    pub(crate) fn attempts(&self, program: &Program, order: u32) -> Vec<Id> {
+        let ((v, y), (pace, scales)) = (self.state(), self.pace());
+        let (rates, projected) = (|step: Symbol| self.rates(step), self.after());
         let system = Attempted { rates: &rates, projected: projected.as_ref() };
         let budget = Symbol::new(Op::Param(BUDGET));
         let (pace, longest, v, y) = attempt(program, &system, order, self.acceptance, (pace, &scales), budget, &v, &y);

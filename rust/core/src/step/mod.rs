@@ -1,7 +1,7 @@
 //! A model and a method become tapes.
 
 mod acceptance;
-mod attempts;
+pub(crate) mod attempts;
 pub mod cache;
 mod controller;
 pub mod key;

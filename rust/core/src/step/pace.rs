@@ -35,6 +35,8 @@ const LOW: u32 = 5;
 /// margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 /// rounding.
 pub(crate) const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+/// The same of states of float32, whose roundings are 2²⁹ times as large.
+pub(crate) const SINGLE_ROUNDING: f64 = 1.0 / (1u64 << 11) as f64;
 /// A component that has been zero so far counts as this part of the largest in its block. A cascade or a wave reaches one
 /// component after the other, each at first with a power of the time that is beyond the order of the method: relative to itself
 /// its first step would always be all wrong, however short.
@@ -161,6 +163,8 @@ pub(crate) struct Made<N> {
     pub errors: Vec<Vec<N>>,
     /// The numbers that have to stay positive.
     pub positive: Vec<N>,
+    /// See [`ROUNDING`].
+    pub rounding: f64,
 }
 
 impl<N: Number> Made<N> {
@@ -175,6 +179,7 @@ impl<N: Number> Made<N> {
             new: sizes(after),
             errors: pairs.map(sizes).collect(),
             positive: acceptance.positive.iter().filter_map(|place| component(*place)).collect(),
+            rounding: ROUNDING,
         }
     }
 }
@@ -206,8 +211,12 @@ pub(crate) fn attempt<N: Number>(
         Some(done) => Pace { work: N::choose(took & !outlook.is_extra, pace.work + done, pace.work), ..next },
         None => next,
     };
-    let goes_on = |new: &Block<N>, old: &Block<N>| new.zip_map(old, |new, old| N::choose(took, new, old));
-    (next, longest, goes_on(&new_v, v), goes_on(&new_y, y))
+    (next, longest, taken(took, &new_v, v), taken(took, &new_y, y))
+}
+
+/// The new block if the state goes on, else the old one.
+pub(crate) fn taken<N: Number>(took: N::Truth, new: &Block<N>, old: &Block<N>) -> Block<N> {
+    new.zip_map(old, |new, old| N::choose(took, new, old))
 }
 
 /// What comes after an attempt, the largest sizes so far, and whether the state goes on. `counts` are how many groups v and y
@@ -221,7 +230,7 @@ pub(crate) fn judge<N: Number>(
     outlook: Outlook<N>,
 ) -> (Pace<N>, Vec<N>, N::Truth) {
     let zero = N::of(0.0);
-    let (least, bound) = pace.tolerated(scales, outlook.step, counts, &made.old, &made.new);
+    let (least, bound) = pace.tolerated(scales, outlook.step, counts, made);
     let mut r = made.errors.first().map_or(zero, |error| over(error, &bound));
     if let Some(coarse) = made.errors.get(1) {
         let size: Vec<N> = scales.longest.iter().zip(&made.new).map(|(so_far, new)| longer(*so_far, *new)).collect();
@@ -258,9 +267,9 @@ pub(crate) fn over<N: Number>(error: &[N], bound: &[N]) -> N {
 
 impl<N: Number> Pace<N> {
     /// Of each group the size that it has at least after the step, and the error that is tolerated. `counts` are how many groups
-    /// v and y have; `old` and `new` are their sizes before and after the step.
-    fn tolerated(&self, scales: &Scales<N>, step: N, counts: [usize; 2], old: &[N], new: &[N]) -> (Vec<N>, Vec<N>) {
-        let zero = N::of(0.0);
+    /// v and y have; of what was made the sizes before and after the step count.
+    fn tolerated(&self, scales: &Scales<N>, step: N, counts: [usize; 2], made: &Made<N>) -> (Vec<N>, Vec<N>) {
+        let (zero, old, new) = (N::of(0.0), &made.old, &made.new);
         // A state at zero so far on which a force sets in counts as long as that force would have made it in a part of the time
         // since.
         let since = longer(N::of(1.0), N::of(PUSHED) * ((self.t + step - self.begin) / step));
@@ -282,7 +291,7 @@ impl<N: Number> Pace<N> {
             }
         }
         if counts[0] > 0 && counts[1] > 0 {
-            let lost = N::of(ROUNDING) / step;
+            let lost = N::of(made.rounding) / step;
             for (size, of_y) in lasting.iter_mut().zip(paired(&scales.longest[of_v..], of_v)) {
                 *size = longer(*size, of_y * lost);
             }

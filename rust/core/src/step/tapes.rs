@@ -3,11 +3,12 @@
 use std::sync::{Arc, LazyLock, OnceLock};
 
 use super::{
+    attempts::TriedRows,
     cache::Cache,
     key::{StepKind, TapeKey},
     leaves::BEGINS,
     properties::{MAX_LONG_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, has_series, operations, recorded, shape},
-    trace::{trace_begin, trace_by_terms, trace_record, trace_slot, trace_step},
+    trace::{trace_begin, trace_by_terms, trace_judged, trace_record, trace_slot, trace_step},
     watch,
 };
 use crate::{
@@ -32,6 +33,8 @@ pub struct Tapes<T: Real = f64> {
     /// The same attempt by coefficients that are known, behind the state: saved states, and a held step when it is taken. Not
     /// where operations are fused, for the attempt may fuse what made the coefficients.
     pub by_terms: Option<Stage<T>>,
+    /// The second part of an attempt of float32, which is of float64, and where the rows of both parts are; `step` is the first.
+    pub(crate) judged: Option<(Stage, TriedRows)>,
     /// Of attempts: the pace behind the state, as it is at the start: see `Pace::begun`. Its operations are never fused.
     pub begin: Option<Stage<T>>,
     /// Turns velocities into what the method carries.
@@ -178,10 +181,7 @@ impl TapeKey {
         if operations > MAX_TAPE_OPERATIONS {
             return Err(Error::TooLongForSingle { operations, most: MAX_TAPE_OPERATIONS });
         }
-        let of = match (&self.how, self.signature.tables.first()) {
-            (StepKind::Attempts { .. }, _) => "adaptive steps",
-            (StepKind::Matrix { .. }, _) => "the matrix form",
-            (_, Some(_)) => "sampled inputs",
+        let of = match &self.how {
             _ if self.signature.watched.is_some() => "events",
             _ if has_series(&self.how)? => "the series of a solution",
             _ => return Ok(()),
@@ -205,8 +205,16 @@ impl TapeKey {
                 }
             }
         }
+        let single = T::PRECISION == Precision::Single;
+        let mut judged = None;
+        if single && matches!(self.how, StepKind::Attempts { .. }) {
+            let (tape, next, rows) = trace_judged(Tape::default(), &self.signature, &self.how)?;
+            judged = Some((Stage::cut(&self.signature, &(tape, next)), rows));
+        }
         let begin = match &self.how {
-            StepKind::Attempts { .. } => Some(Stage::cut(&self.signature, &trace_begin(new(), &self.signature, &self.how)?)),
+            StepKind::Attempts { .. } if !single => {
+                Some(Stage::cut(&self.signature, &trace_begin(new(), &self.signature, &self.how)?))
+            }
             _ => None,
         };
         let mut quantities = None;
@@ -233,6 +241,17 @@ impl TapeKey {
         let [start, finish, step_with_velocities] =
             [start, finish, step_with_velocities].map(|made| made.map(|made| Stage::cut(&self.signature, &made)));
         let step = Stage::cut(&self.signature, &step);
-        Ok(Tapes { step, by_terms, begin, start, finish, step_with_velocities, record: quantities, written, series_evaluations })
+        Ok(Tapes {
+            step,
+            by_terms,
+            judged,
+            begin,
+            start,
+            finish,
+            step_with_velocities,
+            record: quantities,
+            written,
+            series_evaluations,
+        })
     }
 }

@@ -1,7 +1,7 @@
 //! Traces a system and a method to tapes.
 
 use super::{
-    attempts::AttemptsOf,
+    attempts::{AttemptsOf, TriedRows},
     key::StepKind,
     leaves::{block, ids, parameters, time},
     pace::Pace,
@@ -26,6 +26,7 @@ use crate::{
     tape::{
         Id, Op, Tape,
         number::{Number, Symbol, record},
+        real::Precision,
     },
 };
 
@@ -72,8 +73,10 @@ pub(crate) fn trace_step(tape: Tape, signature: &Signature, how: &StepKind) -> R
                 return Err(signature.unknown("contact_0"));
             }
             let attempts = AttemptsOf { kind, signature, shape, acceptance, backward: *backward };
+            let single = tape.precision() == Precision::Single;
             let (tape, (next, terms)) = record(tape, || match series_order(&program, *order) {
                 Some(order) => attempts.series(order),
+                None if single => (attempts.tried(&program), Vec::new()),
                 None => (attempts.attempts(&program, estimate.order), Vec::new()),
             });
             Ok(Steps { tape, next, shape, terms })
@@ -108,6 +111,17 @@ fn step(kind: &Kind, signature: &Signature, shape: Shape, method: &Record, choic
     let first = next.len();
     next.extend(watch::next(kind, &p, method, choice, t, [&v0, &y0], first));
     next
+}
+
+/// Traces the second part of an attempt of float32, onto a tape of float64 that may hold something already; and where its rows are.
+pub(super) fn trace_judged(tape: Tape, signature: &Signature, how: &StepKind) -> Result<(Tape, Vec<Id>, TriedRows), Error> {
+    let shape = shape(signature, how)?;
+    let StepKind::Attempts { name, acceptance, backward, .. } = how else { return Err(Error::NoEstimate) };
+    let (kind, method) = (kind(signature)?, method(name)?);
+    let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
+    let attempts = AttemptsOf { kind, signature, shape, acceptance, backward: *backward };
+    let (tape, next) = record(tape, || attempts.judged(&program, estimate.order));
+    Ok((tape, next, attempts.rows(&program)))
 }
 
 /// Traces where a member stands at the start, without control, onto a tape that may hold something already.
@@ -204,7 +218,7 @@ pub(crate) fn trace_record(tape: Tape, signature: &Signature, names: &[String]) 
     }))
 }
 
-/// Traces a part of a scene by its name, for comparisons: "step", "attempt", "begin", "start" and "finish" with the number of a
+/// Traces a part of a scene by its name, for comparisons: "step", "attempt", its second part "judged", "begin", "start" and "finish" with the number of a
 /// way to start behind them, or "record" with a quantity behind it.
 pub fn trace(tape: Tape, signature: &Signature, how: &StepKind, what: &str) -> Result<(Tape, Vec<Id>), Error> {
     let (what, which) = what.split_once(' ').unwrap_or((what, ""));
@@ -219,6 +233,7 @@ pub fn trace(tape: Tape, signature: &Signature, how: &StepKind, what: &str) -> R
         "attempt" if matches!(how, StepKind::Attempts { .. }) => {
             trace_step(tape, signature, how).map(|steps| (steps.tape, steps.next))
         }
+        "judged" => trace_judged(tape, signature, how).map(|(tape, next, _)| (tape, next)),
         "begin" => trace_begin(tape, signature, how),
         "start" => trace_slot(tape, signature, &method(name)?.start(choice).ok_or_else(unknown)?),
         "finish" => trace_slot(tape, signature, &method(name)?.finish(choice).ok_or_else(unknown)?),

@@ -172,6 +172,17 @@ impl Body {
         unrolled.finished()
     }
 
+    /// The same operations on numbers of 64 bits.
+    fn widened(mut self) -> Body {
+        for op in &mut self.ops {
+            if let Op::Const(bits) = *op {
+                *op = Op::Const(self.precision.number(bits).to_bits());
+            }
+        }
+        self.precision = Precision::Double;
+        self
+    }
+
     fn finished(mut self) -> Body {
         self.copy_what_is_shared();
         self.count_leaves();
@@ -211,6 +222,8 @@ pub enum UniformSource {
     First(u32),
     /// How long a row of samples is.
     Lanes,
+    /// [`HOLD_SLACK`], which float32 has no number for.
+    Slack,
 }
 
 /// The meaning of an entry of the table of the steps.
@@ -235,8 +248,11 @@ pub struct Split {
     pub run: Body,
     /// Its state are the rows of `body`; computed once for each member.
     pub member: Body,
-    /// Its state are the entries of the table of the steps, a lane for each step; row 0 is the time.
+    /// Its state are the first entries of the table of the steps, a lane for each step; row 0 is the time.
     pub step: Body,
+    /// The same of the other entries of a step of float32: which sample holds, and what is made of the times of samples. It computes
+    /// in float64, for a time divided by an interval takes more digits than float32 has.
+    pub clock: Body,
     /// What the entries are.
     pub entries: Vec<Entry>,
     /// The hot loop.
@@ -290,7 +306,16 @@ pub(crate) fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, comm
             _ => None,
         },
     });
-    let behind = |place: u32| if place > u32::MAX / 2 { entries.len() as u32 + (u32::MAX - place) } else { place };
+    // Entries of the clock stand behind the others.
+    let single = tape.precision() == Precision::Single;
+    let of_clock = if single { made_of_intervals(&tape) } else { Vec::new() };
+    let is_of_clock = |id: &Id| single && of_clock[*id as usize];
+    let mut order: Vec<usize> = (0..entries.len()).collect();
+    order.sort_by_key(|i| is_of_clock(&entries[*i])); // stable
+    let mut place = vec![0; entries.len()];
+    order.iter().enumerate().for_each(|(new, old)| place[*old] = new as u32);
+    let mut entries: Vec<Id> = order.iter().map(|i| entries[*i]).collect();
+    let behind = |i: u32| if i > u32::MAX / 2 { entries.len() as u32 + (u32::MAX - i) } else { place[i as usize] };
     for op in &mut split.body.ops {
         *op = match *op {
             Op::PerStep(i) => Op::PerStep(behind(i)),
@@ -304,6 +329,7 @@ pub(crate) fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, comm
 
     // Numbers of samples are found like other values.
     split.entries = vec![Entry::Value; entries.len()];
+    let of_step = if single { entries.iter().filter(|id| !is_of_clock(id)).count() } else { usize::MAX };
     for (input, t) in samples {
         split.entries.push(if common(input) { Entry::Sample(input) } else { Entry::Row(input) });
         entries.push(sample_number(&mut tape, input, t));
@@ -321,7 +347,9 @@ pub(crate) fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, comm
     };
     split.run = Body::of(&tape, &uniforms, &mut leaf).finished();
     split.member = Body::of(&tape, &rows, &mut leaf).finished();
-    split.step = Body::of(&tape, &entries, &mut leaf).finished();
+    let (of_step, of_clock) = entries.split_at(of_step.min(entries.len()));
+    split.step = Body::of(&tape, of_step, &mut leaf).finished();
+    split.clock = Body::of(&tape, of_clock, &mut leaf).widened().finished();
     split.sources = sources.list;
     split.params = params.list;
     split
@@ -351,24 +379,40 @@ impl<T: Copy + Eq + Hash> Places<T> {
 /// A property of an input that is known for a run but not when a step is traced, as a leaf of a tape that is being cut.
 fn fact(source: UniformSource) -> Op {
     Op::Uniform(match source {
-        UniformSource::Start(input) => 5 * input,
-        UniformSource::Interval(input) => 5 * input + 1,
-        UniformSource::Last(input) => 5 * input + 2,
-        UniformSource::First(input) => 5 * input + 3,
-        UniformSource::Lanes | UniformSource::Step | UniformSource::Param(_) => 4,
+        UniformSource::Start(input) => FACTS * input,
+        UniformSource::Interval(input) => FACTS * input + 1,
+        UniformSource::Last(input) => FACTS * input + 2,
+        UniformSource::First(input) => FACTS * input + 3,
+        UniformSource::Slack => 4,
+        UniformSource::Lanes | UniformSource::Step | UniformSource::Param(_) => 5,
     })
 }
 
+/// How many facts of an input there are; two are the same for all.
+const FACTS: u32 = 6;
+
 /// The inverse of `fact`.
 fn fact_of(fact: u32) -> UniformSource {
-    let input = fact / 5;
+    let input = fact / FACTS;
     [
         UniformSource::Start(input),
         UniformSource::Interval(input),
         UniformSource::Last(input),
         UniformSource::First(input),
+        UniformSource::Slack,
         UniformSource::Lanes,
-    ][fact as usize % 5]
+    ][(fact % FACTS) as usize]
+}
+
+/// For each value whether it depends on the time between two samples, as their times do.
+fn made_of_intervals(tape: &Tape) -> Vec<bool> {
+    let mut depends: Vec<bool> = Vec::with_capacity(tape.ops().len());
+    for op in tape.ops() {
+        let (operands, n) = op.operands();
+        let is_interval = matches!(*op, Op::Uniform(fact) if matches!(fact_of(fact), UniformSource::Interval(_)));
+        depends.push(is_interval || operands[..n].iter().any(|id| depends[*id as usize]));
+    }
+    depends
 }
 
 /// The number of the sample that holds at a time: the last one not after it, or the first or last one outside; 0 if the time is a
@@ -378,7 +422,10 @@ fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
         [UniformSource::Start(input), UniformSource::Interval(input), UniformSource::Last(input)].map(|g| tape.keep(fact(g)));
     let since = tape.keep(Op::Sub(t, start));
     let intervals = tape.keep(Op::Div(since, interval));
-    let slack = tape.constant(HOLD_SLACK);
+    let slack = match tape.precision() {
+        Precision::Double => tape.constant(HOLD_SLACK),
+        Precision::Single => tape.keep(fact(UniformSource::Slack)),
+    };
     let late = tape.keep(Op::Mul(intervals, slack));
     let at = tape.keep(Op::Floor(late));
     let zero = tape.keep(Op::Const(0));
