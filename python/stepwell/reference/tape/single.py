@@ -91,18 +91,19 @@ class Steps:
             for i, line in enumerate(self._clock.lines):
                 operations[line] = Operation("parameter", (), self._first + i)
             operations, roots = needed(operations, roots)
+        self._lines, self._roots = operations, roots
         self._run = compiled(operations, roots, single=True)
 
     def fuse_products_of(self, parameters: int) -> None:
         """Let products with one of so many first parameters be added by fused multiply-adds, as the matrix form does."""
-        tape = list(self._lines.tape)
-        factors = {line for line, each in enumerate(tape) if each.name == "parameter" and each.given < parameters}
-        products = {line for line, each in enumerate(tape) if each.name == "multiply" and not factors.isdisjoint(each.of)}
-        for line, each in enumerate(tape):
+        lines = list(self._lines)
+        factors = {i for i, each in enumerate(lines) if each.name == "parameter" and each.extra < parameters}
+        products = {i for i, each in enumerate(lines) if each.name == "multiply" and not factors.isdisjoint(each.of)}
+        for i, each in enumerate(lines):
             if each.name == "add" and (of_sum := products.intersection(each.of)):
                 product = max(of_sum)  # of two the later one is added
-                tape[line] = Operation("multiply add", (*tape[product].of, *(other for other in each.of if other != product)), 0)
-        self._lines.tape = tape
+                lines[i] = Operation("multiply add", (*lines[product].of, *(other for other in each.of if other != product)), 0)
+        self._run = compiled(lines, self._roots, single=True)
 
     def __call__(
         self, state: Sequence[Any], t: Any, h: Any, numbers: Mapping[int, Any] | None = None, tables: Sequence[Any] | None = None
