@@ -34,7 +34,6 @@ from ..model.methods import methods as every_method
 from ..model.systems import Sinusoid, System
 from ..model.systems.base import TINY, a_system
 from ..reference.acceptance import Acceptance
-from ..reference.adaptive import sizes
 from . import continuation, engine, positive
 from .result import AdaptiveState
 from .tolerance import order_of_series, tolerances_of
@@ -364,6 +363,8 @@ class Request(NamedTuple):
         if single:
             v, y = float32.rounded_state(v, y)
             if tolerances is not None:
+                from ..reference.adaptive import sizes
+
                 lengths = sizes(v, y, (len(system.v_shape), len(system.y_shape)), acceptance.groups)
                 float32.check_tolerance(tolerances.relative, tolerances.absolute, lengths)
         progress = checks.flag("progress", options.progress)
