@@ -13,6 +13,7 @@ import stepwell as sw
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from stepwell.base.immutable import changed
+from stepwell.model.around import Part
 from support import families
 from support.cases import SYSTEMS, Case, assert_same, by_both_backends, cases, number, thinned
 
@@ -188,7 +189,7 @@ def _member(system: sw.System, i: int, b: int) -> sw.System:
                 return type(value)(map(one, value))
             case dict():
                 return {name: one(each) for name, each in value.items()}
-            case sw.System() | sw.Sinusoid() | sw.Sampled() | sw.Floor() | sw.Sphere():
+            case sw.System() | Part() | sw.Sinusoid() | sw.Sampled() | sw.Floor() | sw.Sphere():
                 return changed(value, **{name: one(each) for name, each in vars(value).items()})
         return value
 
