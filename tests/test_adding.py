@@ -172,6 +172,35 @@ def test_it_is_the_spring_of_that_name(tree: Path) -> None:
     run(tree, "-c", code)
 
 
+def test_the_suite_tests_the_operation(tree: Path) -> None:
+    """Both tables, all places of its meaning, every language; and the function that is made of it."""
+    assert suite(tree, "ceiling or table or language", "operations") >= 7
+    assert suite(tree, "ceil", "functions", "functions_traced") >= 1
+
+
+def test_it_is_the_operation_of_that_name(tree: Path) -> None:
+    """One operation in place of three, the same bits by interpreter, machine code and reference, and no derivative by it."""
+    code = (
+        "import numpy as np, stepwell as sw\n"
+        "from stepwell import _core\n"
+        "@sw.system\n"
+        "def steps(t, v, y):\n"
+        "    return -np.ceil(3.0 * y) - 0.1 * v\n"
+        "y = np.linspace(-2.0, 2.0, 64)\n"
+        "runs = [sw.integrate(steps(), 'rk4', v=0.0, y=y, dt=0.01, steps=2000, backend=b) for b in ('rust', 'numpy')]\n"
+        "assert np.array_equal(runs[0].y, runs[1].y)\n"
+        "assert 'ceil(' in str(sw.explain(steps(), 'rk4'))\n"
+        "assert 'Math.ceil(' in sw.export(steps(), 'rk4', 'javascript', v=0.0, y=1.0).source\n"
+        "tape = _core.Tape()\n"
+        "assert [line[0] for line in tape.operations([tape.state(0).ceil()])[0]] == ['state', 'ceiling']\n"
+    )
+    run(tree, "-c", code)
+    level = {"STEPWELL_KERNELS": "interpret"}
+    subprocess.run(
+        [sys.executable, "-c", code], cwd=tree, env=os.environ | level | {"PYTHONPATH": str(tree / "site")}, check=True
+    )
+
+
 def test_what_is_added_is_formatted(tree: Path) -> None:
     page = (ROOT / "docs" / "developing" / "adding.md").read_text(encoding="utf-8")
     files = {name for name, _ in [*FILES.findall(page), *CHANGES.findall(page)]}

@@ -26,7 +26,7 @@ from ..model.systems import System
 from ..model.systems.digest import digest
 from ..model.systems.own import OwnSystem
 from ..runs import encounters, engine
-from ..runs.events.result import Occurrences
+from ..runs.occurrences import Occurrences
 from ..runs.result import Run
 
 Arrays = dict[str, Any]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from .events import Occurrences
+    from .occurrences import Occurrences
 
 
 class Status(IntEnum):

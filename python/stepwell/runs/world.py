@@ -21,7 +21,7 @@ from .request import Options, Request
 from .result import Run
 
 if TYPE_CHECKING:
-    from .events import Occurrences
+    from .occurrences import Occurrences
 
 
 class World:

@@ -10,10 +10,10 @@ import numpy as np
 from ...base.arrays import Array, Whole
 from ...reference.events import LEAST_SHARE, Parts, located, may_change, parted
 from .. import engine
+from ..occurrences import Occurrences
 from .event import Event
 from .members import Members
 from .parts import Changes, Found, nothing, ordinals
-from .result import Occurrences
 from .traced import Quantity
 from .trials import Trials
 

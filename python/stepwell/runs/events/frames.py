@@ -12,12 +12,12 @@ from ...base import checks
 from ...base.arrays import Array, Whole
 from ...errors import UnsupportedError
 from .. import engine
+from ..occurrences import Occurrences
 from .collected import Collected
 from .event import Event
 from .members import Members
 from .parts import Changes
 from .resets import Resets, Stretch
-from .result import Occurrences
 from .trials import Trials
 
 

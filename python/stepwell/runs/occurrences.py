@@ -1,4 +1,4 @@
-"""What a run tells of an event."""
+"""Where the quantity of an event changed its sign."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base import checks
-from ...base.arrays import Array, Whole
-from ...base.immutable import ValueEquality
-from ...base.reprs import counted
-from ...errors import ArgumentError
+from ..base import checks
+from ..base.arrays import Array, Whole
+from ..base.immutable import ValueEquality
+from ..base.reprs import counted
+from ..errors import ArgumentError
 
 
 @dataclass(frozen=True, eq=False)
