@@ -8,14 +8,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.arrays import Array
-from .tape.fma import double_fma as fma
 
 
 def times(matrix: Array, columns: "Sequence[Array] | Array", *, fused: bool = False) -> Array:
     """The matrix, of shape (rows, columns, *batch), times a column of numbers."""
     total: Array = matrix[:, 0] * columns[0]
-    for j in range(1, len(columns)):
-        total = fma(matrix[:, j], columns[j], total) if fused else total + matrix[:, j] * columns[j]
+    if fused:
+        from .tape.fma import double_fma  # only fused products need it
+
+        for j in range(1, len(columns)):
+            total = double_fma(matrix[:, j], columns[j], total)
+    else:
+        for j in range(1, len(columns)):
+            total = total + matrix[:, j] * columns[j]
     return total
 
 
