@@ -27,7 +27,7 @@ from ..model.compatibility import (
     not_of_a_step,
     velocities,
 )
-from ..model.controls import a_control
+from ..model.controls import ConstraintControl, EnergyControl, a_control
 from ..model.methods import Method
 from ..model.methods import method as find_method
 from ..model.methods import methods as every_method
@@ -455,6 +455,65 @@ class Request(NamedTuple):
         plan = engine.Plan(seen, how, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
         watched = None if events is None else _events(events, "direct")
         return cls(plan, stepped, v, y, slot is not None, events=watched, start=start, slot=slot)
+
+    @classmethod
+    def one_step(cls, system: System, method: str | Method, options: Options, batch: Shape | None = None) -> Request:
+        """A step as text, without a run: nothing need be known of its start, nor ``dt``; ``batch`` if not that of the arguments.
+
+        The state is that of an example, v = 0 and y = 1, 2, 3, … where it is not given.
+        """
+        how, system = find_method(method), a_system(system)
+        states = () if options.v is None and options.y is None else (options.v, options.y)
+        system = system.for_state_shapes(*(0.0 if each is None else each for each in states))
+        fits_together(system, how)
+        dt = 1.0 if options.dt is None else checks.number("dt", options.dt, positive=True, unit="units of time")
+        t0 = 0.0 if options.t0 is None else checks.number("t0", options.t0, unit="units of time")
+        fused, single = _arithmetic(options.fused, options.dtype)
+        control, form = a_control(options.control), checks.known("form", options.form, ("direct", "matrix"))
+        if form != "direct" and (fused or control is not None):
+            raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
+        if form != "direct" and not system.linear:
+            raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+        if single:
+            from . import float32
+
+            dt = float32.step(system, how, form, dt)
+            float32.check_inputs(system, t0)
+        choice = how.start_choice(options.start)
+        if options.force is not None:
+            forced(system)
+        shapes = {"v": system.v_shape, "y": system.y_shape, "force": system.v_shape}
+        given = {name: getattr(options, name) for name in shapes if getattr(options, name) is not None}
+        blocks = {name: checks.block(name, block, shapes[name], system.axes) for name, block in given.items()}
+        batches = {"system": system.batch, "control": () if control is None else control.batch}
+        batches |= {name: block.shape[len(shapes[name]) :] for name, block in blocks.items()}
+        batch = checks.batch_shape(batches) if batch is None else checks.batch_shape(batches | {"members": batch})
+        for name, block in blocks.items():
+            if single:
+                checks.fits_single(name, block)
+                block = np.asarray(np.asarray(block, np.float32), np.float64)
+            blocks[name] = spread(block, shapes[name], batch)
+        v, y, force = (blocks.get(name) for name in shapes)
+        if control is not None:
+            system = _under(system, control, v, y, batch, None if options.dt is None else dt)
+            fits_together(system, how)
+            system = system.stepped_by(how)
+        stepped = system if options.dt is None else system.over_steps(how, t0, dt)
+        plan = engine.Plan(stepped, how, batch, dt, t0, choice=choice, fused=fused, form=form, force=force, single=single)
+        first = np.arange(1.0, 1.0 + prod(system.y_shape)).reshape(system.y_shape)
+        v = spread(np.zeros(system.v_shape), system.v_shape, batch) if v is None else v
+        return cls(plan, system, v, spread(first, system.y_shape, batch) if y is None else y)
+
+
+def _under(system: System, control: Any, v: Array | None, y: Array | None, batch: Shape, dt: float | None) -> System:
+    """The system under control; without a state the control needs all of its numbers, unless they do not matter (no ``dt``)."""
+    if v is not None and y is not None and dt is not None:
+        return system.controlled(control, v, y, dt)
+    if dt is not None and not system.keeps(control) and not isinstance(control, ConstraintControl) and control.target is None:
+        raise ArgumentError("control: expected one with a target, or v and y, of which it keeps the energy")
+    if dt is not None and isinstance(control, EnergyControl) and control.gain is None:
+        raise ArgumentError("control: expected one with a gain, or v and y, to which relative= relates it")
+    return system.under(control, batch)
 
 
 def _going_on(options: Options) -> tuple[Options, Continuation]:

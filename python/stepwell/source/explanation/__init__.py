@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ... import _core
 from ...base import checks
 from ...errors import ArgumentError, UnsupportedError
-from ...model.compatibility import fits_together, not_of_a_step
+from ...model.compatibility import not_of_a_step
 from ...model.controls import AnyControl, a_control
 from ...model.methods import Method
 from ...model.methods import method as find_method
@@ -24,6 +24,7 @@ from ...model.systems.base import a_system
 from ...runs import engine, float32
 from ...runs.engine.counted import written
 from ...runs.engine.linear import matrix_model
+from ...runs.request import Options, Request
 from .beside import lines_beside
 from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape, matrix_of
 from .result import Explanation, MachineCode, Packing
@@ -85,53 +86,45 @@ def explain(
           y' = y + Φ·v'
     """
     how, system = find_method(method), a_system(system).for_state_shapes()
-    fits_together(system, how)
-    fused, attempt = checks.flag("fused", fused), checks.flag("attempt", attempt)
-    single = checks.is_single(dtype)
-    control = a_control(control)
-    if single and attempt:
-        raise UnsupportedError(
-            "attempt: one of float32 is two lists, the stages in float32 and the decision in float64; explain it in float64"
-        )
-    if attempt and how.error_order is None:
-        able = ", ".join(m.name for m in every_method() if m.error_order is not None)
-        raise UnsupportedError(f"attempt: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
-    if attempt and system.stick_friction is not None:
-        raise UnsupportedError(f"attempt: adaptive steps do not go with friction that sticks, which {system!r} has")
-    if attempt:
-        not_of_a_step(system.keeper if control is None else control)
+    if attempt := checks.flag("attempt", attempt):
+        _attempted(system, how, a_control(control), dtype, form)
     own = prod(system.batch)
-    form = checks.known("form", form, ("direct", "matrix"))
-    if form != "direct" and (fused or attempt or control is not None):
-        raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
-    if form != "direct" and not system.linear:
-        raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
-    if single:
-        float32.step(system, how, form, 1.0)
-        float32.check_inputs(system, 0.0)
-        float32.check_written(system, "a listing")
-    choice = how.start_choice(start)
-    given = [record] if isinstance(record, str) else [] if record is None else checks.several("record", record, "quantities")
-    if given and not system.quantities:
+    names = [record] if isinstance(record, str) else [] if record is None else checks.several("record", record, "quantities")
+    if names and not system.quantities:
         raise UnsupportedError(f"record: the core records nothing of {system!r}; its energy is NumPy's, from the saved states")
-    if given and single:
+    if names and checks.is_single(dtype):
         raise UnsupportedError("record: float32 runs compute it of the saved states, in float64; explain it without dtype=")
-    quantities = list(dict.fromkeys(checks.known("record", name, list(system.quantities)) for name in given))
+    quantities = list(dict.fromkeys(checks.known("record", name, list(system.quantities)) for name in names))
+    if checks.is_single(dtype):
+        float32.check_written(system, "a listing")
     count = own if members is None else checks.count("members", members, 1)
     if count % own:
         raise ArgumentError(f"members: expected a multiple of the system's batch of {own}, got {count}")
     batch = system.batch if count == own else (count // own, *system.batch)
-    checks.batch_shape({"system": batch, "control": () if control is None else control.batch})
     if control is not None:
         checks.fits("members: the numbers of a control", 8, batch, "explain fewer")
-        system = system.under(control, batch)
-        fits_together(system, how)
-        system = system.stepped_by(how)
-    plan = engine.Plan(system, how, batch, 1.0, fused=fused, form=form, choice=choice, single=single)
+    options = Options(control=control, fused=fused, form=form, start=start, dtype=dtype)
+    plan = Request.one_step(system, how, options, batch).plan
     explained = _explained(plan, attempt)
     if explained.parts is not None or attempt:
         return explained
-    return replace(explained, beside=lines_beside(plan, choice, quantities))
+    return replace(explained, beside=lines_beside(plan, plan.choice, quantities))
+
+
+def _attempted(system: System, method: Method, control: AnyControl | None, dtype: Any, form: str) -> None:
+    """Raise if there is no attempt at an adaptive step."""
+    if checks.is_single(dtype):
+        raise UnsupportedError(
+            "attempt: one of float32 is two lists, the stages in float32 and the decision in float64; explain it in float64"
+        )
+    if method.error_order is None:
+        able = ", ".join(m.name for m in every_method() if m.error_order is not None)
+        raise UnsupportedError(f"attempt: {method.name} does not estimate its error, so it cannot choose its steps; use {able}")
+    if system.stick_friction is not None:
+        raise UnsupportedError(f"attempt: adaptive steps do not go with friction that sticks, which {system!r} has")
+    if form != "direct":
+        raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
+    not_of_a_step(system.keeper if control is None else control)
 
 
 def _explained(plan: engine.Plan, attempt: bool) -> Explanation:

@@ -9,19 +9,18 @@ from __future__ import annotations
 from math import prod
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ...base import checks
-from ...base.arrays import Array, Shape
+from ...base.arrays import Shape
 from ...errors import ArgumentError, ShapeError, UnsupportedError
-from ...model.compatibility import fits_together, forced
-from ...model.controls import AnyControl, ConstraintControl, EnergyControl, a_control
+from ...model.controls import AnyControl
 from ...model.methods import Method
 from ...model.methods import method as find_method
-from ...model.parameters import aligned
 from ...model.systems import System
 from ...model.systems.base import a_system
-from ...runs import engine, float32
+from ...runs import float32
+from ...runs.diagnostics import of_a_strong_control
+from ...runs.findings import warn_of
+from ...runs.request import Options, Request
 from .c import C
 from .head import head
 from .javascript import JavaScript
@@ -96,77 +95,30 @@ def export(
         >>> sw.export(sw.Oscillator(omega=2.0), "rk4", "c", dt=1 / 60).save("step.c").name
         'step.c'
     """
-    how = find_method(method)
-    system = a_system(system)
-    system = (
-        system.for_state_shapes()
-        if v is None and y is None
-        else system.for_state_shapes(*(0.0 if each is None else each for each in (v, y)))
-    )
-    fits_together(system, how)
+    how, system = find_method(method), a_system(system)
     kind = LANGUAGES[checks.known("language", language, tuple(LANGUAGES))]
-    dt = checks.number("dt", dt, positive=True, unit="units of time")
-    t0 = checks.number("t0", t0, unit="units of time")
-    fused = checks.flag("fused", fused)
-    single = checks.is_single(dtype)
+    fused, single = checks.flag("fused", fused), checks.is_single(dtype)
     if fused and kind.fma is None:
         raise UnsupportedError(f"fused: {kind.title} has no fused multiply-add; export without, or to another language")
     if fused and single and kind.of_single.get("fma", kind.fma) is None:
         raise UnsupportedError(
             f"fused: {kind.title} has no fused multiply-add of float32; export without, or to another language"
         )
-    if single:
-        dt = float32.step(system, how, "direct", dt)
-        float32.check_inputs(system, t0)
-        float32.check_written(system, "an exported step")
-    choice = how.start_choice(start)
-    control = a_control(control)
     called = prefix(f"{snake(system.kind_name)}_{how.name}" if name is None else name)
-    blocks = [
-        None if block is None else checks.block(argument, block, shape, system.axes)
-        for argument, block, shape in (("v", v, system.v_shape), ("y", y, system.y_shape))
-    ]
-    push = _force(force, system)
-    shapes = {"system": system.batch, "control": () if control is None else control.batch}
-    for argument, block, shape in (
-        ("v", blocks[0], system.v_shape),
-        ("y", blocks[1], system.y_shape),
-        ("force", push, system.v_shape),
-    ):
-        if block is not None:
-            shapes[argument] = block.shape[len(shape) :]
+    push = None if force is False else 0.0 if force is True else force
+    options = Options(v=v, y=y, dt=dt, t0=t0, control=control, force=push, fused=fused, dtype=dtype, start=start)
+    request = Request.one_step(system, how, options)
+    system, plan, index = request.system, request.plan, _member(member, request.plan.batch)
     if single:
-        blocks = [None if each is None else _rounded(name, each) for name, each in zip("vy", blocks, strict=True)]
-        push = None if push is None else _rounded("force", push)
-    batch = checks.batch_shape(shapes)
-    index = _member(member, batch)
-    if control is not None:
-        system = _under(system, control, blocks, batch, dt)
-        fits_together(system, how)
-        system = system.stepped_by(how)
-    push = None if push is None else _wide(push, system.v_shape, batch)
-    stepped = system.over_steps(how, t0, dt)
-    plan = engine.Plan(stepped, how, batch, dt, t0, choice=choice, fused=fused, force=push, single=single)
+        float32.check_written(system, "an exported step")
+    if control is not None and v is not None and y is not None:
+        warn_of(of_a_strong_control(system, request.v, request.y, plan.dt))
     traced = Traced(plan, index)
     writer = kind(called, Names(MEMBERS), single)
     written = Written(traced, writer)
-    text = writer.file(written, writer.remark(head(written, writer, *_example(system, blocks, batch, index))))
+    text = writer.file(written, writer.remark(head(written, writer, *_example(request, index))))
     of = "float32" if single else "float64"
     return ExportedStep(text, called, kind.title, kind.endings, system, how, index, fused, traced.count, of)
-
-
-def _force(force: Any, system: System) -> Array | None:
-    """The force of the example, or None without one."""
-    if force is None or force is False:
-        return None
-    forced(system)
-    return checks.block("force", 0.0 if force is True else force, system.v_shape, system.axes)
-
-
-def _rounded(name: str, block: Array) -> Array:
-    """A block in numbers of float32."""
-    checks.fits_single(name, block)
-    return np.asarray(np.asarray(block, np.float32), np.float64)
 
 
 def _member(member: Any, batch: Shape) -> Shape:
@@ -189,32 +141,7 @@ def _member(member: Any, batch: Shape) -> Shape:
     return tuple(checks.count("member", each, 0, n - 1) for each, n in zip(given, batch, strict=True))
 
 
-def _under(system: System, control: AnyControl, blocks: list[Array | None], batch: Shape, dt: float) -> System:
-    """The system under control; without a state it needs all numbers of the control."""
-    v, y = blocks
-    if v is not None and y is not None:
-        v, y = (_wide(each, shape, batch) for each, shape in ((v, system.v_shape), (y, system.y_shape)))
-        return system.controlled(control, v, y, dt)
-    if not system.keeps(control) and not isinstance(control, ConstraintControl) and control.target is None:
-        raise ArgumentError("control: expected one with a target, or v and y, of which it keeps the energy")
-    if isinstance(control, EnergyControl) and control.gain is None:
-        raise ArgumentError("control: expected one with a gain, or v and y, to which relative= relates it")
-    return system.under(control, batch)
-
-
-def _wide(block: Array, shape: Shape, batch: Shape) -> Array:
-    """A block for every member."""
-    axes = len(shape)
-    return np.broadcast_to(aligned(block, axes, batch), (*shape, *batch))
-
-
-def _example(system: System, blocks: list[Array | None], batch: Shape, index: Shape) -> tuple[list[float], list[float]]:
+def _example(request: Request, index: Shape) -> tuple[list[float], list[float]]:
     """Velocities and coordinates with which the example begins."""
-    out = []
-    for block, shape, others in zip(blocks, (system.v_shape, system.y_shape), (0.0, 1.0), strict=True):
-        if block is None:
-            out.append([others * (i + 1.0) for i in range(prod(shape))])
-        else:
-            own = _wide(block, shape, batch)[(slice(None),) * len(shape) + index]
-            out.append([float(each) for each in own.reshape(-1)])
-    return out[0], out[1]
+    v, y = ([float(each) for each in checks.member(block, index).reshape(-1)] for block in (request.v, request.y))
+    return v, y
