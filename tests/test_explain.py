@@ -434,8 +434,6 @@ def test_what_cannot_be_explained_says_so() -> None:
         sw.explain(sw.Oscillator(), "rk4", control=sw.EnergyControl(0.1))
     with pytest.raises(sw.errors.UnsupportedError, match="verlet needs forces"):
         sw.explain(sw.Oscillator(1.0, 0.1), "verlet")
-    with pytest.raises(sw.errors.ArgumentError, match=r"fused: a step of about \d+ operations is too long"):
-        sw.explain(sw.Chain(1000), "rk4", fused=True)
     with pytest.raises(sw.errors.UnsupportedError, match="form: form='matrix' goes without fused="):
         sw.explain(sw.Oscillator(), "rk4", form="matrix", fused=True)
     with pytest.raises(sw.errors.UnsupportedError, match="form: only linear systems have a transition matrix"):

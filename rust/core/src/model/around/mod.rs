@@ -33,8 +33,11 @@ pub(crate) struct Part<N: Number> {
     /// Whether `large/` has it over rows. Otherwise the whole step of a system with it is one tape.
     pub has_rows: bool,
     /// The system with the part around it. The tally starts from the number: h times the energy that a control added.
-    pub wrap: fn(&Parameters<N>, Box<dyn System<N>>, N) -> Box<dyn System<N>>,
+    pub wrap: Wrap<N>,
 }
+
+/// Puts a part around a system.
+pub type Wrap<N> = fn(&Parameters<N>, Box<dyn System<N>>, N) -> Box<dyn System<N>>;
 
 /// All kinds, from the inside out: friction resists all other forces.
 pub(crate) fn parts<N: Number>() -> Vec<Part<N>> {
