@@ -26,23 +26,23 @@ static ALLOCATOR: dhat::Alloc = dhat::Alloc;
 const MEMBERS: usize = 100;
 const ONE: Row = Row(&[1.0]);
 
-/// Steps a world some hundred times, past the ends of tables of steps, and counts what it allocates when its code is written: that
-/// is so once after as many steps as make up for it, how many depends on the CPU.
+/// Steps a world some hundred times, past the ends of tables of steps, and counts what it allocates: the least of some such
+/// rounds, for code is written once after as many steps as make up for it, and how many these are depends on the CPU.
 fn allocations(model: &Model, level: Level) -> Result<u64, Error> {
     let clock = Clock { t0: 0.0, h: 0.1 };
     let mut world = World::new(model, clock, Machine { level, threads: 1 }, MEMBERS, 0)?;
     let sizes = world.sizes();
     let (mut v, mut y) = (vec![0.0; sizes.0], vec![1.0; sizes.1]);
-    let mut steps = || {
+    world.step(1, &mut v, &mut y); // what a carry needs is made at the first step
+    let mut round = || {
+        let before = dhat::HeapStats::get().total_blocks;
         for _ in 0..200 {
             world.step(3, &mut v, &mut y);
             v[0] += 0.01; // a kick: a method with a carry starts anew
         }
+        dhat::HeapStats::get().total_blocks - before
     };
-    steps();
-    let before = dhat::HeapStats::get().total_blocks;
-    steps();
-    Ok(dhat::HeapStats::get().total_blocks - before)
+    Ok((0..8).map(|_| round()).find(|count| *count == 0).unwrap_or_else(round))
 }
 
 fn main() {

@@ -1,7 +1,7 @@
 //! A force from outside, added to v̇ in every stage: the caller's own array, which a [`crate::run::world::World`] reads before
 //! its steps.
 
-use super::Part;
+use super::part::Part;
 use crate::{
     model::{
         spec::Signature,

@@ -7,7 +7,7 @@
 //! Methods of several stages mix such increments, and v would only shrink by a factor in each step. So after the step v is set to
 //! zero if the first stage said that the block stops, and friction can hold it there.
 
-use super::{Part, controls};
+use super::{controls, part::Part};
 use crate::{
     error::Error,
     model::{

@@ -18,7 +18,7 @@ use meet::{OPERATIONS, Step};
 use rods::RodContacts;
 use surface::{ContactMode, Surface};
 
-use super::{Part, controls};
+use super::{controls, part::Part};
 use crate::{
     error::Error,
     model::{

@@ -13,7 +13,7 @@ pub(crate) mod energy;
 pub(crate) mod projection;
 
 use self::energy::is_between;
-use super::Part;
+use super::part::Part;
 use crate::{
     error::Error,
     model::{

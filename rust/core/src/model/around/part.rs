@@ -1,0 +1,36 @@
+//! What each kind of part says of itself.
+
+use crate::{
+    error::Error,
+    model::{
+        method::Record,
+        spec::{Parameters, Signature},
+        system::{Kind, Shape, System},
+    },
+    tape::number::Number,
+};
+
+/// A kind of part. A system has it if parameters of its names are given.
+pub(crate) struct Part<N: Number> {
+    /// The name that is reported where it does not go with something.
+    pub name: &'static str,
+    /// Whether a system has it.
+    pub is_given: fn(&Signature) -> bool,
+    /// An error if its parameters are wrong, or if it does not go with the system or with another part.
+    pub check: fn(&Kind, &Signature, Shape) -> Result<(), Error>,
+    /// The term of it that depends on the velocity, if there is one: methods that need an acceleration refuse it.
+    pub velocity_term: fn(&Signature, &Record) -> Option<&'static str>,
+    /// Whether it only adds to v̇. Attempts at adaptive steps add such parts to rates that are stretched to their step.
+    pub is_force: bool,
+    /// Whether a method's start and finish see it.
+    pub is_for_carry: bool,
+    /// Whether it goes with steps of fixed length only.
+    pub is_only_fixed: bool,
+    /// Whether `large/` has it over rows. Otherwise the whole step of a system with it is one tape.
+    pub has_rows: bool,
+    /// The system with the part around it. The tally starts from the number: h times the energy that a control added.
+    pub wrap: Wrap<N>,
+}
+
+/// Puts a part around a system.
+pub type Wrap<N> = fn(&Parameters<N>, Box<dyn System<N>>, N) -> Box<dyn System<N>>;
