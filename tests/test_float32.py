@@ -680,7 +680,7 @@ def test_functions_in_equations_of_ones_own(equations: Any) -> None:
 # ---- what is refused
 
 
-@pytest.mark.parametrize("dtype", ["float16", np.int32, "double precision", None, 32, np.complex64, "", object()])
+@pytest.mark.parametrize("dtype", ["float16", np.int32, "double precision", 32, np.complex64, "", object()])
 def test_other_types_are_refused(dtype: Any) -> None:
     with pytest.raises(DTypeError, match=r"^dtype: expected 'float64' or 'float32', got "):
         sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, dtype=dtype)

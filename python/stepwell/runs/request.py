@@ -171,8 +171,6 @@ class Request(NamedTuple):
         backend = checks.known("backend", backend, BACKENDS)
         if form != "direct":
             _goes_with_matrices(system, how, form, force)
-            if fused and single:
-                raise UnsupportedError(f"fused: form={form!r} goes with fused=True in float64 only; leave out fused= or dtype=")
         watched = None if events is None else _events(events, form)
         control = a_control(control)
         if form == "power":
