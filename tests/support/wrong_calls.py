@@ -497,7 +497,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "charts.panel": (charts.panel, {"scenes": ["oscillator"], "methods": ["false_euler"], "steps": [100], "progress": None}),
     "charts.Peer": (charts.Peer, {"name": "a", "solve": len, "settings": [0.1], "by": "step", "order": 1}),
-    "charts.peers.peer": (charts.peers.peer, {"given": len}),
+    "charts.peers.peer": (charts.peers.peer, {"function": len}),
     "charts.peers.scipy": (charts.peers.scipy, {"method": "RK45", "settings": [1e-3]}),
     "charts.peers.rebound": (charts.peers.rebound, {"integrator": "ias15", "settings": [1e-3]}),
     "charts.peers.heyoka": (charts.peers.heyoka, {"settings": [1e-3]}),

@@ -291,7 +291,8 @@ def adaptive_averages(
     began = t0 if transient == 0 else float(times[transient - 1])
     for i, (begin, end) in enumerate(zip([t0, *times.tolist()], times.tolist(), strict=False)):
         # Lengths of disturbances mean nothing, but an error is relative to that of a whole block, with them.
-        longest[going] = np.maximum(longest[going], np.sqrt((states[n_v:, going] ** 2).sum(axis=0)))
+        with np.errstate(over="ignore"):
+            longest[going] = np.maximum(longest[going], np.sqrt((states[n_v:, going] ** 2).sum(axis=0)))
         unit = np.where(longest[going] > 0.0, longest[going], 1.0)
         beside = np.concatenate([states[n_v:, going], (unit * vectors[..., going]).reshape(n * k, -1)])
         first, *parts = (each(going) for each in asked)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from hashlib import blake2b
 from typing import TYPE_CHECKING, Any
@@ -241,6 +242,21 @@ def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any], needed: 
             )
     elif not callable(system):
         raise DTypeError(f"system: expected a system, or what makes one of parameters by name, got {type(system).__name__}")
+    elif not isinstance(system, type):  # a class says itself what it takes
+        _takes(system, sorted(varied - set(OF_THE_RUN)))
+
+
+def _takes(maker: Callable[..., Any], parameters: Sequence[str]) -> None:
+    """Raise if a function does not take the parameters that have axes, by their names."""
+    try:
+        signature = inspect.signature(maker)
+    except (TypeError, ValueError):  # of some callables nothing is known
+        return
+    try:
+        signature.bind_partial(**dict.fromkeys(parameters))
+    except TypeError as error:
+        names = ", ".join(parameters)
+        raise DTypeError(f"system: expected a function of {names} by name, got one that cannot be called so: {error}") from None
 
 
 def _fits_single(grid: Grid, paced: bool) -> None:
