@@ -35,6 +35,7 @@ __all__ = [
     "series_evaluations",
     "sound",
     "systems",
+    "tape_operations",
     "times",
 ]
 __version__: str
