@@ -60,7 +60,7 @@ def findings_of(run: Run, request: Request, heard: Callable[[type[Warning]], boo
 
     What takes longer than to evaluate the end is computed only if its warning is ``heard``.
     """
-    noticed = list(run.findings)
+    noticed = list(run.findings)  # of events that it came to rest at
     if run.paces is None:
         if run.system.keeper is not None:
             noticed += of_a_strong_control(run.system, request.v, request.y, run.dt)
@@ -71,7 +71,9 @@ def findings_of(run: Run, request: Request, heard: Callable[[type[Warning]], boo
         if (lost := _of_a_lost_motion(run, request)) is not None:
             noticed.append(lost)
     # What an event makes of a state tells nothing of the steps, and what a method carries not where it began.
-    began = not request.carried and request.before is None and not any(event.then for event in request.events or ())
+    began = not request.carried and request.before is None
+    if request.events is not None and any(event.then for event in request.events):
+        began = False
     start = (request.v, request.y) if began else None
     noticed += _of_nonsense(run, start, request, heard)
     if run.paces is None and start is not None and (growth := registry.task("growth_of")(run, start)) is not None:
@@ -84,8 +86,8 @@ def _of_nonsense(run: Run, start: State | None, request: Request, heard: Callabl
     system = run.system
     if not isinstance(system, NBody):
         about = system.doubt(run.y)
-        if about is None and heard(AccuracyWarning):
-            about = known_energy.told(run, start, None if request.step_control is None else partial(_visited, request))
+        if about is None and start is not None:
+            about = known_energy.told(run, start, None if request.step_control is None else partial(_visited, request), heard)
         return [] if about is None else [Finding(AccuracyWarning, *about)]
     noticed = []
     if run.force is None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.arrays import Array, Shape, Whole
 from ..base.reprs import in_words, share
+from ..errors import AccuracyWarning
 from ..model.systems import Pendulum, RigidBody, System
 from ..reference.acceptance import Acceptance
 from .engine import ABSOLUTE, PACE_NUMBERS, RELATIVE
@@ -61,7 +62,7 @@ def keeps_energy(run: Run) -> bool:
     return isinstance(system, RigidBody) or not system.given_inputs()
 
 
-def told(run: Run, start: State | None, visited: Visited | None = None) -> About | None:
+def told(run: Run, start: State, visited: Visited | None, heard: Callable[[type[Warning]], bool]) -> About | None:
     """What is to be said and of which members, or None.
 
     With steps of fixed length a change of the energy is a property of the method, which grows or decays by nature; there it is
@@ -69,18 +70,17 @@ def told(run: Run, start: State | None, visited: Visited | None = None) -> About
 
     Args:
         run: which.
-        start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
+        start: velocities and coordinates at its start, spread over the batch.
         visited: between which y some members have been, by their places, at the ends of adaptive steps.
+        heard: whether a warning is of use.
     """
     system, paces = run.system, run.paces
-    if start is None or system.keeper is not None:
-        return None
     if paces is None and (run.method.limit == 0.0 or not (isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS)):
         return None  # other systems have no barrier
     made = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
     if made < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS or not run.status.size:
         return None
-    if not (names := _names(system)) or not keeps_energy(run):
+    if system.keeper is not None or not (names := _names(system)) or not keeps_energy(run) or not heard(AccuracyWarning):
         return None
     start = np.broadcast_to(start[0], run.v.shape[1:]), np.broadcast_to(start[1], run.y.shape[1:])
     with np.errstate(all="ignore"):

@@ -87,11 +87,16 @@ class System(Immutable, ValueEquality, ABC):
 
     def part(self, kind: str) -> Any:
         """The part of that kind around its equations, or None."""
-        return next((part for part in self.around if part.kind == kind), None)
+        for part in self.around:
+            if part.kind == kind:
+                return part
+        return None
 
     @property
     def control(self) -> EnergyControl | Projection | None:
         """The control or projection of its energy, or None; ``integrate`` sets it."""
+        if not self.around:
+            return None  # the usual case, which is asked for several times a run
         control: EnergyControl | Projection | None = self.part("control")
         return control
 

@@ -198,7 +198,7 @@ def paces(
     h, *both, longest, begin = (np.asarray(number).item() if np.size(number) == 1 else number for number in each)
     tolerance = both[0], both[1], float(tolerances.absolute is None)
     numbers = [*adaptive.waiting(begin, h, tolerance, plan.system.samples, longest, groups).numbers, *own]
-    if all(np.ndim(number) == 0 for number in numbers):
+    if not any(getattr(number, "ndim", 0) for number in numbers):  # as ``np.ndim``, in a fifth of the time
         return np.array(numbers, dtype=np.float64)
     out = np.empty((len(numbers), *plan.batch))
     for row, number in zip(out, numbers, strict=True):
