@@ -56,8 +56,8 @@ class Precision(NamedTuple):
         return x
 
 
-DOUBLE = Precision(np.float64, np.uint64, 2**64 - 1, 63, ("<d", "<Q"))
-SINGLE = Precision(np.float32, np.uint32, 2**32 - 1, 31, ("<f", "<I"))
+DOUBLE = Precision(np.float64, np.uint64, (1 << 64) - 1, 63, ("<d", "<Q"))
+SINGLE = Precision(np.float32, np.uint32, (1 << 32) - 1, 31, ("<f", "<I"))
 
 
 def is_symbol(x: Any) -> bool:

@@ -6,7 +6,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use crate::aligned::Aligned;
+use crate::{aligned::Aligned, tape::eval::fused};
 
 /// A matrix, by panels.
 pub(crate) struct Panels {
@@ -54,7 +54,7 @@ fn sums<const R: usize, const FUSED: bool>(mut entries: &[[f64; R]], parts: [&[f
         let (now, later) = entries.split_at(part.len());
         for (m, s) in now.iter().zip(part) {
             for r in 0..R {
-                sum[r] = if FUSED { m[r].mul_add(*s, sum[r]) } else { sum[r] + m[r] * s };
+                sum[r] = if FUSED { fused(m[r], *s, sum[r]) } else { sum[r] + m[r] * s };
             }
         }
         entries = later;

@@ -2,6 +2,12 @@
 
 use super::op::Op;
 
+/// a·b + c rounded once, for sums that are asked to be fused and are not on a tape.
+#[inline(always)]
+pub(crate) fn fused(a: f64, b: f64, c: f64) -> f64 {
+    a.mul_add(b, c)
+}
+
 macro_rules! meaning {
     ($(#[$doc:meta])* $apply:ident, $bits:ident, $float:ident) => {
         $(#[$doc])*

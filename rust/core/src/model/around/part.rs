@@ -33,4 +33,4 @@ pub(crate) struct Part<N: Number> {
 }
 
 /// Puts a part around a system.
-pub type Wrap<N> = fn(&Parameters<N>, Box<dyn System<N>>, N) -> Box<dyn System<N>>;
+pub(crate) type Wrap<N> = fn(&Parameters<N>, Box<dyn System<N>>, N) -> Box<dyn System<N>>;
