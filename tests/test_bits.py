@@ -160,7 +160,7 @@ def test_the_reference_sums_in_a_written_order() -> None:
     forbidden = (".sum(", ".dot(", " @ ", "einsum", "np.sin", "np.cos", "math.sin", "math.cos", "fma")
     folder = Path(sw.__file__).parent / "reference"
     for path in sorted(folder.rglob("*.py")):
-        # What a fused multiply-add is stands in one file; the table of operations names it, and a product that is asked to be fused.
+        # What a fused multiply-add is stands in one file; the table of operations names it, and a product that is to be fused.
         # Constants may be powers of two.
         wrong = [word for word in forbidden if word != "fma" or path.name not in ("fma.py", "operations.py", "product.py")]
         text = re.sub(r"2\.0\*\*-?\d+", "", path.read_text())

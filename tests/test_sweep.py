@@ -324,7 +324,11 @@ def test_what_is_refused(what: str) -> None:
 @pytest.mark.parametrize(
     ("options", "error", "said"),
     [
-        ({"tolerance": 1e-3, "at": [1.0]}, UnsupportedError, "dtype: float32 goes with fixed steps only, and tolerance="),
+        (
+            {"tolerance": 1e-9, "at": [1.0], "method": "merson"},
+            ArgumentError,
+            "tolerance: in float32 a step rounds the state by up",
+        ),
         ({"outcomes": "lyapunov"}, ArgumentError, "dtype: goes without Lyapunov exponents"),
         ({"axes": {"omega": [1.0, 1e39, 1.0]}}, ArgumentError, "axes: omega: expected numbers up to 3.4e38"),
         (

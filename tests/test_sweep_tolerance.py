@@ -75,6 +75,7 @@ def test_members_are_those_of_integrate(method: str) -> None:
         {"t0": -1.0},
         {"max_steps": 5000},
         {"control": sw.Projection("energy")},
+        {"dtype": "float32", "tolerance": 1e-4},
     ],
     ids=lambda options: next(iter(options)),
 )

@@ -556,14 +556,20 @@ def _events(events: Any, form: str) -> list[Event]:
     from .events.event import several
 
     if form != "direct":
-        raise UnsupportedError(f"events: goes with form='direct' only, got form={form!r}")
+        raise UnsupportedError(
+            f"events: goes with form='direct' only, got form={form!r}; a located event ends a shorter step, and a "
+            f"matrix is of steps of one length"
+        )
     return several(events)
 
 
 def _goes_with_matrices(system: System, how: Method, form: str, force: Any) -> None:
     """Raise if there is no transition matrix."""
     if force is not None:
-        raise UnsupportedError(f"force: goes with form='direct' only, got form={form!r}; a linear system has inputs")
+        raise UnsupportedError(
+            f"force: goes with form='direct' only, got form={form!r}; the matrices of a step have no term for it: "
+            f"give the linear system an input"
+        )
     if not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
     if how.has_series and any(isinstance(each, Sinusoid) for each in system.given_inputs().values()):
@@ -653,7 +659,10 @@ def _goes_with_a_tolerance(system: System, how: Method, control: Any, options: O
             f"estimated; use dt= and steps="
         )
     if system.contacts:
-        raise UnsupportedError(f"tolerance: goes with systems that meet no surfaces, got {system!r}; use dt= and steps=")
+        raise UnsupportedError(
+            f"tolerance: goes with systems that meet no surfaces, got {system!r}: a bounce is an instant within a step, of "
+            f"which the estimated error of the step knows nothing; use dt= and steps="
+        )
     if how.has_series:
         goes_with_series(system, control)
         if options.positive is not None:

@@ -14,7 +14,7 @@ import numpy as np
 from ...analysis.growth import Growth
 from ...base import checks
 from ...base.reprs import counted
-from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, ToleranceWarning, UnsupportedError
+from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, ToleranceWarning
 from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import System
@@ -183,7 +183,7 @@ def sweep(
     arguments |= {"t0": checks.number("t0", t0, unit="units of time"), "fused": checks.flag("fused", fused), "threads": 1}
     arguments |= {name: value for name, value in (("control", control), ("start", start)) if value is not None}
     if checks.is_single(dtype):
-        _fits_single(grid, paced)
+        _fits_single(grid)
         arguments["dtype"] = "float32"
     every = None if every is None else checks.count("every", every, 1)
     kept_of_each = _outcomes(outcomes, every)
@@ -259,10 +259,8 @@ def _takes(maker: Callable[..., Any], parameters: Sequence[str]) -> None:
         raise DTypeError(f"system: expected a function of {names} by name, got one that cannot be called so: {error}") from None
 
 
-def _fits_single(grid: Grid, paced: bool) -> None:
-    """Raise if members do not go with float32: with adaptive steps, or numbers that it does not have."""
-    if paced:
-        raise UnsupportedError("dtype: float32 goes with fixed steps only, and tolerance= or at= was given; use dt= and steps=")
+def _fits_single(grid: Grid) -> None:
+    """Raise if members have numbers that float32 does not have."""
     for axis in grid.axes:
         checks.fits_single(f"axes: {axis.argument}", axis.values)
         if axis.argument == "dt":
