@@ -321,7 +321,7 @@ def test_what_cannot_be_exported_says_so(tmp_path: Path) -> None:
             r"and at most 20000 are written out one by one",
         ),
         (
-            lambda: sw.export(sw.Chain(1000), "rk4", "c", fused=True),
+            lambda: sw.export(sw.Chain(10_000), "rk4", "c", fused=True),
             sw.errors.ArgumentError,
             r"fused: a step of about \d+ operations",
         ),

@@ -43,7 +43,7 @@ def test_an_invariant_is_recorded() -> None:
     np.testing.assert_allclose(norm, 1.0, rtol=1e-6)
 
 
-@pytest.mark.parametrize("method", ["standard_euler", "standard_heun", "rk4", "false_euler", "dop853"])
+@pytest.mark.parametrize("method", ["standard_euler", "standard_heun", "rk4", "false_euler", "dop853", "taylor"])
 @pytest.mark.parametrize(
     "control", [sw.Control("energy", 2.0), sw.Control("energy", 2.0, "printed"), sw.Projection("energy")], ids=repr
 )
@@ -54,6 +54,31 @@ def test_the_core_and_the_reference_are_one_graph_under_control(method: str, con
     tape = _core.Tape()
     assert_one_graph(tape, tape.trace(engine.model(plan), "step"), Tracer(held, tape).step(sw.method(method)))
     both(system, method, **START, control=control, record="energy")
+
+
+@pytest.mark.parametrize("form", ["printed", "limited"])
+@pytest.mark.parametrize("batch", [(), (3,)])
+def test_a_series_has_the_functions_of_the_invariant_that_is_kept(form: Any, batch: tuple[int, ...]) -> None:
+    """The rates have none of them, so their series come from the invariant alone: a wrong one would show in order 2."""
+
+    @sw.system
+    def orbit(t: Any, v: Any, y: Any) -> Any:
+        square = y[0] * y[0] + y[1] * y[1]
+        return np.array([-y[0], -y[1]]) / (square * np.sqrt(square))
+
+    @orbit.invariant
+    def of_energy(v: Any, y: Any) -> Any:
+        energy = 0.5 * (v[0] * v[0] + v[1] * v[1]) - 1.0 / np.hypot(y[0], y[1])
+        return np.exp(energy) + np.sin(energy)
+
+    control = sw.Control("of_energy", np.linspace(0.5, 1.0, *batch or (1,)).reshape(batch), form, target=0.2)
+    start = {"v": [0.0, 1.1], "y": [1.0, 0.0], "control": control}
+    start = {name: np.reshape(each, (2, *len(batch) * [1])) if name in "vy" else each for name, each in start.items()}
+    series = both(orbit(), "taylor", **start, dt=0.02, steps=100, every=25)
+    # Both methods have errors far below rounding at this step, and 100 steps round some hundred times each.
+    np.testing.assert_allclose(series.y, sw.integrate(orbit(), "dop853", **start, dt=0.02, steps=100, every=25).y, rtol=1e-13)
+    if form == "printed":
+        both(orbit(), "taylor", **start, tolerance=1e-9, at=[0.5, 2.0])
 
 
 def test_a_control_keeps_what_the_method_loses() -> None:

@@ -15,10 +15,6 @@ from .systems import Sampled, System
 
 def fits_together(system: System, method: Method) -> None:
     """Raise if the method cannot do the system."""
-    if method.has_series and getattr(system, "push", None) is not None:
-        raise UnsupportedError(
-            f"control: {method.name} goes with projections, not with {system.keeper!r}, which is a part of the rates; use dop853"
-        )
     if not method.needs_acceleration:
         return
     if not system.second_order:

@@ -125,7 +125,7 @@ class Control(Immutable, ValueEquality):
         invariant: its name; see ``Definition.invariant``.
         gain: in 1 per unit of time, zero or more; broadcasts over the batch.
         form: ``"limited"`` uses gain/(1 + h·gain), as backward Euler would, which never overshoots; ``"printed"`` uses gain
-            itself, and overshoots where h·gain is above 1.
+            itself, and overshoots where h·gain is above 1. With adaptive steps the first depends on their lengths.
         target: the value to keep; that of the start if None. Broadcasts.
 
     Raises:

@@ -17,6 +17,7 @@ from ...errors import ArgumentError
 from ...reference.marks import recording
 from ...reference.tape.replay import Replay
 from .function import TracedFunction
+from .series import MarkedReplay
 
 
 class Invariant(NamedTuple):
@@ -85,7 +86,7 @@ class Traced:
             made = equations.of_state(invariant, self._tape.time(), v, y, parameters)
         self._value = made if isinstance(made, _core.Symbol) else self._tape.number(float(made))
         self._state = [*v.flat, *y.flat]
-        self._of_value = Replay(*self._tape.operations([self._value]))
+        self._of_value = MarkedReplay(self._tape, [self._value], self._marks)
         if any(name == "time" for name, *_ in self._of_value.lines):
             raise ArgumentError(
                 f"{equations.name}: {invariant.name}: expected a quantity of the state and the parameters, got one that depends "
@@ -100,7 +101,7 @@ class Traced:
         square = along[0] * along[0]
         for each in along[1:]:
             square = square + each * each
-        return Replay(*self._tape.operations([*along, square]))
+        return MarkedReplay(self._tape, [*along, square], self._marks)
 
     @cached_property
     def _in_single(self) -> Traced:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import count
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from ... import _core
 from ...reference import series
-from ...reference.marks import Marks, recording
+from ...reference.marks import Marks, mark, recording
 from ...reference.tape.replay import Replay
 from .function import TracedFunction
 
@@ -52,6 +53,96 @@ class _Told:
         return self.value
 
 
+class Line(int):
+    """A line of a tape, in place of its value."""
+
+
+class MarkedReplay(Replay):
+    """Values of a tape, carried out once more, in which functions are known as such.
+
+    On series a function follows its own rule, since roundings and operations on bits have none; on symbols its value is marked.
+
+    Args:
+        tape: the tape of the values.
+        values: the values.
+        marks: the marked functions.
+    """
+
+    def __init__(self, tape: Any, values: Sequence[Any], marks: Marks) -> None:
+        functions = {id: function for id, function in marks.items() if series.has_rule(function)}
+        arguments = [each for function in functions.values() for each in function.arguments if isinstance(each, _core.Symbol)]
+        lines, places = tape.operations([*values, *(tape.value(id) for id in functions), *arguments])
+        super().__init__(lines, places[: len(values)])
+        place = dict(zip([*(each.id for each in values), *functions, *(each.id for each in arguments)], places, strict=True))
+        self.functions = {
+            place[id]: function._replace(
+                arguments=tuple(Line(place[each.id]) if isinstance(each, _core.Symbol) else each for each in function.arguments)
+            )
+            for id, function in functions.items()
+        }
+        self.needed = self._needed()
+
+    def _needed(self) -> list[int]:
+        """The lines that the values depend on, where a function depends on its arguments and not on its operations."""
+        needed: set[int] = set()
+        waiting = list(self.places)
+        while waiting:
+            line = waiting.pop()
+            if line not in needed:
+                needed.add(line)
+                function = self.functions.get(line)
+                waiting += (
+                    self.lines[line][1] if function is None else [each for each in function.arguments if isinstance(each, Line)]
+                )
+        return sorted(needed)
+
+    def __call__(self, state: Sequence[Any], numbers: Sequence[Any], t: Any = None) -> list[Any]:
+        """The values, for numbers, arrays that broadcast, symbols, or series and arrays of them."""
+        if not series.among((t, *state)):
+            return super().__call__(state, numbers, t)
+        batch = np.broadcast_shapes(*(np.shape(each) for each in (t, *numbers, *state)))
+        values = np.empty((len(self.places), *batch), dtype=object)
+        groups = [[np.broadcast_to(_objects(each), batch) for each in group] for group in ((t,), numbers, state)]
+        for member in np.ndindex(batch):
+            values[(slice(None), *member)] = self._of_series(*([each[member] for each in group] for group in groups))
+        return list(values)
+
+    def _of_series(self, t: list[Any], numbers: list[Any], state: list[Any]) -> list[Any]:
+        """The values of one member."""
+        values: dict[int, Any] = {}
+        book = next(each.book for each in (*t, *state) if isinstance(each, series.Series))
+        for line in self.needed:
+            name, of, extra = self.lines[line]
+            function = self.functions.get(line)
+            if function is not None and function.function is not None:
+                arguments = [values[each] if isinstance(each, Line) else each for each in function.arguments]
+                values[line] = series.function(function.name, function.function, function.function, arguments)
+            elif name in ("state", "parameter"):
+                values[line] = (state if name == "state" else numbers)[extra]
+            elif name == "time":
+                values[line] = t[0]
+            else:
+                values[line] = series.operation(book, name, [values[each] for each in of], extra)
+        return [values[place] for place in self.places]
+
+    def _on_tape(self, values: list[Any], symbol: Any) -> list[Any]:
+        """The values on another tape, where functions are marked as on this one."""
+        on_tape = super()._on_tape(values, symbol)
+        for line, function in self.functions.items():
+            arguments = [on_tape[each] if isinstance(each, Line) else each for each in function.arguments]
+            mark(function.name, on_tape[line], *arguments, function=function.function)
+        return on_tape
+
+
+def _objects(x: Any) -> Any:
+    """An array of objects, of one if x is no array."""
+    if isinstance(x, np.ndarray):
+        return x.astype(object)
+    made = np.empty((), dtype=object)
+    made[()] = x
+    return made
+
+
 class Rates:
     """The operations of a user's function, carried out on series.
 
@@ -82,34 +173,7 @@ class Rates:
         with recording(marks):
             rates = equations.rates(tape.time(), v, y, told)
         roots = [each if isinstance(each, _core.Symbol) else tape.number(float(each)) for block in rates for each in block.flat]
-        functions = {id: mark for id, mark in marks.items() if series.has_rule(mark)}
-        arguments = [each for mark in functions.values() for each in mark.arguments if isinstance(each, _core.Symbol)]
-        lines, places = tape.operations([*roots, *(tape.value(id) for id in functions), *arguments])
-        self.operations = Replay(lines, places[: len(roots)])
-        place = dict(zip([*(each.id for each in roots), *functions, *(each.id for each in arguments)], places, strict=True))
-        self.functions = {
-            place[id]: mark._replace(
-                arguments=tuple(Line(place[each.id]) if isinstance(each, _core.Symbol) else each for each in mark.arguments)
-            )
-            for id, mark in functions.items()
-        }
-        self.needed = self._needed()
-
-    def _needed(self) -> list[int]:
-        needed: set[int] = set()
-        waiting = list(self.operations.places)
-        while waiting:
-            line = waiting.pop()
-            if line not in needed:
-                needed.add(line)
-                mark = self.functions.get(line)
-                of = (
-                    self.operations.lines[line][1]
-                    if mark is None
-                    else [each for each in mark.arguments if isinstance(each, Line)]
-                )
-                waiting += of
-        return sorted(needed)
+        self.operations = MarkedReplay(tape, roots, marks)
 
     def __call__(self, t: Any, v: Any, y: Any, given: dict[str, Any]) -> tuple[Any, Any]:
         """v̇ and ẏ of arrays of series whose last axes are those of a batch."""
@@ -125,30 +189,6 @@ class Rates:
         state = [block[index] for block, own in ((v, equations.v_shape), (y, equations.y_shape)) for index in np.ndindex(own)]
         state = [np.asarray(each, dtype=object) for each in state]
         batch = np.broadcast_shapes(t.shape, *(each.shape for each in (*rows, *state)))
-        made = np.empty((len(self.operations.places), *batch), dtype=object)
-        for member in np.ndindex(batch):
-            values = [[np.broadcast_to(each, batch)[member] for each in group] for group in ([t], rows, state)]
-            made[(slice(None), *member)] = self._member(*values)
+        made = np.array(self.operations(state, rows, t), dtype=object).reshape((-1, *batch))
         n_v = len(state) - int(np.prod(equations.y_shape))
         return made[:n_v].reshape((*equations.v_shape, *batch)), made[n_v:].reshape((*equations.y_shape, *batch))
-
-    def _member(self, t: list[Any], numbers: list[Any], state: list[Any]) -> list[Any]:
-        made: dict[int, Any] = {}
-        book = next(each.book for each in (*t, *state) if isinstance(each, series.Series))
-        for line in self.needed:
-            name, of, given = self.operations.lines[line]
-            mark = self.functions.get(line)
-            if mark is not None and mark.function is not None:
-                arguments = [made[each] if isinstance(each, Line) else each for each in mark.arguments]
-                made[line] = series.function(mark.name, mark.function, mark.function, arguments)
-            elif name in ("state", "parameter"):
-                made[line] = (state if name == "state" else numbers)[given]
-            elif name == "time":
-                made[line] = t[0]
-            else:
-                made[line] = series.operation(book, name, [made[each] for each in of], given)
-        return [made[place] for place in self.operations.places]
-
-
-class Line(int):
-    """A line of a tape, in place of its value."""

@@ -126,7 +126,7 @@ class Switches:
 
     def __init__(self, rates: Rates, numbers: Sequence[Array | None]) -> None:
         self.tape = [Operation(name, tuple(of), extra) for name, of, extra in rates.operations.lines]
-        self.functions = rates.functions
+        self.functions = rates.operations.functions
         #: Of each line whether it changes with the time; None if with the state or an input, too.
         self.changes: list[bool | None] = []
         #: Of each line what it is a whole power of, and the exponent.
@@ -143,8 +143,8 @@ class Switches:
             unknown = None in operands or name == "state" or (name == "parameter" and numbers[extra] is None)
             self.changes.append(None if unknown else name == "time" or any(operands))
         values = self._of_values(rates.operations.places)
-        switches = [each for line in rates.needed for each in self._jumps(line)]
-        switches += [each for line in rates.needed if line in values for each in self._bends(line)]
+        switches = [each for line in rates.operations.needed for each in self._jumps(line)]
+        switches += [each for line in rates.operations.needed if line in values for each in self._bends(line)]
         solvable = [each for each in switches if self._solvable(each)]
         #: The times with which the time itself is compared, where they are constants of the function; and all other switches.
         self.constants = np.unique([time for each in solvable if (time := self._constant_time(each)) is not None])

@@ -320,7 +320,12 @@ class OwnSystem(System):
 
     @property
     def chooses(self) -> bool:
-        """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
+        """Whether the rates are made of pieces, one of which is chosen by the state or the time.
+
+        The choice of a control, to do nothing where the gradient is zero, counts for nothing: there is no gradient to go along.
+        """
+        if self.push is not None:
+            return self.uncontrolled.chooses
         return bool(self._retraced()._series_rates().chooses)
 
     @property

@@ -79,12 +79,9 @@ class Equations:
 
 
 def stacked(rows: list[Any], own: tuple[int, ...], batch: tuple[int, ...]) -> Any:
-    """Numbers, or symbols, as a block of this shape, whose last axes are those of the batch."""
-    if any(hasattr(row, "xor_bits") for row in rows):
-        made = np.empty(len(rows), dtype=object)
-        made[:] = rows
-        return made.reshape(own)
-    made = np.empty((len(rows), *np.broadcast_shapes(batch, *(np.shape(row) for row in rows))))
+    """Numbers, symbols or series as a block of this shape, whose last axes are those of the batch."""
+    kind = object if any(np.asarray(row).dtype == object for row in rows) else float
+    block = np.empty((len(rows), *np.broadcast_shapes(batch, *(np.shape(row) for row in rows))), dtype=kind)
     for i, row in enumerate(rows):
-        made[i] = row
-    return made.reshape((*own, *made.shape[1:]))
+        block[i] = row
+    return block.reshape((*own, *block.shape[1:]))

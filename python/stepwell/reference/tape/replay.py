@@ -59,17 +59,19 @@ class Replay:
         for line, name, extra in self._leaves:
             values[line] = t if name == "time" else sources[name][extra]
         if symbol is not None:
-            return self._of_symbols(values, symbol)
+            on_tape = self._on_tape(values, symbol)
+            return [on_tape[place] for place in self.places]
         for line, function, of, more, done in self._meanings:
             values[line] = function(*[values[each] for each in of], *more)
             for each in done:
                 values[each] = None
         return [values[place] for place in self.places]
 
-    def _of_symbols(self, values: list[Any], symbol: Any) -> list[Any]:
+    def _on_tape(self, values: list[Any], symbol: Any) -> list[Any]:
+        """The values of all lines on the tape of this symbol."""
         for line, (name, of, extra) in enumerate(self.lines):
             if name == "constant":
                 values[line] = symbol.constant(extra)
             elif of:
                 values[line] = of_symbols(name, [values[each] for each in of], extra)
-        return [values[place] for place in self.places]
+        return values
