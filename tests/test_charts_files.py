@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell.base import tables
 from stepwell.errors import ArgumentError, DTypeError, UnknownNameError, UnsupportedError
 from stepwell.studies.measuring import data, peers, timing
 from stepwell.views.charts import style
@@ -203,7 +204,7 @@ def test_the_json_is_strict_and_whole(small, tmp_path):
     assert whole["measured_on"] == {"members": 4096, "threads": 1, "repeats": timing.CHARTS.repeats, "isa": sw.isa()}
     assert [row["state_error"] for row in whole["rows"][:3]] == [p.state_error for p in small.curves[0].points]
     assert [row["method"] for row in whole["summary"]] == ["false_euler", "rk4"]
-    assert data.finite({"a": [math.inf, 1.0], "b": math.nan}) == {"a": [None, 1.0], "b": None}
+    assert tables.finite({"a": [math.inf, 1.0], "b": math.nan}) == {"a": [None, 1.0], "b": None}
 
 
 def test_the_summary_is_what_the_points_say(charts):

@@ -232,13 +232,57 @@ def test_a_point_that_is_not_finite_stays_so() -> None:
         assert not np.isfinite(np.concatenate([run.v, run.y], axis=1)[first:].reshape(6 - first, -1)).all(axis=1).any()
 
 
+# ---- adaptive steps
+
+
+@pytest.mark.parametrize("method", ["merson", "fehlberg", "fehlberg_5", "dop853"])
+@pytest.mark.parametrize("n", [1, 70])
+@pytest.mark.parametrize("backward", [False, True])
+def test_a_spring_goes_with_adaptive_steps(method: str, n: int, backward: bool) -> None:
+    """The closed form: half a period of the spring, between two flights.
+
+    The estimate of a step that meets or leaves the spring is of a smooth motion, and may be too small by a lot: errors of up to
+    3e4 tolerances were seen here, with the smallest tolerance. docs/howto/contact.md says so.
+    """
+    omega, height, tolerance = 30.0, np.linspace(0.5, 1.5, n)[:, np.newaxis], 1e-9
+    ball = sw.Particles(gravity=[0.0], floor=sw.Floor(way="spring", omega=omega, normal=[1.0], offset=0.0))
+    speed, end = -2.0, 2.0
+    sign = -1.0 if backward else 1.0
+    runs = [
+        sw.integrate(ball, method, v=sign * speed, y=height, tolerance=tolerance, at=[0.5 * sign, end * sign], backend=backend)
+        for backend in ("rust", "numpy")
+    ]
+    assert_same(*runs)
+    touched = height / -speed
+    np.testing.assert_allclose(runs[0].v[-1], -sign * speed, rtol=1e5 * tolerance)
+    expected = (end - touched - np.pi / omega) * -speed
+    np.testing.assert_allclose(runs[0].y[-1], expected, rtol=1e5 * tolerance)
+
+
+def test_a_ball_that_a_step_might_pass_needs_a_longest_step() -> None:
+    """Without forces a step has no error, however long; a chord of 2·√(0.5² − 0.1²) is passed in half a unit of time."""
+    ball = sw.Particles(gravity=[0.0, 0.0], floor=sw.Sphere((0.0, 0.0), 0.5, way="spring", omega=50.0))
+    start: dict[str, Any] = {"v": [[2.0, 0.0]], "y": [[-3.0, 0.1]], "tolerance": 1e-8, "at": [4.0]}
+    run = sw.integrate(ball, "dop853", **start, max_step=0.1)
+    exact = sw.integrate(ball, "rk4", v=start["v"], y=start["y"], dt=1e-4, steps=40_000)
+    np.testing.assert_allclose(run.y[-1], exact.y[-1], atol=1e-5)
+    assert run.v[-1, 0, 0] < 0.0
+
+
 # ---- refusals
 
 
 def test_what_does_not_go_together_is_refused() -> None:
     ball = sw.Particles(floor=sw.Floor())
-    with pytest.raises(UnsupportedError, match="tolerance: goes with systems that meet no surfaces"):
-        sw.integrate(ball, "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[1.0])
+    paced: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0]}
+    with pytest.raises(UnsupportedError, match="tolerance: a bounce is an instant within a step"):
+        sw.integrate(ball, "dop853", **paced)
+    sprung = sw.Particles(floor=sw.Floor(way="spring", omega=9.0))
+    with pytest.raises(UnsupportedError, match="tolerance: a series does not see that a point meets a surface within a step"):
+        sw.integrate(sprung, "taylor", **paced)
+    round_a_ball = sw.Particles(floor=sw.Sphere((0.0, 0.0), 0.5, way="spring", omega=9.0))
+    with pytest.raises(UnsupportedError, match=r"tolerance: a step may pass a ball between its stages.* give max_step="):
+        sw.integrate(round_a_ball, "dop853", **paced | {"y": [[1.0, 0.0]]})
     with pytest.raises(UnsupportedError, match=r"control: .* meets surfaces"):
         sw.integrate(sw.NBody(floor=sw.Floor()), "rk4", v=0.0, y=np.eye(3)[:, :2], dt=0.1, steps=1, control=sw.Projection())
     with pytest.raises(ArgumentError, match=r"restitution: expected numbers of 0 to 1, got 1.5"):

@@ -42,7 +42,7 @@ def same(a: sw.Run, b: sw.Run) -> None:
 
 def goes(system: sw.System, method: sw.Method) -> bool:
     """Whether a method takes adaptive steps of a system."""
-    series = method.has_series and (system.chooses or np.isfinite(system.samples[0]))
+    series = method.has_series and (system.chooses or system.contacts or np.isfinite(system.samples[0]))
     return fits(system, method) and not series
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import DTypeError, ShapeError, UnsupportedError
-from stepwell.model.systems import base
+from stepwell.model import surfaces
 from stepwell.reference import contact
 from stepwell.runs.engine import direct
 from support.cases import assert_same
@@ -231,4 +231,4 @@ def test_what_does_not_go_together_is_refused() -> None:
 
 
 def test_the_module_that_is_changed_is_the_one_that_runs() -> None:
-    assert base.contact is direct.contact is contact
+    assert surfaces.contact is direct.contact is contact

@@ -249,7 +249,7 @@ SYSTEMS: dict[str, Make] = {
 
 def _adaptive(system: sw.System) -> bool:
     """Whether it goes with adaptive steps: friction depends on the step, and a step that meets a surface is no estimate."""
-    return system.stick_friction is None and not system.contacts
+    return system.stick_friction is None and all(surface.way == "spring" for surface in system.contacts)
 
 
 ADAPTIVE = [name for name, make in SYSTEMS.items() if _adaptive(make(np.random.default_rng(0), 1))]

@@ -26,11 +26,13 @@ class Part(Immutable, ValueEquality, ABC):
         kind: its place in ``ORDER``.
         velocity_term: what of it depends on the velocity, so that methods for ÿ = a(t, y) refuse it; or None.
         acts_on_rates: whether it changes the rates in every stage. Otherwise it changes the state after a step.
+        is_scaled: whether attempts at adaptive steps have it in the rates for a step of 1, which are multiplied by the step.
     """
 
     kind: ClassVar[str]
     velocity_term: ClassVar[str | None] = None
     acts_on_rates: ClassVar[bool] = True
+    is_scaled: ClassVar[bool] = False
 
     def check(self, system: Any) -> None:
         """Raise if it does not go with a system."""

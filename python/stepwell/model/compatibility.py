@@ -104,6 +104,8 @@ def goes_with_series(system: System, control: Any) -> None:
     instead = "use another method, such as dop853"
     if system.samples[0] < np.inf:
         raise UnsupportedError(f"tolerance: a series does not see that samples of an input change within a step; {instead}")
+    if system.contacts:
+        raise UnsupportedError(f"tolerance: a series does not see that a point meets a surface within a step; {instead}")
     if isinstance(control or system.control, EnergyControl):
         raise UnsupportedError(f"tolerance: EnergyControl pushes once a step, and a series has long steps; {instead}")
     if system.chooses:

@@ -242,6 +242,7 @@ class Surfaces(Part):
     """The surfaces that the points of a system meet, in this order."""
 
     kind = "surfaces"
+    is_scaled = True
 
     def __init__(self, surfaces: tuple[Surface, ...]) -> None:
         self.surfaces = surfaces

@@ -284,7 +284,10 @@ class Attempted:
     """
 
     def __init__(self, s: Any, parts: Sequence[Bound] = ()) -> None:
+        scaled = [part for part in parts if part[0].is_scaled]
+        s = Backward(wrapped(s.s, -1.0, scaled)) if isinstance(s, Backward) and scaled else wrapped(s, 1.0, scaled)
         self.s = s
+        parts = [part for part in parts if not part[0].is_scaled]
         self.acting = [part for part in parts if part[0].acts_on_rates]
         self.projected = wrapped(s, 1.0, [part for part in parts if not part[0].acts_on_rates])
         self.unit = self._acting(s, 1.0, without="control")

@@ -658,10 +658,15 @@ def _goes_with_a_tolerance(system: System, how: Method, control: Any, options: O
             f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
             f"estimated; use dt= and steps="
         )
-    if system.contacts:
+    if any(surface.way != "spring" for surface in system.contacts):
         raise UnsupportedError(
-            f"tolerance: goes with systems that meet no surfaces, got {system!r}: a bounce is an instant within a step, of "
-            f"which the estimated error of the step knows nothing; use dt= and steps="
+            f"tolerance: a bounce is an instant within a step, of which the estimated error knows nothing, got {system!r}; use "
+            f'dt= and steps=, or surfaces with way="spring"'
+        )
+    if options.max_step is None and any(getattr(surface, "inside", True) is False for surface in system.contacts):
+        raise UnsupportedError(
+            f"tolerance: a step may pass a ball between its stages, which then do not feel it, got {system!r}; give max_step=, "
+            f"shorter than a point takes past the ball"
         )
     if how.has_series:
         goes_with_series(system, control)

@@ -9,7 +9,7 @@ use super::{
     rates::{RateTraits, Rates, RatesRequest},
 };
 use crate::model::{
-    around::contact::{Contacts, Springs, dimensions},
+    around::contact::{Contacts, Springs, dimensions, ways},
     spec::{Parameters, Spec},
 };
 
@@ -163,8 +163,7 @@ struct SprungRates {
 
 /// Rates with the springs that are given, or the rates themselves.
 pub(crate) fn wrap(rates: Box<dyn Rates>, asked: &RatesRequest) -> Box<dyn Rates> {
-    let has_spring =
-        (0..asked.signature.whole("contacts")).any(|i| asked.signature.word(&format!("contact_{i}_way")) == "spring");
+    let has_spring = ways(asked.signature).any(|way| way == "spring");
     if has_spring { Box::new(SprungRates { rates, h: asked.h, springs: None }) } else { rates }
 }
 

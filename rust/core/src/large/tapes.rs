@@ -77,8 +77,11 @@ fn rate(kind: &Kind, signature: &Signature, shape: Shape, unforced: bool, make: 
         let state = |i: usize| Symbol::new(Op::State(i as u32));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(signature, Symbol::new(Op::Step));
-        let wrap = if unforced { around::wrap_without_forces } else { around::wrap };
-        let s = wrap(&p, (kind.make)(&p), state(behind(shape)));
+        let (made, tally) = ((kind.make)(&p), state(behind(shape)));
+        let s = match unforced {
+            true => around::wrap_without_forces(&p, around::wrap_scaled(&p, made), tally),
+            false => around::wrap(&p, made, tally),
+        };
         let seen = || WINDOW_ENDS.map(|end| Symbol::new(Op::Param(end)));
         let (made, v, y) = window::over(signature, seen, || make(s.as_ref(), v, y));
         let mut next = ids([&v, &y]);

@@ -52,10 +52,11 @@ pub(super) struct AttemptsOf<'a> {
 impl AttemptsOf<'_> {
     /// The system, scaled to a step.
     fn scaled(&self, h: Symbol) -> Box<dyn System<Symbol>> {
-        if self.backward {
-            return Box::new(Backward((self.kind.make)(&parameters(self.signature, -h))));
-        }
-        (self.kind.make)(&parameters(self.signature, h))
+        let made = |h: Symbol| {
+            let p = parameters(self.signature, h);
+            around::wrap_scaled(&p, (self.kind.make)(&p))
+        };
+        if self.backward { Box::new(Backward(made(-h))) } else { made(h) }
     }
 
     /// Rates for a step with the forces around the system: h·v̇ + h·f. Where time runs backward, these see the step and the time

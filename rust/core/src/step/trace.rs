@@ -69,9 +69,6 @@ pub(crate) fn trace_step(tape: Tape, signature: &Signature, how: &StepKind) -> R
         StepKind::Attempts { name, order, acceptance, backward } => {
             let (kind, method) = (kind(signature)?, method(name)?);
             let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
-            if contact::is_given(signature) {
-                return Err(signature.unknown("contact_0"));
-            }
             let attempts = AttemptsOf { kind, signature, shape, acceptance, backward: *backward };
             let single = tape.precision() == Precision::Single;
             let (tape, (next, terms)) = record(tape, || match series_order(&program, *order) {

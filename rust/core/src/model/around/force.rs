@@ -1,7 +1,7 @@
 //! A force from outside, added to v̇ in every stage: the caller's own array, which a [`crate::run::world::World`] reads before
 //! its steps.
 
-use super::part::Part;
+use super::part::{Attempts, Part};
 use crate::{
     model::{
         spec::Signature,
@@ -20,9 +20,9 @@ pub(crate) fn part<N: Number>() -> Part<N> {
         is_given: |signature| signature.count(NAME) > 0,
         check: |_, signature, shape| signature.expect(NAME, shape.v),
         velocity_term: |_, _| None,
-        is_force: true,
+        attempts: Attempts::Added,
         is_for_carry: true,
-        is_only_fixed: false,
+        is_only_fixed: |_| false,
         has_rows: true,
         wrap: |p, system, _| {
             let force = p.numbers(NAME);

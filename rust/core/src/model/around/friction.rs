@@ -7,7 +7,10 @@
 //! Methods of several stages mix such increments, and v would only shrink by a factor in each step. So after the step v is set to
 //! zero if the first stage said that the block stops, and friction can hold it there.
 
-use super::{controls, part::Part};
+use super::{
+    controls,
+    part::{Attempts, Part},
+};
 use crate::{
     error::Error,
     model::{
@@ -27,9 +30,9 @@ pub(crate) fn part<N: Number>() -> Part<N> {
         is_given: |signature| signature.count(NAME) > 0,
         check,
         velocity_term: |_, _| Some("friction"),
-        is_force: false,
+        attempts: Attempts::Other,
         is_for_carry: false,
-        is_only_fixed: true,
+        is_only_fixed: |_| true,
         has_rows: false,
         wrap: |p, system, _| Box::new(Rubbing { system, limit: p.h * p.number(NAME) }),
     }

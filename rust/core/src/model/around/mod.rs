@@ -8,7 +8,7 @@ pub mod force;
 pub(crate) mod friction;
 mod part;
 
-use self::part::Part;
+use self::part::{Attempts, Part};
 use super::{
     method::{Needs, Record},
     spec::{Parameters, Signature},
@@ -46,7 +46,7 @@ pub fn fit(kind: &Kind, signature: &Signature, method: &Record) -> Result<Shape,
 
 /// An error if something is given that goes with steps of fixed length only.
 pub(crate) fn only_fixed(signature: &Signature) -> Result<(), Error> {
-    match parts::<f64>().iter().find(|part| part.is_only_fixed && (part.is_given)(signature)) {
+    match parts::<f64>().iter().find(|part| (part.is_given)(signature) && (part.is_only_fixed)(signature)) {
         None => Ok(()),
         Some(part) => {
             Err(Error::Options { system: signature.system.clone(), options: format!("{}, with adaptive steps", part.name) })
@@ -75,19 +75,24 @@ pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) 
     wrap_in(p, system, tally, |_| true)
 }
 
-/// A system with what is around it but forces, which attempts add to rates that are stretched already.
+/// A system with the parts that attempts have in the rates for a step of 1.
+pub(crate) fn wrap_scaled<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn System<N>> {
+    wrap_in(p, system, N::of(0.0), |part| part.attempts == Attempts::Scaled)
+}
+
+/// A system, as `wrap_scaled` returns it, with what is around it but forces, which attempts add to rates that are stretched already.
 pub(crate) fn wrap_without_forces<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
-    wrap_in(p, system, tally, |part| !part.is_force)
+    wrap_in(p, system, tally, |part| part.attempts == Attempts::Other)
 }
 
 /// Whether there are any of these forces.
 pub(crate) fn has_forces(signature: &Signature) -> bool {
-    parts::<f64>().iter().any(|part| part.is_force && (part.is_given)(signature))
+    parts::<f64>().iter().any(|part| part.attempts == Attempts::Added && (part.is_given)(signature))
 }
 
 /// Rates with these forces.
 pub(crate) fn wrap_in_forces<N: Number>(p: &Parameters<N>, rates: Box<dyn System<N>>) -> Box<dyn System<N>> {
-    wrap_in(p, rates, N::of(0.0), |part| part.is_force)
+    wrap_in(p, rates, N::of(0.0), |part| part.attempts == Attempts::Added)
 }
 
 /// A system as a method's start and finish see it: with surfaces and forces.

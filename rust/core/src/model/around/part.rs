@@ -20,16 +20,27 @@ pub(crate) struct Part<N: Number> {
     pub check: fn(&Kind, &Signature, Shape) -> Result<(), Error>,
     /// The term of it that depends on the velocity, if there is one: methods that need an acceleration refuse it.
     pub velocity_term: fn(&Signature, &Record) -> Option<&'static str>,
-    /// Whether it only adds to v̇. Attempts at adaptive steps add such parts to rates that are stretched to their step.
-    pub is_force: bool,
+    /// Where attempts at adaptive steps have it.
+    pub attempts: Attempts,
     /// Whether a method's start and finish see it.
     pub is_for_carry: bool,
-    /// Whether it goes with steps of fixed length only.
-    pub is_only_fixed: bool,
+    /// Whether it goes with steps of fixed length only, as its parameters are.
+    pub is_only_fixed: fn(&Signature) -> bool,
     /// Whether `large/` has it over rows. Otherwise the whole step of a system with it is one tape.
     pub has_rows: bool,
     /// The system with the part around it. The tally starts from the number: h times the energy that a control added.
     pub wrap: Wrap<N>,
+}
+
+/// Where attempts at adaptive steps, whose length is not known before, have a part.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Attempts {
+    /// In the rates for a step of 1, which are multiplied by the step.
+    Scaled,
+    /// Added to the rates after that, for the step.
+    Added,
+    /// Around all of it: it acts on the state after the step, or on velocities.
+    Other,
 }
 
 /// Puts a part around a system.

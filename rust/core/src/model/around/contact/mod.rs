@@ -16,9 +16,13 @@ mod surface;
 
 use meet::{OPERATIONS, Step};
 use rods::RodContacts;
+pub(crate) use surface::ways;
 use surface::{ContactMode, Surface};
 
-use super::{controls, part::Part};
+use super::{
+    controls,
+    part::{Attempts, Part},
+};
 use crate::{
     error::Error,
     model::{
@@ -56,9 +60,9 @@ pub(crate) fn part<N: Number>() -> Part<N> {
         is_given,
         check: |_, signature, shape| check(signature, shape),
         velocity_term: |_, _| None,
-        is_force: false,
+        attempts: Attempts::Scaled,
         is_for_carry: true,
-        is_only_fixed: false, // a trace of attempts says so
+        is_only_fixed: |signature| ways(signature).any(|way| way != "spring"), // a bounce is an instant within a step
         has_rows: true,
         wrap: |p, system, _| match Springs::new(p) {
             Some(springs) => Box::new(Sprung { system, springs }),

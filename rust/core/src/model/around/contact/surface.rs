@@ -105,6 +105,11 @@ pub(crate) fn check(signature: &Signature, i: usize, dim: usize) -> Result<(), E
     }
 }
 
+/// The ways of all surfaces.
+pub(crate) fn ways(signature: &Signature) -> impl Iterator<Item = &str> {
+    (0..signature.whole("contacts")).map(|i| signature.word(&format!("contact_{i}_way")))
+}
+
 /// The surfaces of some ways.
 pub(crate) fn all<N: Number>(p: &Parameters<N>, is_wanted: impl Fn(ContactMode) -> bool) -> Vec<Surface<N>> {
     (0..p.signature.whole("contacts")).map(|i| Surface::new(p, i)).filter(|surface| is_wanted(surface.way)).collect()

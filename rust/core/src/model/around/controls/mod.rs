@@ -13,7 +13,7 @@ pub(crate) mod energy;
 pub(crate) mod projection;
 
 use self::energy::is_between;
-use super::part::Part;
+use super::part::{Attempts, Part};
 use crate::{
     error::Error,
     model::{
@@ -49,9 +49,9 @@ pub(crate) fn part<N: Number>() -> Part<N> {
             let is_apart = is_after_the_step(signature) && method.carry.is_none();
             (!is_apart).then_some("energy control")
         },
-        is_force: false,
+        attempts: Attempts::Other,
         is_for_carry: false,
-        is_only_fixed: false,
+        is_only_fixed: |_| false,
         has_rows: true,
         wrap: |p, system, tally| match p.signature.word("control") {
             "energy" => Box::new(energy::Controlled::new(p, system, tally)),
