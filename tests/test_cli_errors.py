@@ -4,7 +4,6 @@ import subprocess
 import sys
 
 import pytest
-import stepwell as sw
 from stepwell.views import cli
 from support.commands import run_command
 
@@ -65,7 +64,7 @@ def test_ctrl_c_ends_with_130(capsys, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sw.scenes.Scene, "run", interrupted)
+    monkeypatch.setattr("stepwell.views.cli.run.noticing", interrupted)
     assert run_command(capsys, "run", "clover", "--method", "rk4") == (130, "", "stepwell: interrupted\n")
 
 

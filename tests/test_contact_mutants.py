@@ -10,7 +10,7 @@ import itertools
 from typing import Any
 
 import pytest
-from stepwell.model.systems import base
+from stepwell.model import surfaces
 from stepwell.runs.engine import direct
 from support import contacts
 from support.contact_mutants import changed
@@ -89,7 +89,7 @@ def is_noticed() -> bool:
 @pytest.mark.filterwarnings("ignore")
 def test_a_mistake_is_noticed(old: str, new: str, monkeypatch: Any) -> None:
     wrong = changed(old, new)
-    monkeypatch.setattr(base, "contact", wrong)
+    monkeypatch.setattr(surfaces, "contact", wrong)
     monkeypatch.setattr(direct, "contact", wrong)
     assert is_noticed()
 

@@ -100,7 +100,7 @@ def test_no_step_adds_more_energy_than_springs_can_take(floor: str) -> None:
 )
 def test_a_mistake_in_a_net_is_noticed(old: str, new: str, monkeypatch: Any) -> None:
     wrong = changed(old, new)
-    monkeypatch.setattr(base, "contact", wrong)
+    monkeypatch.setattr(surfaces, "contact", wrong)
     monkeypatch.setattr(direct, "contact", wrong)
     with pytest.raises(AssertionError):
         no_energy_beyond_the_bound(sw.Floor(), backend="numpy", heights=(0.3,))
@@ -175,7 +175,7 @@ def test_fixed_particles_pass_through_surfaces(way: dict[str, Any], n: int, back
 )
 def test_a_mistake_about_fixed_particles_is_noticed(way: dict[str, Any], old: str, new: str, monkeypatch: Any) -> None:
     wrong = changed(old, new)
-    monkeypatch.setattr(base, "contact", wrong)
+    monkeypatch.setattr(surfaces, "contact", wrong)
     monkeypatch.setattr(direct, "contact", wrong)
     with pytest.raises(AssertionError):
         test_fixed_particles_pass_through_surfaces(way, 2, "numpy")
