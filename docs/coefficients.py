@@ -35,7 +35,7 @@ FITS: dict[str, tuple[Callable[[Any], Any], Any, Any, int, int]] = {
 }
 
 
-#: The same for float32 (``single_others.py``).
+#: The same for float32.
 SINGLE_FITS = {name: (*FITS[name][:3], n, FITS[name][4]) for name, n in {"SINH": 3, "COSH": 2, "ATAN": 5, "ASIN": 6}.items()}
 SINGLE_FITS |= {name: (*FITS[name][:3], n, FITS[name][4]) for name, n in {"EXP2": 5, "EXP": 5, "LOG_LONG": 4}.items()}
 

@@ -339,10 +339,13 @@ def test_functions_are_called_by_name() -> None:
 def test_what_only_looks_like_a_function_is_none() -> None:
     tape = _core.Tape()
     x = 0.5 * tape.state(0)
-    y = x * trig.PER_HALF_TURN + trig.MAGIC
-    n = y - trig.MAGIC
-    rough = trig._half_turn(x - n * trig.PI[0], y)  # a sine whose argument is reduced by the first part of π alone
-    other = trig._half_turn((x - n * trig.PI[0]) - n * trig.PI[1], x * trig.PER_HALF_TURN)  # one whose sign is turned by another
+    turn = x * trig.PER_HALF_TURN + bits.DOUBLE.magic
+    n = turn - bits.DOUBLE.magic
+    with pytest.MonkeyPatch.context() as patch:
+        of_double = trig.CONSTANTS.double._replace(pi=trig.CONSTANTS.double.pi[:1])
+        patch.setattr(trig, "CONSTANTS", trig.CONSTANTS._replace(double=of_double))
+        rough = trig.sin(x)  # a sine whose argument is reduced by the first part of π alone
+    other = trig._half_turn(x, n, x * trig.PER_HALF_TURN)  # one whose sign is turned by another
     for made, function in (
         (trig.sin(x), "sine"),
         (trig.cos(x), "cosine"),

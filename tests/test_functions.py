@@ -21,6 +21,7 @@ import stepwell as sw
 from stepwell import _core
 from stepwell.errors import ShapeError
 from stepwell.reference import functions as fn
+from stepwell.reference.bits import DOUBLE
 from stepwell.reference.functions import (
     exponential,
     hyperbolic,
@@ -100,29 +101,37 @@ def test_an_angle_that_is_too_large_has_none(name: str) -> None:
 
 
 CONSTANTS = [
-    (trigonometric, "SIN", "sin"),
-    (trigonometric, "COS", "cos"),
-    (exponential, "EXP", "exp"),
-    (exponential, "EXP2", "exp2"),
-    (logarithms, "LOG", "log"),
-    (hyperbolic, "SINH", "sinh"),
-    (hyperbolic, "COSH", "cosh"),
-    (inverse, "ATAN", "arctan"),
-    (inverse, "ASIN", "arcsin"),
-    (powers, "LOG_LONG", "power"),
-    (trigonometric, "HALF_PI", "sin"),
-    (exponential, "LN2", "exp"),
-    (inverse, "QUARTER_PI", "arctan"),
-    (logarithms, "LOG10_2", "log10"),
+    (trigonometric, "sin", "sin"),
+    (trigonometric, "cos", "cos"),
+    (exponential, "exp", "expm1"),
+    (exponential, "exp_short", "exp"),
+    (exponential, "exp2", "exp2"),
+    (logarithms, "log", "log"),
+    (hyperbolic, "sinh", "sinh"),
+    (hyperbolic, "cosh", "cosh"),
+    (inverse, "atan", "arctan"),
+    (inverse, "asin", "arcsin"),
+    (powers, "log_long", "power"),
+    (trigonometric, "half_pi", "sin"),
+    (exponential, "ln2", "exp"),
+    (inverse, "quarter_pi", "arctan"),
+    (logarithms, "log10_2", "log10"),
 ]
+
+
+def with_constants(monkeypatch: pytest.MonkeyPatch, module: ModuleType, precision: str, **constants: Any) -> None:
+    """Let functions of one precision have other constants."""
+    records = module.CONSTANTS
+    monkeypatch.setattr(module, "CONSTANTS", records._replace(**{precision: getattr(records, precision)._replace(**constants)}))
 
 
 @pytest.mark.mutant
 @pytest.mark.parametrize(("module", "constant", "name"), CONSTANTS, ids=[c for _, c, _ in CONSTANTS])
 def test_a_wrong_constant_is_noticed(module: ModuleType, constant: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its second part is wrong by a hundredth; π/4's by ten times itself, since it is below an ulp. That is more than an ulp."""
-    first, second, *rest = getattr(module, constant)
-    monkeypatch.setattr(module, constant, (first, second * (10.0 if constant == "QUARTER_PI" else 1.01), *rest))
+    first, second, *rest = getattr(module.CONSTANTS.double, constant)
+    value = (first, second * (10.0 if constant == "quarter_pi" else 1.01), *rest)
+    with_constants(monkeypatch, module, "double", **{constant: value})
     assert worst(name, 1000, 1) > 1.0
 
 
@@ -135,7 +144,7 @@ def test_a_wrong_constant_is_noticed(module: ModuleType, constant: str, name: st
             "by_parity",
             lambda x, z, coefficients: pieces.polynomial(z, coefficients[::2]) + pieces.polynomial(z, coefficients[1::2]),
         ),
-        ("magic", lambda low: pieces.MAGIC + pieces.BIAS),
+        ("magic", lambda x, low: DOUBLE.magic + DOUBLE.bias),
     ],
     ids=["odd powers without their x", "one scale for all exponents"],
 )
@@ -152,12 +161,16 @@ def test_the_coefficients_are_those_that_the_script_finds() -> None:
     before = mp.mp.dps
     try:
         spec.loader.exec_module(script)
-        where = {constant: getattr(module, constant) for module, constant, _ in CONSTANTS}
-        assert set(script.FITS) <= set(where)
+        records = {constant.upper(): module.CONSTANTS for module, constant, _ in CONSTANTS}
+        assert set(script.FITS) <= set(records)
         for constant, given in script.FITS.items():
             coefficients, error = script.fit(*given)
-            assert tuple(coefficients) == where[constant]
+            assert tuple(coefficients) == getattr(records[constant].double, constant.lower())
             assert error < 2.0**-57  # a sixteenth of an ulp of 1
+        for constant, given in script.SINGLE_FITS.items():
+            coefficients, error = script.fit(*given, np.float32)
+            assert tuple(coefficients) == getattr(records[constant].single, constant.lower())
+            assert error < 2.0**-26
     finally:
         mp.mp.dps = before
 

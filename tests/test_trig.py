@@ -37,14 +37,14 @@ def test_the_polynomial_misses_the_sine_by_less_than_a_quarter_of_1e_18() -> Non
     for k in range(1, 301):
         r = PI / 2 * k / 300
         z = r * r
-        made = r + r * z * sum(Decimal(c) * z**i for i, c in enumerate(trig.S))
+        made = r + r * z * sum(Decimal(c) * z**i for i, c in enumerate(trig.CONSTANTS.double.sin))
         worst = max(worst, abs(made - true_sin(r)))
     assert 1e-19 < float(worst) < 2.5e-19  # what is known of the best polynomial of this degree: 1.95e-19
 
 
 def test_the_parts_of_pi() -> None:
     """The first has 33 bits, so n times it is exact below 2²⁰; both together miss π by what 53 bits of the second leave."""
-    first, second = trig.PI
+    first, second = trig.CONSTANTS.double.pi
     assert first.as_integer_ratio()[0].bit_length() <= 33
     assert abs(Decimal(first) + Decimal(second) - PI) <= Decimal(second) / 2**53
 
@@ -67,7 +67,7 @@ def test_near_a_multiple_of_pi_the_error_is_far_below_an_ulp_of_one() -> None:
     x = n * math.pi
     found = trig.sin(x)
     for s, a, k in zip(found.tolist(), x.tolist(), n.tolist(), strict=True):
-        allowed = 2 * k * Decimal(trig.PI[1]) / 2**53 + Decimal(abs(s)) / 2**52
+        allowed = 2 * k * Decimal(trig.CONSTANTS.double.pi[1]) / 2**53 + Decimal(abs(s)) / 2**52
         assert abs(Decimal(s) - true_sin(Decimal(a))) <= allowed
 
 

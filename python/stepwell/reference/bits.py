@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import operator
 import struct
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,22 +16,34 @@ import numpy as np
 SIGN, NOT_SIGN = 1 << 63, (1 << 63) - 1
 
 
-class Precision(NamedTuple):
+class Precision:
     """Numbers of one size and their bits.
 
     Attributes:
         number: NumPy's type of them.
         bits: NumPy's type of a whole number of as many bits.
-        all_bits: what is true as a number: all bits are set.
+        fraction_bits: how many of the lowest bits are the fraction. Those of the exponent are above them.
         sign_place: which bit is the sign.
-        formats: of a number and of its bits, for ``struct``.
+        all_bits: what is true as a number: all bits are set.
+        upper_half: all bits but the lower half of the digits. A product of two numbers that are cut to these is exact.
+        bias: the exponent's bits of 1.
+        lowest_bit: the number with only the lowest bit set.
+        least_normal: the least normal number above zero.
+        first_whole: from here to its double the low bits of a number hold a whole number.
+        magic: a number added to this is rounded to a whole one, which then stands in the low bits.
     """
 
-    number: type
-    bits: type
-    all_bits: int
-    sign_place: int
-    formats: tuple[str, str]
+    def __init__(self, number: type, bits: type, fraction_bits: int, formats: tuple[str, str]) -> None:
+        size = 8 * np.dtype(bits).itemsize
+        self.number, self.bits, self.fraction_bits = number, bits, fraction_bits
+        self.sign_place, self.all_bits = size - 1, (1 << size) - 1
+        self.upper_half = self.all_bits & -(1 << (fraction_bits + 2) // 2)
+        self._formats = formats
+        bias = (1 << size - fraction_bits - 2) - 1
+        self.bias, self.least_normal = float(bias), 2.0 ** (1 - bias)
+        self.lowest_bit = self.constant(1)
+        self.first_whole = 2.0**fraction_bits
+        self.magic = 1.5 * self.first_whole
 
     def bits_of(self, x: Any) -> Any:
         """The bits of numbers, as whole numbers."""
@@ -47,17 +59,34 @@ class Precision(NamedTuple):
 
     def pattern(self, x: float) -> int:
         """The bits of one number, which is rounded to this size."""
-        bits: int = struct.unpack(self.formats[1], struct.pack(self.formats[0], x))[0]
+        bits: int = struct.unpack(self._formats[1], struct.pack(self._formats[0], x))[0]
         return bits
 
     def constant(self, bits: int) -> float:
         """The one number of these bits."""
-        x: float = struct.unpack(self.formats[0], struct.pack(self.formats[1], bits))[0]
+        x: float = struct.unpack(self._formats[0], struct.pack(self._formats[1], bits))[0]
         return x
 
 
-DOUBLE = Precision(np.float64, np.uint64, (1 << 64) - 1, 63, ("<d", "<Q"))
-SINGLE = Precision(np.float32, np.uint32, (1 << 32) - 1, 31, ("<f", "<I"))
+DOUBLE = Precision(np.float64, np.uint64, 52, ("<d", "<Q"))
+SINGLE = Precision(np.float32, np.uint32, 23, ("<f", "<I"))
+
+
+T = TypeVar("T")
+
+
+class PerPrecision(NamedTuple, Generic[T]):
+    """What is different for numbers of 64 bits and of 32."""
+
+    double: T
+    single: T
+
+    def of(self, x: Any) -> T:
+        """That of the precision of these numbers or symbols."""
+        return self.single if is_single(x) else self.double
+
+
+PRECISIONS = PerPrecision(DOUBLE, SINGLE)
 
 
 def is_symbol(x: Any) -> bool:
@@ -67,7 +96,9 @@ def is_symbol(x: Any) -> bool:
 
 def is_single(x: Any) -> bool:
     """Whether these are symbols of a tape of float32."""
-    return _objects(x) and any(getattr(each, "single", False) for each in np.asarray(x).flat)
+    if not isinstance(x, np.ndarray):
+        return bool(getattr(x, "single", False))
+    return x.dtype == object and any(getattr(each, "single", False) for each in x.flat)
 
 
 def _objects(*values: Any) -> bool:
@@ -155,7 +186,7 @@ def turn_bits(x: Any, y: Any) -> Any:
 def turn_sign(x: Any, y: Any) -> Any:
     """X, its sign turned where the lowest bit of y is set."""
     if _objects(x, y):
-        return _call("xor_bits", x, _call("shift_up", y, 31 if is_single(y) else 63))
+        return _call("xor_bits", x, _call("shift_up", y, PRECISIONS.of(y).sign_place))
     return turn_bits(x, shift_up(y, 63))
 
 

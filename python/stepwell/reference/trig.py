@@ -4,6 +4,9 @@ Stability analysis steps the reference on numbers that the core never sees, and 
 imaginary part is infinitesimal, and ones that count what is done to them.
 """
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
 from ..base.arrays import Array
@@ -11,17 +14,57 @@ from . import bits
 from .marks import differentiable
 
 PER_HALF_TURN = 0.3183098861837907  # 1/π
-MAGIC = 6755399441055744.0  # 1.5·2⁵²: adding it rounds to an integer, which is then in the low bits
-PI = (3.1415926534682512, 1.2154201013012384e-10)
-S = (
-    -0.16666666666666666,
-    0.008333333333333196,
-    -0.00019841269841207676,
-    2.75573192107121e-6,
-    -2.505210682744121e-8,
-    1.6058937294753282e-10,
-    -7.64292781535996e-13,
-    2.7205082501769597e-15,
+
+
+def _by_parity(r: Array, s: tuple[float, ...]) -> Array:
+    """Sin r = r + r³·(s₀ + s₁·r² + …) of eight terms: odd and even powers are summed apart, to wait for less."""
+    z = r * r
+    w = z * z
+    odd = s[1] + w * (s[3] + w * (s[5] + w * s[7]))
+    even = s[2] + w * (s[4] + w * s[6])
+    return r + (r * z) * (s[0] + z * (odd + z * even))
+
+
+def _in_turn(r: Array, s: tuple[float, ...]) -> Array:
+    """The same of four terms, each of which waits for the one before."""
+    z = r * r
+    return r + (r * z) * (s[0] + z * (s[1] + z * (s[2] + z * s[3])))
+
+
+class Constants(NamedTuple):
+    """Those of one precision.
+
+    Attributes:
+        pi: π in parts; n times each but the last is exact, for n < 2²⁰ or 2¹¹.
+        sin: (sin r − r)/r³ in powers of r², on [−π/2, π/2].
+        polynomial: from r and these the sine of r.
+    """
+
+    pi: tuple[float, ...]
+    sin: tuple[float, ...]
+    polynomial: Callable[[Array, tuple[float, ...]], Array]
+
+
+CONSTANTS = bits.PerPrecision(
+    double=Constants(
+        pi=(3.1415926534682512, 1.2154201013012384e-10),
+        sin=(
+            -0.16666666666666666,
+            0.008333333333333196,
+            -0.00019841269841207676,
+            2.75573192107121e-6,
+            -2.505210682744121e-8,
+            1.6058937294753282e-10,
+            -7.64292781535996e-13,
+            2.7205082501769597e-15,
+        ),
+        polynomial=_by_parity,
+    ),
+    single=Constants(
+        pi=(3.1416015625, -8.909031748771667e-06, 1.215420125655342e-10),
+        sin=(-0.16666656732559204, 0.008333008736371994, -0.00019806012278422713, 2.5987430944951484e-06),
+        polynomial=_in_turn,
+    ),
 )
 
 
@@ -30,11 +73,9 @@ def sin(x: Array) -> Array:
     """Sin x."""
     if np.iscomplexobj(x):  # an infinitesimal imaginary part is multiplied by the derivative
         return sin(x.real) + 1j * (x.imag * cos(x.real))
-    if bits.is_single(x):
-        return _single(x, 0.0)
-    y = x * PER_HALF_TURN + MAGIC
-    n = y - MAGIC
-    return _half_turn((x - n * PI[0]) - n * PI[1], y)
+    magic = bits.PRECISIONS.of(x).magic
+    turn = x * PER_HALF_TURN + magic
+    return _half_turn(x, turn - magic, turn)
 
 
 @differentiable("cos", general=False)
@@ -42,38 +83,16 @@ def cos(x: Array) -> Array:
     """Cos x, which is the sine a quarter of a turn further."""
     if np.iscomplexobj(x):
         return cos(x.real) - 1j * (x.imag * sin(x.real))
-    if bits.is_single(x):
-        return _single(x, 0.5)
-    y = (x * PER_HALF_TURN + 0.5) + MAGIC
-    n = (y - MAGIC) - 0.5
-    return _half_turn((x - n * PI[0]) - n * PI[1], y)
+    magic = bits.PRECISIONS.of(x).magic
+    turn = (x * PER_HALF_TURN + 0.5) + magic
+    return _half_turn(x, (turn - magic) - 0.5, turn)
 
 
-#: The same for float32, where the first two parts of π have 13 bits each.
-SINGLE_MAGIC = 12582912.0
-SINGLE_PI = (3.1416015625, -8.909031748771667e-06, 1.215420125655342e-10)
-SINGLE_S = (-0.16666656732559204, 0.008333008736371994, -0.00019806012278422713, 2.5987430944951484e-06)
-
-
-def _single(x: Array, turned: float) -> Array:
-    """Sin(x + turned·π) of symbols of float32."""
-    y = x * PER_HALF_TURN
-    y = (y + turned if turned else y) + SINGLE_MAGIC
-    n = y - SINGLE_MAGIC
-    n = n - turned if turned else n
-    r = ((x - n * SINGLE_PI[0]) - n * SINGLE_PI[1]) - n * SINGLE_PI[2]
-    z = r * r
-    s = r + (r * z) * (SINGLE_S[0] + z * (SINGLE_S[1] + z * (SINGLE_S[2] + z * SINGLE_S[3])))
-    signed: Array = bits.turn_sign(s, y)
-    return signed
-
-
-def _half_turn(r: Array, y: Array) -> Array:
-    """Sin r on [−π/2, π/2]; its sign turns if the integer in the low bits of y is odd."""
-    z = r * r
-    w = z * z
-    odd = S[1] + w * (S[3] + w * (S[5] + w * S[7]))
-    even = S[2] + w * (S[4] + w * S[6])
-    s = r + (r * z) * (S[0] + z * (odd + z * even))
-    signed: Array = bits.turn_sign(s, y)
+def _half_turn(x: Array, n: Array, turn: Array) -> Array:
+    """Sin(x − nπ), in [−π/2, π/2]; its sign turns if the integer in the low bits of ``turn`` is odd."""
+    constants = CONSTANTS.of(x)
+    r = x
+    for part in constants.pi:
+        r = r - n * part
+    signed: Array = bits.turn_sign(constants.polynomial(r, constants.sin), turn)
     return signed

@@ -5,7 +5,6 @@ makes of a symbol is a straight line of additions, multiplications, divisions, s
 which are exact or correctly rounded everywhere. ``docs/theory/functions.md`` says how accurate each is and what it costs.
 """
 
-from . import single_others as _single  # noqa: F401  it puts the functions of float32 where they are found
 from .comparisons import equal, greater, greater_equal, less, less_equal, not_equal
 from .exponential import exp, exp2, expm1
 from .hyperbolic import cosh, sinh, tanh

@@ -23,8 +23,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 #: Functions without a mark: those with another name for users, and those of products alone, which are differentiated as such.
 NAMES, UNMARKED = {"any_power": "power"}, {"of", "deg2rad", "rad2deg"}
-#: The function of float32 by its name and that of float64; its module puts it here, since it needs this one.
-SINGLE: list[Callable[[str, Callable[..., Any]], Callable[..., Any]]] = []
 
 
 def symbol_of(values: Sequence[Any]) -> Any:
@@ -83,7 +81,7 @@ def elementary(f: F) -> F:
         if one_by_one(values):
             return np.frompyfunc(of_anything, len(values), 1)(*values)
         if (symbol := symbol_of(values)) is not None:
-            value = _of_symbols(symbol, f)(*(lifted(symbol, *pair) for pair in zip(names, values, strict=True)))
+            value = f(*(lifted(symbol, *pair) for pair in zip(names, values, strict=True)))
             return (
                 value if f.__name__ in UNMARKED else mark(NAMES.get(f.__name__, f.__name__), value, *values, function=of_anything)
             )
@@ -92,10 +90,3 @@ def elementary(f: F) -> F:
             return f(*(np.atleast_1d(each) for each in arrays)).reshape(shape)[()]
 
     return of_anything  # type: ignore[return-value]
-
-
-def _of_symbols(symbol: Any, f: Callable[..., Any]) -> Callable[..., Any]:
-    """The function for symbols of the precision of this one."""
-    if not getattr(symbol, "single", False):
-        return f
-    return SINGLE[0](f.__name__, f)

@@ -6,49 +6,76 @@ which are short polynomials; ``docs/coefficients.py`` finds their coefficients.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from ..bits import either_bits, magnitude, sign_of, where
+from ..bits import PerPrecision, either_bits, is_single, magnitude, sign_of, where
 from .elementary import elementary
-from .exponential import LN2, LOG2_E
 from .exponential import reduced as exponential
-from .pieces import MAGIC, fast_sum, halves, polynomial, power_of_two, quotient
+from .pieces import fast_sum, halves, polynomial, power_of_two, quotient
 
-#: (sinh r − r)/r³ in powers of r².
-SINH = (
-    0.16666666666666677,
-    0.008333333333321454,
-    0.00019841269886514685,
-    2.7557243862350308e-06,
-    2.5109145832168022e-08,
+
+class Constants(NamedTuple):
+    """Those of one precision.
+
+    Attributes:
+        sinh: (sinh r − r)/r³ in powers of r².
+        cosh: (cosh r − 1 − r²/2)/r⁴ in powers of r².
+        identity_below: below it sinh x and tanh x round to x.
+        overflow_from: from here on sinh x and cosh x are infinite.
+        tanh_one_from: from here on tanh x rounds to 1.
+        least_exponent: about the exponent of the least normal number, without its sign.
+    """
+
+    sinh: tuple[float, ...]
+    cosh: tuple[float, ...]
+    identity_below: float
+    overflow_from: float
+    tanh_one_from: float
+    least_exponent: float
+
+
+CONSTANTS = PerPrecision(
+    double=Constants(
+        sinh=(
+            0.16666666666666677,
+            0.008333333333321454,
+            0.00019841269886514685,
+            2.7557243862350308e-06,
+            2.5109145832168022e-08,
+        ),
+        cosh=(
+            0.041666666666666685,
+            0.001388888888887332,
+            2.4801587349060595e-05,
+            2.755725199229993e-07,
+            2.0921702372435563e-09,
+        ),
+        identity_below=2.0**-28,
+        overflow_from=710.6,
+        tanh_one_from=22.0,
+        least_exponent=1000.0,
+    ),
+    single=Constants(
+        sinh=(0.1666666716337204, 0.008333191275596619, 0.00019959326891694218),
+        cosh=(0.04166645556688309, 0.0013935758033767343),
+        identity_below=2.0**-13,
+        overflow_from=89.6,
+        tanh_one_from=10.0,
+        least_exponent=100.0,
+    ),
 )
-#: (cosh r − 1 − r²/2)/r⁴ in powers of r².
-COSH = (
-    0.041666666666666685,
-    0.001388888888887332,
-    2.4801587349060595e-05,
-    2.755725199229993e-07,
-    2.0921702372435563e-09,
-)
-#: Below it sinh x and tanh x round to x.
-IDENTITY_BELOW = 2.0**-28
-#: From here on sinh x and cosh x are infinite.
-OVERFLOW_FROM = 710.6
-#: From here on tanh x rounds to 1.
-TANH_ONE_FROM = 22.0
 
 
 def _half(x: Any) -> tuple[Any, Any]:
     """Half of sinh |x| and half of cosh |x|; their double may be infinite."""
-    x = where(x > OVERFLOW_FROM, OVERFLOW_FROM, x)
-    n = (x * LOG2_E + MAGIC) - MAGIC
-    upper, lower = x - n * LN2[0], n * LN2[1]
-    r = upper - lower
-    z = r * r
-    growing, falling = power_of_two(n - 2.0), power_of_two(1000.0 - n) * 2.0**-1002
+    constants = CONSTANTS.of(x)
+    x = where(x > constants.overflow_from, constants.overflow_from, x)
+    n, _, upper, lower, r, z = exponential(x)
+    growing = power_of_two(n - 2.0)
+    falling = power_of_two(constants.least_exponent - n) * 2.0 ** -(constants.least_exponent + 2.0)
     first, second = halves(upper)  # a product with the first half is exact where exactness is needed
-    rest_of_sinh = (second - lower) + (z * r) * polynomial(z, SINH)
-    rest_of_cosh = z * (0.5 + z * polynomial(z, COSH))
+    rest_of_sinh = (second - lower) + (z * r) * polynomial(z, constants.sinh)
+    rest_of_cosh = z * (0.5 + z * polynomial(z, constants.cosh))
     # Half of sinh and of cosh of n·ln 2, each with its rest.
     odd, even = fast_sum(growing, -falling), fast_sum(growing, falling)
 
@@ -69,7 +96,7 @@ def sinh(x: Any) -> Any:
     """
     y = magnitude(x)
     sine, _ = _half(y)
-    return either_bits(where(y < IDENTITY_BELOW, y, sine * 2.0), sign_of(x))
+    return either_bits(where(y < CONSTANTS.of(x).identity_below, y, sine * 2.0), sign_of(x))
 
 
 @elementary
@@ -81,14 +108,16 @@ def cosh(x: Any) -> Any:
 
 @elementary
 def tanh(x: Any) -> Any:
-    """Hyperbolic tangent of x: (e²ˣ − 1)/(e²ˣ + 1), each to more than 53 bits."""
+    """Hyperbolic tangent of x: (e²ˣ − 1)/(e²ˣ + 1), each with more digits than numbers have."""
+    constants = CONSTANTS.of(x)
     y = magnitude(x)
-    p = exponential(2.0 * where(y > TANH_ONE_FROM, TANH_ONE_FROM, y))
+    p = exponential(2.0 * where(y > constants.tanh_one_from, constants.tanh_one_from, y))
+    rest = p.rest() if is_single(x) else None  # of few terms, and first of all
     inverse = power_of_two(-p.n)
     pairs = []
     for part in (-inverse, inverse):  # e²ˣ − 1 and e²ˣ + 1, divided by 2ⁿ
         one, one_rest = fast_sum(1.0, part)
         s, lost = fast_sum(one, p.upper)
-        pairs.append(fast_sum(s, lost + (p.rest + one_rest)))
-    q, rest = quotient(*pairs[0], *pairs[1])
-    return either_bits(where(y < IDENTITY_BELOW, y, q + rest), sign_of(x))
+        pairs.append(fast_sum(s, lost + ((p.accurate_rest() if rest is None else rest) + one_rest)))
+    q, q_rest = quotient(*pairs[0], *pairs[1])
+    return either_bits(where(y < constants.identity_below, y, q + q_rest), sign_of(x))

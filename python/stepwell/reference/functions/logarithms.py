@@ -8,44 +8,79 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ..bits import add_bits, and_bits, either_bits, equal, or_bits, shift_down, sign_of, where
-from .elementary import elementary
-from .exponential import LN2
-from .pieces import fast_sum, halves, polynomial, power_of_two
-
-#: 2·(artanh s − s)/s³ in powers of s².
-LOG = (
-    0.6666666666666736,
-    0.39999999999405483,
-    0.28571428744061894,
-    0.22222198426151224,
-    0.18183571057432849,
-    0.15313895728652202,
-    0.1479736350587642,
+from ..bits import (
+    PRECISIONS,
+    PerPrecision,
+    add_bits,
+    and_bits,
+    either_bits,
+    equal,
+    is_single,
+    or_bits,
+    shift_down,
+    sign_of,
+    where,
 )
-#: √½, cut: the mantissa is taken from √½ to √2.
-HALF_ROOT = 0x3FE6A09E00000000
-TO_ONE = 0x3FF0000000000000 - HALF_ROOT
-MANTISSA = 0x000FFFFFFFFFFFFF
-#: 2⁵²: its low bits hold a whole number.
-TWO_52 = 0x4330000000000000
-LEAST_NORMAL = 2.0**-1022
-INFINITY, NAN = float("inf"), float("nan")
-#: 1/ln 2, 1/ln 10: a first part of 26 bits, and the rest.
-LOG2_E = (1.4426950514316559, -1.0542692476429138e-08)
-LOG10_E = (0.4342944845557213, -2.6524694553078553e-09)
-#: log₁₀ 2; k times the first part, of 40 bits, is exact.
-LOG10_2 = (0.3010299956640665, -8.532344317057107e-14)
+from .elementary import elementary
+from .exponential import CONSTANTS as EXPONENTIAL
+from .pieces import INFINITY, NAN, fast_sum, halves, polynomial, power_of_two
+
+
+class Constants(NamedTuple):
+    """Those of one precision.
+
+    Attributes:
+        log: 2·(artanh s − s)/s³ in powers of s².
+        half_root: the bits of √½, cut: the mantissa is taken from √½ to √2.
+        log2_e: 1/ln 2: a first part of 26 or 12 bits, and the rest.
+        log10_e: 1/ln 10 likewise.
+        log10_2: log₁₀ 2; k times the first part, of 40 or 16 bits, is exact.
+    """
+
+    log: tuple[float, ...]
+    half_root: int
+    log2_e: tuple[float, float]
+    log10_e: tuple[float, float]
+    log10_2: tuple[float, float]
+
+
+CONSTANTS = PerPrecision(
+    double=Constants(
+        log=(
+            0.6666666666666736,
+            0.39999999999405483,
+            0.28571428744061894,
+            0.22222198426151224,
+            0.18183571057432849,
+            0.15313895728652202,
+            0.1479736350587642,
+        ),
+        half_root=0x3FE6A09E00000000,
+        log2_e=(1.4426950514316559, -1.0542692476429138e-08),
+        log10_e=(0.4342944845557213, -2.6524694553078553e-09),
+        log10_2=(0.3010299956640665, -8.532344317057107e-14),
+    ),
+    single=Constants(
+        log=(0.6666666269302368, 0.40000972151756287, 0.2849878966808319, 0.2427894026041031),
+        half_root=0x3F350400,
+        log2_e=(1.4423828125, 0.00031222839606925845),
+        log10_e=(0.4342041015625, 9.038033749675378e-05),
+        log10_2=(0.301025390625, 4.605039066518657e-06),
+    ),
+)
 
 
 def exponent_and_rest(x: Any, *, normal: bool = False) -> tuple[Any, Any]:
     """K and m of x = 2ᵏ·m with m from √½ to √2, of a positive number, which is not subnormal if ``normal``."""
-    offset: Any = 4503599627370496.0 + 1023.0
+    precision, half_root = PRECISIONS.of(x), CONSTANTS.of(x).half_root
+    places = precision.fraction_bits
+    offset: Any = precision.first_whole + precision.bias
     if not normal:
-        tiny = x < LEAST_NORMAL
-        x, offset = where(tiny, x * 2.0**54, x), where(tiny, offset + 54.0, offset)
-    u = add_bits(x, TO_ONE)
-    return or_bits(shift_down(u, 52), TWO_52) - offset, add_bits(and_bits(u, MANTISSA), HALF_ROOT)
+        tiny = x < precision.least_normal
+        x, offset = where(tiny, x * 2.0 ** (places + 2), x), where(tiny, offset + (places + 2.0), offset)
+    u = add_bits(x, precision.pattern(1.0) - half_root)
+    k = or_bits(shift_down(u, places), precision.pattern(precision.first_whole)) - offset
+    return k, add_bits(and_bits(u, (1 << places) - 1), half_root)
 
 
 class Reduced(NamedTuple):
@@ -65,12 +100,14 @@ def reduced(x: Any, *, normal: bool = False) -> Reduced:
     s = f / (2.0 + f)
     z = s * s
     half = (0.5 * f) * f
-    return Reduced(k, f, half, s, s * (half + z * polynomial(z, LOG)))
+    return Reduced(k, f, half, s, s * (half + z * polynomial(z, CONSTANTS.of(x).log)))
 
 
 def at_the_ends(x: Any, value: Any) -> Any:
     """A logarithm where x is positive and finite; −∞ for zero, NaN for negative numbers, ∞ and NaN unchanged."""
     value = where(x < INFINITY, value, x)
+    if is_single(x):  # where a NaN keeps its bits
+        return where(equal(x, 0.0), -INFINITY, where(x < 0.0, NAN, value))
     return where(x > 0.0, value, where(equal(x, 0.0), -INFINITY, NAN))
 
 
@@ -82,8 +119,8 @@ def log(x: Any) -> Any:
         >>> print(log(2.0))
         0.6931471805599453
     """
-    p = reduced(x)
-    return at_the_ends(x, p.k * LN2[0] - ((p.half - (p.rest + p.k * LN2[1])) - p.f))
+    p, ln2 = reduced(x), EXPONENTIAL.of(x).ln2
+    return at_the_ends(x, p.k * ln2[0] - ((p.half - (p.rest + p.k * ln2[1])) - p.f))
 
 
 @elementary
@@ -95,7 +132,8 @@ def log1p(x: Any) -> Any:
     p = reduced(u, normal=True)
     # The derivative, (1 − s)/(1 + s), is 1 − 2s + 2s² to a hundredth, and lost is that small beside the result.
     lost = (lost * power_of_two(1.0 - p.k)) * (0.5 - (p.s - p.s * p.s))
-    value = p.k * LN2[0] - ((p.half - (p.rest + (p.k * LN2[1] + lost))) - p.f)
+    ln2 = EXPONENTIAL.of(x).ln2
+    value = p.k * ln2[0] - ((p.half - (p.rest + (p.k * ln2[1] + lost))) - p.f)
     return at_the_ends(u, either_bits(value, sign_of(x)))
 
 
@@ -112,10 +150,10 @@ def _in_base(x: Any, factor: tuple[float, float], unit: tuple[float, float]) -> 
 @elementary
 def log2(x: Any) -> Any:
     """Logarithm to base 2; exact for powers of 2. See ``log``."""
-    return _in_base(x, LOG2_E, (1.0, 0.0))
+    return _in_base(x, CONSTANTS.of(x).log2_e, (1.0, 0.0))
 
 
 @elementary
 def log10(x: Any) -> Any:
     """Logarithm to base 10. See ``log``."""
-    return _in_base(x, LOG10_E, LOG10_2)
+    return _in_base(x, CONSTANTS.of(x).log10_e, CONSTANTS.of(x).log10_2)

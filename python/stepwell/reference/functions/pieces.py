@@ -1,6 +1,6 @@
-"""Arithmetic with more than 53 bits, without fused multiply-adds, and common first and last parts of functions.
+"""Arithmetic with more digits than numbers have, without fused multiply-adds, and common first and last parts of functions.
 
-A number of about 106 bits is the sum of two, of which the second is at most half a unit in the last place of the first.
+A number of twice as many digits is the sum of two, of which the second is at most half a unit in the last place of the first.
 """
 
 from __future__ import annotations
@@ -8,14 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..bits import and_bits, shift_up, where
+from ..bits import PRECISIONS, and_bits, shift_up
 
-#: The first 26 bits of a number's 53. A product of two such numbers is exact.
-UPPER = 0xFFFF_FFFF_F800_0000
-#: 1.5·2⁵²: a number added to it is rounded to a whole one, which then stands in the low bits.
-MAGIC = 6755399441055744.0
-#: The exponent's bits of 1.
-BIAS = 1023.0
+INFINITY, NAN = float("inf"), float("nan")
 
 
 def polynomial(x: Any, coefficients: Sequence[float]) -> Any:
@@ -32,8 +27,8 @@ def by_parity(x: Any, z: Any, coefficients: Sequence[float]) -> Any:
 
 
 def halves(x: Any) -> tuple[Any, Any]:
-    """The first 26 bits, and the other 27."""
-    upper = and_bits(x, UPPER)
+    """The first half of the digits, 26 of 53 or 12 of 24, and the other one."""
+    upper = and_bits(x, PRECISIONS.of(x).upper_half)
     return upper, x - upper
 
 
@@ -53,19 +48,6 @@ def quotient(n: Any, n_rest: Any, d: Any, d_rest: Any) -> tuple[Any, Any]:
 
 
 def power_of_two(n: Any) -> Any:
-    """2ⁿ of a whole number from −1022 to 1023; 0 of −1023."""
-    return shift_up(n + (MAGIC + BIAS), 52)
-
-
-def magic(low: Any) -> Any:
-    """What a number is added to for ``scaled``: it is rounded as by ``MAGIC``, and an exponent's bits stand in the low ones."""
-    return where(low, MAGIC + (BIAS + 100.0), MAGIC + (BIAS - 1.0))
-
-
-def scaled(x: Any, turn: Any, low: Any) -> Any:
-    """x·2ⁿ, rounded once, for |x| near 1 and n from −1100 to 1024; ``turn`` is n + ``magic(low)``.
-
-    No single number of normal size is 2ⁿ for all of these, so there are two factors: one of them is 2⁻¹⁰⁰ or 2. ``low`` is true
-    where n < 0, perhaps also where n = 0.
-    """
-    return (x * shift_up(turn, 52)) * where(low, 2.0**-100, 2.0)
+    """2ⁿ of a whole number for which it is a normal number; 0 of the next one below these."""
+    precision = PRECISIONS.of(n)
+    return shift_up(n + (precision.magic + precision.bias), precision.fraction_bits)

@@ -7,42 +7,78 @@ coefficients.
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...base.checks import numbers
-from ..bits import and_bits, either_bits, equal, floor, magnitude, sign_of, turn_bits, where
+from ..bits import (
+    PRECISIONS,
+    PerPrecision,
+    and_bits,
+    clamp,
+    either_bits,
+    equal,
+    floor,
+    is_single,
+    magnitude,
+    sign_of,
+    turn_bits,
+    where,
+)
 from ..bits import sqrt as root
 from .elementary import elementary
-from .exponential import HIGHEST_POWER_OF_TWO, LOWEST_POWER_OF_TWO, exp2_of_sum
+from .exponential import CONSTANTS as EXPONENTIAL
+from .exponential import exp2_of_sum
 from .logarithms import exponent_and_rest
-from .pieces import UPPER, by_parity, halves
+from .pieces import INFINITY, NAN, by_parity, halves
 
-#: 3·(artanh s − s − s³/3)/s⁵ in powers of s².
-LOG_LONG = (
-    0.6000000000000356,
-    0.42857142855077796,
-    0.3333333379099096,
-    0.272726756868231,
-    0.23080171936530056,
-    0.19884461675660128,
-    0.1980104338875592,
+
+class Constants(NamedTuple):
+    """Those of one precision.
+
+    Attributes:
+        log_long: 3·(artanh s − s − s³/3)/s⁵ in powers of s².
+        two_thirds_log2_e: 2/(3·ln 2): a first part of 26 or 12 bits, the rest, and rounded as a whole.
+        largest_exponent: with an exponent of this size the power is 0 or infinity for all numbers except 1: in float64
+            log₂(1 ± 2⁻⁵³) times it is beyond ±2⁹, in float32 log₂(1 ± 2⁻²⁴) times it.
+    """
+
+    log_long: tuple[float, ...]
+    two_thirds_log2_e: tuple[float, float, float]
+    largest_exponent: float
+
+
+CONSTANTS = PerPrecision(
+    double=Constants(
+        log_long=(
+            0.6000000000000356,
+            0.42857142855077796,
+            0.3333333379099096,
+            0.272726756868231,
+            0.23080171936530056,
+            0.19884461675660128,
+            0.1980104338875592,
+        ),
+        two_thirds_log2_e=(0.9617967009544373, -7.028461650952758e-09, 0.9617966939259756),
+        largest_exponent=2.0**64,
+    ),
+    single=Constants(
+        log_long=(0.5999999642372131, 0.4285793602466583, 0.3327159285545349, 0.292916864156723),
+        two_thirds_log2_e=(0.961669921875, 0.00012677205086220056, 0.9617966939259756),
+        largest_exponent=2.0**33,
+    ),
 )
-#: 2/(3·ln 2): a first part of 26 bits, the rest, and rounded as a whole.
-TWO_THIRDS_LOG2_E = (0.9617967009544373, -7.028461650952758e-09, 0.9617966939259756)
-INFINITY, NAN = float("inf"), float("nan")
 #: Whole and half exponents up to this size are products.
 LARGEST_PRODUCT = 16
-#: With an exponent of this size the power is 0 or infinity for all numbers except 1: log₂(1 ± 2⁻⁵³) times it is beyond ±2⁹.
-LARGEST_EXPONENT = 2.0**64
 
 
 def log2_in_two(x: Any) -> tuple[Any, Any]:
-    """log₂ of a positive number: 26 bits, and the rest to more than 40."""
+    """log₂ of a positive number: 26 or 12 bits, and the rest to more than 40 or 20."""
+    constants, upper_half = CONSTANTS.of(x), PRECISIONS.of(x).upper_half
     k, m = exponent_and_rest(x)
     f = m - 1.0
-    total = and_bits(m + 1.0, UPPER)
+    total = and_bits(m + 1.0, upper_half)
     total_rest = m - (total - 1.0)
     inverse = 1.0 / (m + 1.0)
     s = f * inverse
@@ -52,17 +88,17 @@ def log2_in_two(x: Any) -> tuple[Any, Any]:
     # s·(3 + s² + s⁴·P(s²)), where 3 + s² must be exact.
     z, z1 = s * s, s1 * s1
     square = z * z
-    rest = square * by_parity(z, square, LOG_LONG) + s2 * (s1 + s)
-    t1 = and_bits((3.0 + z1) + rest, UPPER)
+    rest = square * by_parity(z, square, constants.log_long) + s2 * (s1 + s)
+    t1 = and_bits((3.0 + z1) + rest, upper_half)
     t2 = rest - ((t1 - 3.0) - z1)
     u = s1 * t1
     v = s2 * t1 + t2 * s
-    p1 = and_bits(u + v, UPPER)
+    p1 = and_bits(u + v, upper_half)
     p2 = v - (p1 - u)
-    first, second, whole = TWO_THIRDS_LOG2_E
+    first, second, whole = constants.two_thirds_log2_e
     w1 = first * p1
     w2 = second * p1 + p2 * whole
-    upper = and_bits((w1 + w2) + k, UPPER)
+    upper = and_bits((w1 + w2) + k, upper_half)
     return upper, w2 - ((upper - k) - w1)
 
 
@@ -71,13 +107,17 @@ def any_power(x: Any, y: Any) -> Any:
     """X to the power y, as C's pow."""
     a = magnitude(x)
     upper, lower = log2_in_two(a)
-    e = where(y < -LARGEST_EXPONENT, -LARGEST_EXPONENT, where(y > LARGEST_EXPONENT, LARGEST_EXPONENT, y))
+    largest = CONSTANTS.of(x).largest_exponent
+    lowest, highest = EXPONENTIAL.of(x).lowest_power_of_two, EXPONENTIAL.of(x).highest_power_of_two
+    # The two precisions choose the same by other operations.
+    single = is_single(x)
+    e = clamp(y, -largest, largest) if single else where(y < -largest, -largest, where(y > largest, largest, y))
     e1, e2 = halves(e)
     p, p_rest = e1 * upper, e2 * upper + e * lower
-    below, above = p < LOWEST_POWER_OF_TWO, p > HIGHEST_POWER_OF_TWO
-    p = where(below, LOWEST_POWER_OF_TWO, where(above, HIGHEST_POWER_OF_TWO, p))
-    p_rest = where(below, 0.0, where(above, 0.0, p_rest))
-    value = exp2_of_sum(p, p_rest, p < 0.0)
+    below, above = p < lowest, p > highest
+    p = where(below, lowest, where(above, highest, p))
+    p_rest = where(below | above, 0.0, p_rest) if single else where(below, 0.0, where(above, 0.0, p_rest))
+    value = exp2_of_sum(p, p_rest)
     half = 0.5 * y
     whole, even = equal(floor(y), y), equal(floor(half), half)
     value = where(whole, value, where(x < 0.0, NAN, value))

@@ -9,13 +9,10 @@ import numpy as np
 from ...base.checks import numbers, short
 from ...errors import DTypeError
 from .. import bits
-from ..bits import either_bits, equal, is_symbol, magnitude, sign_of, turn_bits
+from ..bits import PRECISIONS, either_bits, equal, is_symbol, magnitude, sign_of, turn_bits
 from ..bits import where as choose
 from .elementary import as_array, elementary, lifted, one_by_one, shape_of, symbol_of
-from .pieces import halves
-
-INFINITY, NAN = float("inf"), float("nan")
-TWO_52 = 2.0**52
+from .pieces import NAN, halves
 
 
 @elementary
@@ -39,8 +36,8 @@ def trunc(x: Any) -> Any:
 @elementary
 def round(x: Any) -> Any:
     """The whole number nearest to x; the even one if two are equally near."""
-    y = magnitude(x)
-    return either_bits(choose(y < TWO_52, (y + TWO_52) - TWO_52, y), sign_of(x))
+    y, whole = magnitude(x), PRECISIONS.of(x).first_whole
+    return either_bits(choose(y < whole, (y + whole) - whole, y), sign_of(x))
 
 
 @elementary
@@ -82,7 +79,7 @@ def clip(x: Any, low: Any, high: Any) -> Any:
 def mod(x: Any, y: Any) -> Any:
     """The remainder of x after subtraction of whole multiples of y, with the sign of y, as ``x % y`` in Python.
 
-    Exact if it has at most 53 bits and |x/y| is below 2⁵²; NaN from there on.
+    Exact if it has at most 53 bits and |x/y| is below 2⁵², of float32 24 bits and 2²³; NaN from there on.
 
     Example:
         >>> print(mod(-7.0, 3.0))
@@ -93,7 +90,7 @@ def mod(x: Any, y: Any) -> Any:
     (n1, n2), (b1, b2) = halves(n), halves(b)
     r = (((a - n1 * b1) - n1 * b2) - n2 * b1) - n2 * b2
     r = choose(r < 0.0, r + b, r)
-    r = choose(n < TWO_52, r, NAN)
+    r = choose(n < PRECISIONS.of(x).first_whole, r, NAN)
     r = choose(a < b, a, r)  # also of an infinite b
     # Now r is |x| mod |y|. With the sign of x it is one y too far from zero if that is not the sign of y.
     r = turn_bits(r, sign_of(x))
