@@ -65,12 +65,12 @@ def test_a_world_steps_them_in_place() -> None:
     assert np.shares_memory(world.y, y)
 
 
-@pytest.mark.parametrize("numbers", [buffer_pool.LEAST_LENT // 8, 100_000, 600_000])
+@pytest.mark.parametrize("numbers", [buffer_pool.LEAST_POOLED // 8, 100_000, 600_000])
 def test_large_results_begin_at_a_cache_line(numbers: int) -> None:
     """As JAX asks for, which copies others; where NumPy's own memory begins is chance, so it is tried several times."""
     kept = []
     for extra in range(4):
-        buffer_pool._kept.clear()
+        buffer_pool._free.clear()
         run = sw.integrate(sw.Oscillator(np.ones(numbers + extra)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
         kept.append(run)
         assert run.y.ctypes.data % 64 == run.v.ctypes.data % 64 == 0

@@ -21,9 +21,9 @@ STEPS = 200
 
 @pytest.fixture(autouse=True)
 def _nothing_kept() -> Iterator[None]:
-    buffer_pool._kept.clear()
+    buffer_pool._free.clear()
     yield
-    buffer_pool._kept.clear()
+    buffer_pool._free.clear()
 
 
 def systems() -> dict[str, tuple[sw.System, tuple[int, ...]]]:
@@ -124,7 +124,7 @@ def test_the_times_are_those_of_the_clock(every: int) -> None:
 
 
 def many(**options: Any) -> sw.Run:
-    steps = buffer_pool.LEAST_LENT // 8
+    steps = buffer_pool.LEAST_POOLED // 8
     return sw.integrate(sw.Oscillator(), "false_euler", v=0.0, y=1.0, steps=steps, every=1, **({"dt": 0.01} | options))
 
 
@@ -169,23 +169,23 @@ def test_threads_are_lent_memory_of_their_own() -> None:
 
 
 def test_no_more_memory_is_kept_than_promised() -> None:
-    runs = [many() for _ in range(buffer_pool.MOST_KEPT // (2 * buffer_pool.LEAST_LENT))]
-    assert sum(run.y.nbytes for run in runs) > buffer_pool.MOST_KEPT / 3
+    runs = [many() for _ in range(buffer_pool.MOST_FREE // (2 * buffer_pool.LEAST_POOLED))]
+    assert sum(run.y.nbytes for run in runs) > buffer_pool.MOST_FREE / 3
     del runs
     gc.collect()
-    assert 0 < sum(each.nbytes for each in buffer_pool._kept.values()) <= buffer_pool.MOST_KEPT
+    assert 0 < sum(each.nbytes for each in buffer_pool._free.values()) <= buffer_pool.MOST_FREE
     # Memory that is larger than that is given back to the system.
-    gone = buffer_pool.empty((buffer_pool.MOST_KEPT // 8 + 1,))
-    before = list(buffer_pool._kept)
+    gone = buffer_pool.empty((buffer_pool.MOST_FREE // 8 + 1,))
+    before = list(buffer_pool._free)
     ends = weakref.ref(gone)
     del gone
     assert ends() is None
-    assert list(buffer_pool._kept) == before
+    assert list(buffer_pool._free) == before
 
 
 def test_memory_is_not_lent_for_much_less() -> None:
     """What a run takes is counted before; so it is not to hold much more than that."""
-    size = 4 * buffer_pool.LEAST_LENT // 8
+    size = 4 * buffer_pool.LEAST_POOLED // 8
     first = buffer_pool.empty((size,))
     at = place(first)
     del first

@@ -1,13 +1,13 @@
 """All errors and warnings of stepwell, in one hierarchy.
 
-A message says what was given, what was expected, and the argument's name.
+A message has the argument's name, what was expected, and what was given.
 """
 
 from __future__ import annotations
 
 from contextvars import ContextVar
 
-#: The errors of what is being traced, in their order; None while nothing is.
+#: The errors of the function that is being traced, in their order; None while none is.
 REFUSED: ContextVar[list[TraceError] | None] = ContextVar("refused", default=None)
 
 
@@ -28,7 +28,7 @@ class ArgumentError(StepwellError, ValueError):
 
 
 class UnknownNameError(ArgumentError, LookupError):
-    """There is no method, system, scene or option of that name; the message names the nearest one."""
+    """No method, system, scene or option has that name; the message names the nearest one."""
 
 
 class ShapeError(ArgumentError):
@@ -46,12 +46,12 @@ class NotFiniteError(ArgumentError):
 class TraceError(ArgumentError):
     """A user's own equations do something that cannot be traced; the message names the line and what to write instead."""
 
-    #: Whether the cause may be a state of another shape than the function expects.
+    #: Whether the cause may be that the state has another shape than the function expects.
     of_shape = False
 
-    def __init__(self, *said: object) -> None:
-        super().__init__(*said)
-        # A user's `except Exception` may swallow it; what went on to be traced would not be the user's equations.
+    def __init__(self, *args: object) -> None:
+        super().__init__(*args)
+        # A user's `except Exception` may swallow it; what is traced after that are not the user's equations.
         if (refused := REFUSED.get()) is not None:
             refused.append(self)
 
@@ -87,7 +87,7 @@ class DivergenceWarning(UserWarning):
 class ToleranceWarning(UserWarning):
     """Some members stopped before the last output time: out of steps, or their steps became too short to change the time.
 
-    It is also given if an absolute tolerance is so large that the motion is lost in it.
+    A run also warns if an absolute tolerance is so large that the motion is lost in it.
 
     Example:
         >>> with warnings.catch_warnings(record=True) as caught:

@@ -1,4 +1,4 @@
-"""The words of the reference: an array, both blocks, and a system scaled to the step."""
+"""Types of the reference: an array, both blocks, a system scaled to the step, and an input."""
 
 from typing import TYPE_CHECKING, Protocol
 
@@ -36,4 +36,4 @@ class Signal(Protocol):
         """The value at time t."""
 
     def scaled(self, factor: Array) -> "Signal":
-        """The same input, times a factor."""
+        """The input times a factor."""

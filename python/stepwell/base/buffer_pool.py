@@ -1,9 +1,9 @@
-"""Memory of large results: a fresh page costs more than filling it, so released memory is reused.
+"""Memory of large results: a new page costs more than filling it, so released memory is reused.
 
 A run that saves every step writes some megabytes in a few milliseconds. The operating system clears each new page before it is
 written, a small page (4 KiB) at a time unless it can give large ones (2 MiB), and takes all pages back when the arrays are
-gone. So large arrays begin at the boundary of a large page; and when the last array over such memory is gone, the memory is kept
-for the next result, up to ``MOST_KEPT`` bytes in all.
+gone. So large arrays begin at the boundary of a large page; and when the last array over such memory is gone, the pool keeps the
+memory for the next result, up to ``MOST_FREE`` bytes in all.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ import numpy as np
 
 from .arrays import Array, Shape
 
-#: Arrays of fewer bytes are NumPy's own: the allocator keeps memory of such sizes by itself. Of larger ones, such as the results
-#: of 100 000 members, it gives the pages back as soon as some of them are free together.
-LEAST_LENT = 1 << 17
-#: The most bytes that are kept in all while no array uses them.
-MOST_KEPT = 1 << 26
+#: Smaller arrays, in bytes, are NumPy's own: the allocator keeps memory of such sizes. The pages of larger arrays, such as the
+#: results of 100 000 members, it returns to the system as soon as some of them are free together.
+LEAST_POOLED = 1 << 17
+#: The most bytes that the pool keeps in all while no array uses them.
+MOST_FREE = 1 << 26
 #: Sizes of a large page and of a cache line, in numbers. Other programs take arrays without a copy only if they begin at a line.
 _LARGE_PAGE, _CACHE_LINE = (1 << 21) // 8, 64 // 8
 
 #: Memory that no array uses, by identity, the newest last. Memory may be released between any two operations on this.
-_kept: dict[int, Array] = {}
+_free: dict[int, Array] = {}
 
 
-def _keep(memory: Array, kept: dict[int, Array] = _kept, most: int = MOST_KEPT) -> None:
-    """Keep released memory. When the interpreter ends, the last memory is released after the names of this file are gone."""
+def _keep(memory: Array, free: dict[int, Array] = _free, most: int = MOST_FREE) -> None:
+    """Keep released memory. The defaults: as the interpreter ends, the last memory is released after this module's names."""
     if memory.nbytes > most:
         return
-    kept[id(memory)] = memory
-    for oldest in list(kept):
-        if sum([each.nbytes for each in list(kept.values())]) <= most:
+    free[id(memory)] = memory
+    for oldest in list(free):
+        if sum([each.nbytes for each in list(free.values())]) <= most:
             break
-        kept.pop(oldest, None)
+        free.pop(oldest, None)
 
 
 class _Loan:
@@ -53,9 +53,9 @@ class _Loan:
 
 
 def _memory(numbers: int) -> Array:
-    """Memory for a given number of floats: kept memory that is not much larger, or else new memory."""
-    for memory in list(_kept.values()):
-        if numbers <= memory.size <= numbers + numbers // 8 and _kept.pop(id(memory), None) is memory:
+    """Memory for so many floats: free memory of the pool that is not much larger, or else new memory."""
+    for memory in list(_free.values()):
+        if numbers <= memory.size <= numbers + numbers // 8 and _free.pop(id(memory), None) is memory:
             return memory
     boundary = _CACHE_LINE if numbers < 2 * _LARGE_PAGE else _LARGE_PAGE
     room = np.empty(numbers + boundary)
@@ -64,9 +64,9 @@ def _memory(numbers: int) -> Array:
 
 
 def empty(shape: Shape, dtype: Any = np.float64) -> Any:
-    """As ``np.empty``, of a type of four or eight bytes."""
+    """As ``np.empty``, for a type of four or eight bytes."""
     numbers = prod(shape)
-    if 8 * numbers < LEAST_LENT:
+    if 8 * numbers < LEAST_POOLED:
         return np.empty(shape, dtype)
     if dtype is np.float64:
         return np.asarray(_Loan(_memory(numbers), shape))

@@ -1,4 +1,4 @@
-"""Checks of what users give, before any work. Each raises one clear error or returns what it was given, made usable."""
+"""Checks of users' arguments, before any work. Each raises one clear error, or returns the argument in a form to compute with."""
 
 from __future__ import annotations
 
@@ -30,26 +30,26 @@ Word = TypeVar("Word", bound=str)
 #: Step numbers above this are no longer exact as floating-point numbers, so neither would be t = t0 + k·dt.
 LAST_STEP = 2**53
 
-#: NumPy has 32 axes in its older versions; those of a block, of saved states, outputs, nodes and inputs go with those of a batch.
+#: The most batch axes. Older versions of NumPy have 32 axes in all; blocks, saved states, outputs, nodes and inputs need some.
 MOST_AXES = 24
 
-#: Less memory than this, in bytes, is not checked: a check takes as long as filling some hundred kilobytes.
+#: Arrays of fewer bytes are not checked to fit in memory: a check takes as long as filling some hundred kilobytes.
 _FEW_BYTES = 1 << 24
 
-#: Lists of names, functions or pairs are no longer than this; a range or a broadcast array takes no memory until it is made one.
+#: The most elements of a list of names, functions or pairs; a range or a broadcast array takes memory only as a list.
 MOST_OF_A_LIST = 1_000_000
 
-#: So many characters of a path are shown in a message.
+#: The most characters of a path in a message.
 PATH = 1000
 
 
 def known(argument: str, name: object, names: Iterable[Word]) -> Word:
-    """Return ``name`` if it is one of ``names``; otherwise say which is the nearest."""
+    """Return ``name`` if it is one of ``names``; the message of the error has the nearest one."""
     if type(name) is str and type(names) is tuple and name in names:
         return name  # type: ignore[return-value]
     names = tuple(names)
     if isinstance(name, np.ndarray) and name.ndim == 0 and name.dtype.kind == "U":
-        name = name.item()  # a word that was read from a file of arrays
+        name = name.item()  # a string that was read from a file of arrays
     if isinstance(name, str) and name in names:
         return str(name)  # type: ignore[return-value]
     import difflib  # a mistake may take its time; the import of stepwell may not
@@ -60,11 +60,11 @@ def known(argument: str, name: object, names: Iterable[Word]) -> Word:
 
 
 def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool = True, unit: str = "") -> Array:
-    """Return ``value`` as float64 if it is real, and by the options finite and positive."""
+    """Return ``value`` as float64 if it is real, and as the options say finite and positive."""
     if type(value) is float and isfinite(value) and (not positive or value > 0.0):
         return np.array(value)  # the most frequent case: nothing more to check
     if type(value) is np.ndarray and _core.sound(value, finite, positive):
-        return value  # likewise; the checks below say what is wrong with any other
+        return value  # likewise; the checks below find what is wrong with other arrays
     if type(value) is np.ndarray and value.nbytes > _FEW_BYTES and 0 in value.strides:
         _room(argument, value.shape)
         once = numbers(argument, once_of(value), positive=positive, finite=finite, unit=unit)
@@ -82,11 +82,11 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
         raise DTypeError(f"{argument}: expected real numbers{_in(unit)}, got {_kind(value, array)}")
     if array.dtype != np.float64 or not array.dtype.isnative:
         _room(argument, array.shape)
-        with np.errstate(over="ignore"):  # what a float cannot hold is infinite, and refused below
+        with np.errstate(over="ignore"):  # numbers beyond the range become infinite, and are refused below
             array = array.astype(np.float64)
     if not array.flags.aligned:
         array = array.copy()
-    # One check of the whole array; the wrong element is searched only if it fails.
+    # One check of the whole array; only if it fails, the wrong element is searched.
     if finite and not np.isfinite(array).all():
         wrong = ~np.isfinite(array)
         raise NotFiniteError(f"{argument}: expected finite numbers{_in(unit)}, got {array[wrong][0]}{_where(wrong)}")
@@ -96,7 +96,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
 
 
 def as_array(argument: str, value: Any) -> Any:
-    """What a user gives as an array, of whatever dtype; of another library's array NumPy's over the same memory."""
+    """The argument as an array of any dtype; for another library's array, NumPy's array over the same memory."""
     if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
         return shared(argument, value)
     if not isinstance(value, np.ndarray) or 0 in value.strides:
@@ -109,17 +109,17 @@ def as_array(argument: str, value: Any) -> Any:
                 f"{argument}: expected a number or a regular array, got a {type(value).__name__} of itself"
             ) from None
         raise _foreign(argument, value, error) from None
-    except (ValueError, TypeError, BufferError, UserWarning) as error:  # a warning is of masked numbers in a list
+    except (ValueError, TypeError, BufferError, UserWarning) as error:  # masked numbers in a list cause a warning
         raise ShapeError(f"{argument}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
 
 
 def once_of(array: Any) -> Any:
-    """The part of an array that it repeats along its broadcast axes."""
+    """The part of an array that is repeated along its broadcast axes."""
     return array[tuple(slice(None) if stride else slice(0, 1) for stride in array.strides)] if array.size else array
 
 
 def _nested(value: Any) -> Shape:
-    """The shape of lists within lists, by the first of each: what they need is known before it is taken."""
+    """The shape of nested lists, by the first element of each, so that their memory is known before it is used."""
     shape: Shape = ()
     while len(shape) < MOST_AXES and isinstance(value, (list, tuple, range)) and len(value):
         shape, value = (*shape, len(value)), value[0]
@@ -140,22 +140,22 @@ def _room(argument: str, shape: Shape) -> None:
 
 
 def _widened(value: Any) -> Array:
-    """An array of float32 as one of float64; in memory that was in use, since new pages take longer than filling them."""
+    """An array of float32 as float64, in pooled memory, since new pages take longer than filling them."""
     wide: Array = buffer_pool.empty(value.shape)
     wide[...] = value
     return wide
 
 
 def shared(argument: str, value: Any) -> Any:
-    """An array of another library, such as PyTorch or JAX, as NumPy's, over the same memory."""
+    """NumPy's array over the memory of an array of another library, such as PyTorch or JAX."""
     try:
         return np.from_dlpack(value)
-    except Exception as error:  # of what kind it is differs from library to library
+    except Exception as error:  # each library raises another kind
         raise _foreign(argument, value, error) from None
 
 
 def _foreign(argument: str, value: Any, error: Exception) -> DTypeError:
-    """The error of an array of another library that NumPy cannot take, or of a list of them."""
+    """The error for an array of another library that NumPy cannot take, or for a list of them."""
     why = str(error).strip().splitlines() or [type(error).__name__]
     kind = type(value).__name__ if type(value).__module__ == "builtins" else f"{type(value).__module__}.{type(value).__name__}"
     return DTypeError(
@@ -166,7 +166,7 @@ def _foreign(argument: str, value: Any, error: Exception) -> DTypeError:
 
 
 def _masked(value: Any) -> int:
-    """How many numbers of a masked array are masked; there is none before ``numpy.ma`` is imported, which takes its time."""
+    """How many numbers of an array are masked. ``numpy.ma`` is slow to import, and before its import no array is masked."""
     ma = sys.modules.get("numpy.ma")
     return int(ma.getmaskarray(value).sum()) if ma is not None and isinstance(value, ma.MaskedArray) else 0
 
@@ -180,7 +180,7 @@ def not_negative(argument: str, value: Any, what: str = "numbers") -> Array:
 
 
 def _exact(argument: str, array: Any) -> Any:
-    """An array of Python objects as floats if all are real numbers, such as an int of more than 64 bits; else as it is."""
+    """An array of Python objects as floats if all are real numbers, such as ints of more than 64 bits; else the array itself."""
     if not all(isinstance(each, Real) and not isinstance(each, bool) for each in array.flat):
         return array
     try:
@@ -202,7 +202,7 @@ def number(argument: str, value: Any, *, positive: bool = False, unit: str = "")
 
 
 def beginning(value: Any) -> Any:
-    """Return ``t0`` as one float, or as an array of its own of the times of a batch; zeros of them are +0, as 0 + k·dt is."""
+    """Return ``t0`` as one float, or as a new array of the times of a batch; −0 becomes +0, as 0 + k·dt is."""
     if type(value) is float and isfinite(value):
         return value + 0.0
     times: Any = numbers("t0", value, unit="units of time") + 0.0
@@ -210,7 +210,7 @@ def beginning(value: Any) -> Any:
 
 
 def step(value: Any) -> float:
-    """Return ``dt`` as one float other than zero; below zero time runs back."""
+    """Return ``dt`` as one float other than zero; with ``dt`` below zero time runs back."""
     if type(value) is float and isfinite(value) and value != 0.0:
         return value
     dt = number("dt", value, unit="units of time")
@@ -236,17 +236,17 @@ def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
     return n
 
 
-#: In which direction a quantity passes a level: as numbers, which SciPy takes too, and as words.
+#: The direction in which a quantity passes a level, as a word and as SciPy's number.
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
 
 def direction(argument: str, value: Any) -> int:
-    """Return a direction as 1, −1 or 0; it may be given as a word."""
+    """Return a direction, which may be a word, as 1, −1 or 0."""
     return DIRECTIONS[known(argument, value, DIRECTIONS)] if isinstance(value, str) else count(argument, value, -1, 1)
 
 
 def several(argument: str, value: Any, what: str) -> list[Any]:
-    """Return a list of what is given several of; a text is not the list of its letters."""
+    """Return the elements of an iterable as a list; a string is not a list of its letters."""
     if isinstance(value, (str, bytes)) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
         raise DTypeError(f"{argument}: expected a list of {what}, got {short(value)} ({type(value).__name__})")
     try:
@@ -267,19 +267,19 @@ def callback(argument: str, value: Any) -> Any:
 
 
 def argument_order(argument: str, function: Any, places: Sequence[str], signature: Signature | None = None) -> None:
-    """Raise if a function of time and state has the name of one of them at the place of another: it would get other numbers.
+    """Raise if a function of time and state has them in another order, as its argument names show: it would get other numbers.
 
     Args:
-        argument: what the function was given as.
-        function: what is called with the time and blocks of the state by position; nothing is known of one without a signature.
-        signature: that of the function, if it is known.
-        places: what stands at each place, such as ``("t", "v", "y")``. A state without velocities may be called v.
+        argument: the argument of the caller that is the function.
+        function: a function that is called with the time and blocks of the state by position; one without a signature passes.
+        places: the name of each position, such as ``("t", "v", "y")``. A state without velocities may be called v.
+        signature: the signature of the function, if it is known.
     """
-    import inspect  # which is slow to import, and only functions need it
+    import inspect  # slow to import, and only functions need it
 
     try:
         signature = signature or inspect.signature(function)
-    except (TypeError, ValueError):  # what is not written in Python may not tell
+    except (TypeError, ValueError):  # a function that is not written in Python may have no signature
         return
     by_place = [each for each in signature.parameters.values() if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
     names = [each.name for each in by_place[: len(places)]]
@@ -297,7 +297,7 @@ def flag(argument: str, value: Any) -> bool:
     if value is False or value is True:
         return value
     if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind == "b":
-        value = value.item()  # as read from a file of arrays
+        value = value.item()  # it was read from a file of arrays
     if not isinstance(value, (bool, np.bool_)):
         raise DTypeError(f"{argument}: expected True or False, got {short(value)} ({type(value).__name__})")
     return bool(value)
@@ -314,12 +314,12 @@ def block(argument: str, value: Any, shape: Shape, axes: str, *, finite: bool = 
 
 
 def shape_of(argument: str, value: Any) -> Shape:
-    """The shape of what is given for numbers."""
+    """The shape of an argument that is checked as numbers."""
     return value.shape if isinstance(value, np.ndarray) else numbers(argument, value, finite=False).shape
 
 
 def over(array: Array, shape: Shape) -> Array:
-    """One number over a whole shape, as ``np.broadcast_to`` gives it, which takes ten times as long."""
+    """One number over a whole shape, as ``np.broadcast_to`` returns it, which takes ten times as long."""
     if not shape:
         return array
     wide = np.ndarray(shape, np.float64, np.ascontiguousarray(array), strides=(0,) * len(shape))
@@ -328,7 +328,7 @@ def over(array: Array, shape: Shape) -> Array:
 
 
 def concatenated(parts: Sequence[Array]) -> Array:
-    """Arrays of shape (rows, *batch), whose axes of a batch broadcast, one after the other."""
+    """Arrays of shape (rows, *batch), joined along the rows; the batch axes broadcast."""
     axes = max(part.ndim for part in parts)
     aligned = [part.reshape(len(part), *(axes - part.ndim) * (1,), *part.shape[1:]) for part in parts]
     batch = np.broadcast_shapes(*(part.shape[1:] for part in aligned))
@@ -336,7 +336,7 @@ def concatenated(parts: Sequence[Array]) -> Array:
 
 
 def batch_shape(shapes: dict[str, Shape]) -> Shape:
-    """Return the shape to which all batches broadcast, the arguments by name."""
+    """Return the shape to which the batch shapes of the named arguments broadcast."""
     one: Shape = ()
     for shape in shapes.values():
         if shape and shape != one:
@@ -352,8 +352,8 @@ def batch_shape(shapes: dict[str, Shape]) -> Shape:
     try:
         shape = np.broadcast_shapes(*different)
     except ValueError:
-        given = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
-        raise ShapeError(f"these batch shapes do not broadcast to one: {given}") from None
+        shapes_by_name = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
+        raise ShapeError(f"these batch shapes do not broadcast to one: {shapes_by_name}") from None
     if 0 in shape:
         empty = ", ".join(name for name, shape in shapes.items() if 0 in shape)
         raise ShapeError(f"{empty}: expected at least one member, got an empty batch of shape {shape}")
@@ -361,7 +361,7 @@ def batch_shape(shapes: dict[str, Shape]) -> Shape:
 
 
 def diverged_before(steps: Whole, v: Array, y: Array, batch: Shape) -> Whole:
-    """The step at which each member diverged, −1 for none; only members that did may hold what is not finite."""
+    """The step at which each member diverged, −1 for none; only states of members that did may be infinite or NaN."""
     steps = np.array(np.broadcast_to(steps, batch), dtype=np.int64)
     for argument, array in (("v", v), ("y", y)):
         if (wrong := ~np.isfinite(array) & (steps < 0)).any():
@@ -384,7 +384,7 @@ def is_single(dtype: Any) -> bool:
         return True
     try:
         name = np.dtype(dtype).name if dtype is not None else ""
-    except (TypeError, ValueError):  # the latter of whole numbers that are too long to print
+    except (TypeError, ValueError):  # whole numbers that are too long to print raise the latter
         name = ""
     if name not in ("float64", "float32"):
         raise DTypeError(f"dtype: expected 'float64' or 'float32', got {short(dtype)}")
@@ -408,7 +408,7 @@ LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
 
 def fits(what: str, rows: float, batch: Shape, remedy: str, *, beside: float = 0.0) -> None:
-    """Raise if ``rows`` numbers for each member of a batch, and so many bytes beside, do not fit in what memory is available."""
+    """Raise if ``rows`` numbers for each member of a batch, and ``beside`` bytes more, do not fit in the available memory."""
     members = prod(batch)
     needed = 8.0 * rows * members + beside
     if needed <= _FEW_BYTES:
@@ -424,7 +424,7 @@ def _bytes(n: float) -> str:
 
 
 def available_memory() -> tuple[float, str]:
-    """How many bytes this process may still take, and what bounds them: the machine, its control groups or its address space."""
+    """How many bytes this process may still use, and what limits it: the machine, its control groups or its address space."""
     return min(_bounds(), default=(2.0**63, "nothing is known of this system's memory"))
 
 
@@ -458,7 +458,7 @@ def _bounds() -> Iterator[tuple[float, str]]:
 
 
 def _control_groups() -> Iterator[tuple[str, tuple[str, str]]]:
-    """The folders of the control groups of this process and of those around them, and the names of limit and usage there."""
+    """The folders of this process's control groups and of their parents, with the names of the files of limit and usage."""
     try:
         lines = _read("/proc/self/cgroup").splitlines()
     except OSError:
@@ -498,9 +498,9 @@ def in_place(
     written: bool = True,
     dtype: Any = np.float64,
 ) -> Array:
-    """Return ``array`` if it can be stepped in place, or read in place if it is not written; it is never copied.
+    """Return ``array`` if it can be stepped in place, or only read in place if not ``written``; it is never copied.
 
-    Of another library's array in the memory of the CPU it is NumPy's array over that memory.
+    For another library's array in the memory of the CPU, return NumPy's array over that memory.
     """
     if hasattr(array, "__dlpack__") and not isinstance(array, np.ndarray):
         array = shared(argument, array)
@@ -522,7 +522,7 @@ def in_place(
 
 
 def file(argument: str, path: Any, endings: tuple[str, ...] = ()) -> Path:
-    """Return the path of a file if it has one of the endings and can be written; that is tried, and nothing is left of it."""
+    """Return the path of a file if it has one of the endings and can be written; a trial leaves no file behind."""
     if not isinstance(path, (str, os.PathLike)):
         raise DTypeError(f"{argument}: expected the path of a file, got {short(path)} ({type(path).__name__})")
     from pathlib import Path  # the import of stepwell does without
@@ -540,7 +540,7 @@ def file(argument: str, path: Any, endings: tuple[str, ...] = ()) -> Path:
         if place.is_file():
             with place.open("ab"):
                 pass
-        elif not place.exists() and not place.is_symlink():  # a pipe, or /dev/null, is not to be opened twice
+        elif not place.exists() and not place.is_symlink():  # a pipe, or /dev/null, must not be opened twice
             with place.open("xb"):
                 pass
             place.unlink()
@@ -550,7 +550,7 @@ def file(argument: str, path: Any, endings: tuple[str, ...] = ()) -> Path:
 
 
 def folder(argument: str, path: Any, names: Iterable[str] = ()) -> Path:
-    """Return the path of a folder if files can be written there, those of these names too; it need not be there yet."""
+    """Return the path of a folder, which need not exist yet, if files can be written there, also those of these names."""
     if not isinstance(path, (str, os.PathLike)):
         raise DTypeError(f"{argument}: expected the path of a folder, got {short(path)} ({type(path).__name__})")
     from pathlib import Path  # the import of stepwell does without
@@ -583,10 +583,10 @@ def _in(unit: str) -> str:
 
 
 def short(value: object, most: int = 80) -> str:
-    """A value in a message: its repr, cut where it is long."""
+    """The repr of a value for a message, cut where it is long."""
     try:
         text = " ".join(repr(value).split())
-    except ValueError:  # Python spells no whole number of thousands of digits
+    except ValueError:  # Python prints no whole number of thousands of digits
         return f"{type(value).__name__} too long to print"
     return text if len(text) <= most else f"{text[: most - 3]}…"
 

@@ -1,4 +1,4 @@
-"""Files that are written: what was there stays until the new one is whole."""
+"""Writing files: the old file stays until the new one is complete."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from uuid import uuid4
 
 @contextmanager
 def replaced(place: Path) -> Iterator[TextIO]:
-    """A text file that takes its place when all is written; if that fails, as on a full disk, the old one is as it was.
+    """A text file that replaces the old one when it is complete; if writing fails, as on a full disk, the old one stays.
 
-    The lines end as they are written. A pipe, a terminal or /dev/null is written to directly, and so is a file in a folder that
-    takes no other.
+    Ends of lines are written unchanged. A pipe, a terminal, /dev/null, and a file in a folder that is not writable are written
+    directly.
     """
     target = place.resolve() if place.is_symlink() else place
     if place.exists() and not (place.is_file() and os.access(target.parent, os.W_OK)):
@@ -36,6 +36,6 @@ def replaced(place: Path) -> Iterator[TextIO]:
 
 
 def write_text(place: Path, text: str) -> None:
-    """Write a text file, which takes its place when it is whole."""
+    """Write a text file, which replaces the old one when it is complete."""
     with replaced(place) as file:
         file.write(text)

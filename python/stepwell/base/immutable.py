@@ -1,4 +1,4 @@
-"""Objects that are what they hold: equality by value, although ``==`` of arrays is an array; and no change once they are made."""
+"""Objects that are compared by value, although ``==`` of arrays is an array, and objects that cannot be changed."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from .reprs import one_line
 Kind = TypeVar("Kind")
 Object = TypeVar("Object")
 
-#: Among the attributes of an object that cannot be changed any more.
+#: The attribute that an object has once it is made and cannot be changed any more.
 DONE = "_done"
 
-#: Of more bytes than this it is made sure that a copy fits in memory.
+#: Before an array of more bytes than this is copied, it is checked that the copy fits in memory.
 LARGE = 1 << 24
 
 
 class ValueEquality:
-    """Equal to another of its class if all that it holds is equal, arrays number by number; NaN equals NaN.
+    """Equal to another object of its class if all attributes are equal, arrays number by number; NaN equals NaN.
 
-    What has no repr of its own is shown in one line; that of a dataclass would print all of its arrays.
+    A class without a repr of its own has one of one line; that of a dataclass would print all of its arrays.
     """
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -34,8 +34,8 @@ class ValueEquality:
         if cls.__repr__ is object.__repr__:
             cls.__repr__ = one_line  # type: ignore[method-assign]
 
-    def _held(self) -> dict[str, Any]:
-        """What counts, by name: the fields of a dataclass (and not what it has cached), or else all attributes."""
+    def _contents(self) -> dict[str, Any]:
+        """What is compared, by name: the fields of a dataclass, without values that it cached, or else all attributes."""
         if dataclasses.is_dataclass(self):
             return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.compare}
         return {name: value for name, value in vars(self).items() if name != DONE}
@@ -43,15 +43,15 @@ class ValueEquality:
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        return same(self._held(), other._held())
+        return same(self._contents(), other._contents())
 
     def __hash__(self) -> int:
-        # Arrays cannot be hashed; words and whole numbers distinguish many objects.
-        return hash((type(self), *(each for each in self._held().values() if isinstance(each, (str, int)))))
+        # Arrays cannot be hashed; strings and whole numbers distinguish most objects.
+        return hash((type(self), *(each for each in self._contents().values() if isinstance(each, (str, int)))))
 
 
 def by_value(kind: type[Kind]) -> type[Kind]:
-    """A named tuple likewise: without this ``==``, and ``!=`` apart from it, would ask arrays for their truth."""
+    """Give a named tuple equality by value; its own ``==`` and ``!=`` would take the truth value of arrays."""
 
     def equal(self: Any, other: Any) -> bool:
         return bool(type(other) is kind) and same(tuple(self), tuple(other))
@@ -71,7 +71,7 @@ def by_value(kind: type[Kind]) -> type[Kind]:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Whether two things hold the same: arrays by shape, kind and numbers, the parts of containers one by one."""
+    """Whether two values are equal: arrays by shape, dtype and numbers, containers element by element."""
     if a is b:
         return True
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
@@ -88,7 +88,7 @@ def same(a: Any, b: Any) -> bool:
 
 
 def takes(kind: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
-    """Raise if a class cannot be called with these arguments; the message says which it takes."""
+    """Raise if a class cannot be called with these arguments; the message shows its signature."""
     import inspect
 
     signature = inspect.signature(kind)
@@ -102,25 +102,25 @@ def takes(kind: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
 class ImmutableMeta(ABCMeta):
     """Makes objects that cannot be changed once ``__init__`` is over."""
 
-    if not TYPE_CHECKING:  # which takes the arguments from ``__init__``
+    if not TYPE_CHECKING:  # a type checker takes the arguments from ``__init__``
 
         def __call__(cls, *args: Any, **kwargs: Any) -> Any:
-            """A new object; its arrays are its own from now on, and read-only."""
+            """A new object, whose arrays are read-only and its own."""
             try:
-                made = super().__call__(*args, **kwargs)
+                instance = super().__call__(*args, **kwargs)
             except TypeError:
                 takes(cls, args, kwargs)
                 raise
-            read_only(vars(made))
-            vars(made)[DONE] = True
-            return made
+            read_only(vars(instance))
+            vars(instance)[DONE] = True
+            return instance
 
-        # That of ``ABCMeta`` takes four times as long, for classes that are registered, of which there are none.
+        # ``ABCMeta``'s takes four times as long, because it looks for registered classes; there are none.
         __instancecheck__ = type.__instancecheck__
 
     @property
     def __signature__(cls) -> Any:
-        """That of ``__init__``, for ``help`` and ``inspect``."""
+        """The signature of ``__init__``, for ``help`` and ``inspect``."""
         import inspect  # slow to import
 
         init: Any = cls.__init__  # type: ignore[misc]
@@ -131,15 +131,15 @@ class ImmutableMeta(ABCMeta):
 
 
 class Immutable(metaclass=ImmutableMeta):
-    """An object that cannot be changed, since what was made of it would not see the change.
+    """An object that cannot be changed, since objects made from it would not see the change.
 
-    Attributes cannot be assigned, except those that begin with ``_``. Its arrays are read-only, and copies of what it was given:
-    the caller may go on to write into theirs. ``changed`` makes another object.
+    Attributes cannot be assigned, except those that begin with ``_``. Its arrays are read-only copies of the arguments, so the
+    caller may write into the originals. ``changed`` makes another object.
     """
 
     def __setattr__(self, name: str, value: object) -> None:
         attributes = self.__dict__
-        if DONE in attributes:  # not while it is made, which is when most attributes are set
+        if DONE in attributes:  # most attributes are set before, in ``__init__``
             self._refuse(name, "assigned")
         attributes[name] = value  # ``object.__setattr__`` does the same here and takes longer than all else
 
@@ -154,7 +154,7 @@ class Immutable(metaclass=ImmutableMeta):
 
     @property
     def _instead(self) -> str:
-        """What to do in place of a change."""
+        """What to do instead of a change."""
         return f"make another {type(self).__name__}, with what is to change"
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -164,7 +164,7 @@ class Immutable(metaclass=ImmutableMeta):
         read_only(vars(self))
 
 
-#: How the state of an object is taken that does not say it itself; there is none before Python 3.11.
+#: The ``__getstate__`` of classes that define none of their own; it does not exist before Python 3.11.
 _STATE = getattr(object, "__getstate__", None)
 
 
@@ -178,25 +178,25 @@ def changed(one: Object, **changes: Any) -> Object:
     else:
         other = copy.copy(one)
     complete(other, **changes)
-    made: Object = other
-    return made
+    result: Object = other
+    return result
 
 
-def complete(one: Any, **found: Any) -> None:
-    """Give attributes to an object that cannot be changed and that was just made."""
-    read_only(found)
-    vars(one).update(found)
+def complete(one: Any, **attributes: Any) -> None:
+    """Set attributes of an object that was just made and cannot be changed otherwise."""
+    read_only(attributes)
+    vars(one).update(attributes)
 
 
 def aligned(attributes: dict[str, Any]) -> None:
-    """Copy arrays that begin at an odd place in memory, as those of a message from another process may (pickle protocol 5)."""
+    """Copy arrays that are not aligned in memory, as those of a message from another process may be (pickle protocol 5)."""
     for name, value in attributes.items():
         if isinstance(value, np.ndarray) and not value.flags.aligned:
             attributes[name] = value.copy()
 
 
 def read_only(attributes: dict[str, Any]) -> None:
-    """Replace arrays by read-only ones that no other code can write to, and dictionaries of them by fixed ones."""
+    """Replace arrays by ones that no other code can write to, and dictionaries by ones that cannot be changed."""
     for name, value in attributes.items():
         if isinstance(value, np.ndarray):
             attributes[name] = frozen(name, value)
@@ -207,7 +207,7 @@ def read_only(attributes: dict[str, Any]) -> None:
 def frozen(name: str, array: Any) -> Any:
     """An array that no other code can write to: itself if it is read-only and owns its numbers, or else a read-only copy.
 
-    A view that is read-only does not suffice: what it views may still be written to.
+    A read-only view does not suffice, because its base may still be written to.
     """
     owner = array
     while isinstance(owner.base, np.ndarray):
@@ -222,14 +222,14 @@ def frozen(name: str, array: Any) -> Any:
         copied = array.copy()
         copied.flags.writeable = False
         return copied
-    # What was broadcast stays one number for many.
+    # A broadcast array is copied once, and broadcast again.
     once = array[tuple(slice(None) if stride else slice(1) for stride in array.strides)].copy()
     once.flags.writeable = False
     return np.broadcast_to(once, array.shape)
 
 
 class FixedDict(dict[str, Any]):
-    """A dictionary that cannot be changed, of which arrays are read-only."""
+    """A dictionary that cannot be changed, and whose arrays are read-only."""
 
     def __init__(self, items: dict[str, Any]) -> None:
         items = dict(items)

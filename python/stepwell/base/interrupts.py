@@ -1,4 +1,4 @@
-"""Threads: how many there may be, and long computations by NumPy, during which Ctrl-C is heard."""
+"""The number of cores, and long computations by NumPy that Ctrl-C interrupts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Result = TypeVar("Result")
 #: A computation of fewer operations takes some hundredths of a second, which is not worth another thread.
 FEW_OPERATIONS = 1e7
 
-#: How often it is asked whether the computation has ended, in seconds.
+#: The interval between checks whether the computation has ended, in seconds.
 POLL = 0.02
 
 
@@ -23,14 +23,14 @@ _unfinished: list[threading.Event] = []
 
 
 def _wait_for(end: threading.Event) -> None:
-    """Until it is set; Ctrl-C is heard.
+    """Wait until the event is set, or raise on Ctrl-C.
 
     No thread is joined here: before Python 3.13 a join that Ctrl-C interrupts takes the thread for dead (CPython gh-90882). The
     process then ends while a function of LAPACK runs, with a segmentation fault.
     """
     while not end.wait(POLL):
         pass
-    with suppress(ValueError):  # another thread may have waited too
+    with suppress(ValueError):  # another thread waited for it, too
         _unfinished.remove(end)
 
 
@@ -42,11 +42,11 @@ def available() -> int:
 
 
 def heard(operations: float, function: Callable[..., Result], *arguments: Any) -> Result:
-    """The result of a function of NumPy that makes about so many operations without looking for signals.
+    """The result of a function of NumPy that makes about so many operations and does not check for signals.
 
-    A long one is computed by another thread, while this one waits. After Ctrl-C that thread goes on until the function ends:
-    nothing can stop it. The next computation, and the end of the process, wait for that: two at once would wait for each other's
-    cores, a hundred times as long.
+    Another thread computes a long one, while this one waits and hears Ctrl-C. The other thread then goes on until the function
+    ends, since nothing can stop it. The next computation and the end of the process wait for that: two at once would compete for
+    the cores and take a hundred times as long.
     """
     for before in tuple(_unfinished):
         _wait_for(before)

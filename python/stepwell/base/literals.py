@@ -1,43 +1,43 @@
-"""The words that arguments take, as types: an editor completes them, and a type checker finds what is written wrongly."""
+"""The strings that arguments take, as types: an editor completes them, and a type checker finds misspelled ones."""
 
 from __future__ import annotations
 
 from typing import Literal
 
-#: How a run makes its steps.
+#: How a run is computed: step by step, by the transition matrix, or by powers of it.
 RunForm = Literal["direct", "matrix", "power"]
 
-#: How a step is explained.
+#: The form of a step that is explained.
 StepForm = Literal["direct", "matrix"]
 
 #: What computes a run.
 Backend = Literal["rust", "numpy"]
 
-#: What is between samples of an input.
+#: The values of an input between its samples.
 Interpolation = Literal["hold", "linear", "cubic"]
 
 #: What the velocity of an oscillator is.
 OscillatorForm = Literal["canonical", "physical"]
 
-#: How an aircraft's attitude is written.
+#: The coordinates of an aircraft's attitude.
 AttitudeForm = Literal["euler", "quaternion"]
 
 #: The force between two bodies.
 BodyForce = Literal["logarithmic", "newton", "printed"]
 
-#: What a surface does to a point behind it.
+#: How a surface acts on a point behind it.
 ContactWay = Literal["safe", "restitution", "flip", "spring"]
 
-#: In which direction a quantity passes a level.
+#: The direction in which a quantity passes a level.
 Direction = Literal["rising", "falling", "both"]
 
-#: How a control divides by what it keeps.
+#: Whether the push of a control is limited, or as the document prints it.
 ControlForm = Literal["limited", "printed"]
 
 #: What advice ranks by.
 Cost = Literal["time", "evaluations"]
 
-#: In which numbers methods are compared.
+#: The dtypes in which methods are compared.
 Dtypes = Literal["float64", "float32", "both"]
 
 #: Languages of exported steps.

@@ -1,4 +1,4 @@
-"""Packages that are needed for one thing only: imported when it is used, and named in the error where they are missing."""
+"""Optional packages: imported on first use; the error names the package where it is missing."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Any
 
 from ..errors import UnsupportedError
 
-#: Packages, and the extra that has them.
+#: Packages, and the extra that installs them.
 EXTRAS = {"xarray": "tables", "pandas": "tables", "zarr": "zarr", "gymnasium": "gym"}
 
 
 def imported(package: str, what: str) -> Any:
-    """A package that ``what`` needs.
+    """The module of a package that ``what`` needs.
 
     Raises:
-        UnsupportedError: if it is not installed, with the command that installs it.
+        UnsupportedError: if the package is not installed; the message has the command that installs it.
     """
     try:
         return importlib.import_module(package)

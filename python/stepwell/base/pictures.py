@@ -1,4 +1,4 @@
-"""Figures of matplotlib, and how they are written to files."""
+"""Figures of matplotlib, and writing them to files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of that size in inches, on its own: pyplot's global state is not touched.
+    """An empty figure of that size in inches, which leaves pyplot's global state as it is.
 
     Raises:
         UnsupportedError: if matplotlib is missing.
@@ -35,7 +35,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def png(figure: Figure, dpi: float | None = None) -> bytes:
-    """A figure as the bytes of a .png file in RGB: printers make what they like of a picture with transparency."""
+    """A figure as the bytes of a .png file in RGB, because printers differ in what they make of transparency."""
     from PIL import Image
 
     drawn, written = BytesIO(), BytesIO()
@@ -46,7 +46,7 @@ def png(figure: Figure, dpi: float | None = None) -> bytes:
 
 
 def drawn(path: str | Path | None, draw: Callable[[], Figure]) -> Figure:
-    """Draw a figure, and write it if there is a path; its ending says in which format.
+    """Draw a figure, and write it if there is a path, whose suffix is the format.
 
     Raises:
         ArgumentError: before anything is drawn, if there is no such format or the file cannot be written.
@@ -68,7 +68,7 @@ def drawn(path: str | Path | None, draw: Callable[[], Figure]) -> Figure:
 class Drawn:
     """A chart with one picture."""
 
-    #: The task that draws it.
+    #: The registered task that draws it.
     _painter: ClassVar[str]
 
     def draw(self) -> Figure:
@@ -77,7 +77,7 @@ class Drawn:
         return figure
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw it, and write it to ``path`` if given; the ending says in which format.
+        """Draw the picture, and write it to ``path`` if given; the suffix is the format.
 
         Raises:
             ArgumentError: if there is no such format.

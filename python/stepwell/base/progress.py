@@ -1,6 +1,6 @@
-"""The progress of a long run: a bar of rich in a terminal, or one line of text without rich; an element of a page in a notebook.
+"""The progress of a long run: in a terminal a bar of rich, or a line of text without rich; in a notebook an element of the page.
 
-In a pipe nothing is shown.
+A pipe shows nothing.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from contextlib import contextmanager
 from html import escape
 from typing import Any
 
-#: A notebook and a line of text are written anew at most so often, in seconds.
+#: The least time between two updates of a notebook or of a line of text, in seconds.
 MIN_SECONDS_BETWEEN = 0.1
 
-#: The length of a bar of text.
+#: The length of a bar of text, in characters.
 BAR_LENGTH = 30
 
 
 @contextmanager
 def bar(title: str) -> Iterator[Callable[[float], object]]:
-    """Show a bar; yields the function that takes the share that is done, from 0 to 1."""
+    """Show a bar; yields the function that takes the share of the work that is done, from 0 to 1."""
     if in_notebook():
         yield from _in_a_page(title)
         return
@@ -40,7 +40,7 @@ def bar(title: str) -> Iterator[Callable[[float], object]]:
 
 
 def in_notebook() -> bool:
-    """Whether this is the kernel of a notebook; IPython in a terminal is none."""
+    """Whether this process is the kernel of a notebook; IPython in a terminal is not."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return hasattr(shell, "kernel")
 
@@ -75,13 +75,13 @@ def _in_a_line(title: str) -> Iterator[Callable[[float], object]]:
 
 
 def _at_intervals(show: Callable[[float], object]) -> Callable[[float], object]:
-    """Show only what comes later than the last by a tenth of a second."""
+    """A function that passes a share on to ``show`` if the last one was passed on long enough ago."""
     last = time.monotonic()
 
-    def told(share: float) -> None:
+    def show_if_due(share: float) -> None:
         nonlocal last
         if (now := time.monotonic()) - last >= MIN_SECONDS_BETWEEN:
             last = now
             show(min(1.0, max(0.0, share)))
 
-    return told
+    return show_if_due

@@ -1,4 +1,4 @@
-"""What objects say of themselves: one line in a terminal, a small table in a notebook."""
+"""How objects are shown: as one line in a terminal, as a small table in a notebook."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import Any
 
 import numpy as np
 
-#: The most characters of such a line, of a word in it and of the parts of a sequence that are named.
+#: The most characters of such a line and of a word in it, and the most elements of a sequence that are shown.
 MAX_LINE, MAX_WORD, MAX_PARTS = 200, 40, 4
 
-#: A number of more characters is shown with six digits.
+#: A longer number is shown with six digits.
 MAX_FLOAT = 8
 
-#: Arrays of at most so many numbers are shown with them.
+#: Longer arrays are shown by their shape.
 MAX_NUMBERS = 4
 
-#: A table in a notebook has at most so many rows.
+#: The most rows of a table in a notebook.
 MAX_ROWS = 30
 
 
 def one_line(thing: Any) -> str:
-    """The class and the fields of a result, each in a few characters."""
+    """The class of an object and its fields, each in a few characters."""
     if hasattr(thing, "__dataclass_fields__"):
         names = [name for name, field in thing.__dataclass_fields__.items() if field.repr and not name.startswith("_")]
     elif hasattr(thing, "_fields"):
@@ -33,7 +33,7 @@ def one_line(thing: Any) -> str:
 
 
 def brief(value: Any) -> str:
-    """A value in a few characters: a method by its name, an array by its shape, many things by their number."""
+    """A value in a few characters: a method by its name, an array by its shape, a long container by its length."""
     if isinstance(value, np.ndarray):
         return (
             str(value.tolist())
@@ -63,7 +63,7 @@ def brief(value: Any) -> str:
 
 
 def shortened(text: str, most: int) -> str:
-    """A text on one line, without its end if it is too long."""
+    """A text on one line, cut if it is too long."""
     text = " ".join(text.split())
     if len(text) <= most:
         return text
@@ -71,14 +71,14 @@ def shortened(text: str, most: int) -> str:
 
 
 def facts(title: str, pairs: Iterable[tuple[str, Any]], note: str = "") -> str:
-    """A title and a table of names and values for a notebook; what is None or empty is left out."""
+    """A title and a table of names and values for a notebook; values that are None or empty are left out."""
     rows = [(name, str(value)) for name, value in pairs if value is not None and value != ""]
     return table(title, (), rows, [note] if note else [])
 
 
 def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], notes: Iterable[str] = ()) -> str:
     """A table for a notebook; columns whose name ends in ``>`` are flush right."""
-    from html import escape  # in a notebook only; the import of stepwell may not take the time
+    from html import escape  # needed in notebooks only
 
     side = ["right" if name.endswith(">") else "left" for name in head]
 
@@ -98,22 +98,22 @@ def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], notes:
 
 
 def counted(number: int, what: str) -> str:
-    """A number and what is counted: "1 step", "2 steps"."""
+    """A number and its noun: "1 step", "2 steps"."""
     return f"{number} {what}{'s' * (number != 1)}"
 
 
 def in_words(index: tuple[int, ...]) -> str:
-    """A member by its place in the batch; without a batch it is the run."""
+    """A member by its index in the batch; without a batch "the run"."""
     return f"member {index if len(index) != 1 else index[0]}" if index else "the run"
 
 
 def of_member(index: tuple[int, ...]) -> str:
-    """Of which member, with a space before it; nothing where there is no batch."""
+    """The phrase " of member 3", with the space before it; empty without a batch."""
     return f" of {in_words(index)}" if index else ""
 
 
 def share(some: int, shape: tuple[int, ...], size: int) -> str:
-    """How many members of a batch of that shape: "2 of 3 members", "the only member"; without a batch "the run"."""
+    """The phrase for some members of a batch: "2 of 3 members", "the only member"; without a batch "the run"."""
     if not shape:
         return "the run"
     return "the only member" if size == 1 else f"{some} of {counted(size, 'member')}"

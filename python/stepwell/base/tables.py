@@ -26,7 +26,7 @@ class Table(ABC):
         """The columns by name, of equal length."""
 
     def _head(self) -> dict[str, Any]:
-        """What stands in JSON before the summary and the rows."""
+        """The entries of the JSON before the summary and the rows."""
         return {}
 
     @abstractmethod
@@ -47,14 +47,14 @@ class Table(ABC):
         write_csv(self._columns(), path)
 
     def to_json(self, path: str | Path) -> None:
-        """Write ``as_dict()``; what is not finite is null."""
+        """Write ``as_dict()``; infinities and NaN become null."""
         write_json(self.as_dict(), path)
 
 
 def stacked(parts: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """The columns of parts that have the same names, one part below the other.
+    """The columns of parts with equal names, one part below the other.
 
-    An array is a column, whose length the part's arrays share; any other value stands in each of the part's rows.
+    The arrays of a part are columns of one length; any other value is repeated in each of the part's rows.
     """
     columns: dict[str, list[Any]] = {}
     for part in parts:
@@ -65,7 +65,7 @@ def stacked(parts: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
 
 
 def columns_of(rows: Sequence[Mapping[str, Any]]) -> Columns:
-    """The columns of rows; a row that lacks one leaves it empty."""
+    """The columns of rows; where a row lacks a value, the column is empty."""
     return {name: [row.get(name, "") for row in rows] for name in max(rows, key=len)}
 
 
@@ -78,17 +78,17 @@ def write_csv(columns: Mapping[str, Iterable[Any]], path: str | Path) -> None:
 
 
 def json_text(value: Any) -> str:
-    """A value as JSON; what is not finite is null."""
+    """A value as JSON; infinities and NaN become null."""
     return json.dumps(finite(value), ensure_ascii=False, indent=1)
 
 
 def write_json(value: Any, path: str | Path) -> None:
-    """Write a value as JSON; what is not finite is null."""
+    """Write a value as JSON; infinities and NaN become null."""
     write_text(file("path", path), json_text(value) + "\n")
 
 
 def finite(value: Any) -> Any:
-    """The value with None in place of infinities and NaN, which JSON does not know."""
+    """The value with None in place of infinities and NaN, which JSON does not have."""
     if isinstance(value, dict):
         return {k: finite(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

@@ -227,7 +227,7 @@ class Run(ValueEquality):
         part.is_part = self.is_part or not len(places) or bool(places[-1] != len(self.t) - 1)
         return part
 
-    def _held(self) -> dict[str, Any]:
+    def _contents(self) -> dict[str, Any]:
         """All attributes but the functions that go through the steps again, which follow from the others."""
         return {name: each for name, each in vars(self).items() if name not in ("collision", "encounter", "overshoots")}
 

@@ -101,8 +101,8 @@ class OwnSystem(System):
         controls = [repr(each) for each in (self.control, self.push) if each is not None]
         return f"{self.definition.name}({', '.join([*self._all_arguments(), *controls])})"
 
-    def _held(self) -> dict[str, Any]:
-        return {name: value for name, value in super()._held().items() if name not in FOUND_LATER}
+    def _contents(self) -> dict[str, Any]:
+        return {name: value for name, value in super()._contents().items() if name not in FOUND_LATER}
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}

@@ -138,7 +138,7 @@ def run_by_core(
     """The run by the core. ``carries`` is whether it has a carry at the end, where that does not go by the method."""
     carries = plan.method.carry is not None if carries is None else carries
     kept = plan.kept
-    empty = np.empty if kept * (v.size + y.size) < buffer_pool.LEAST_LENT // 8 else buffer_pool.empty
+    empty = np.empty if kept * (v.size + y.size) < buffer_pool.LEAST_POOLED // 8 else buffer_pool.empty
     saved_v, saved_y = empty((kept, *v.shape), plan.dtype), empty((kept, *y.shape), plan.dtype)
     carry = np.empty(v.shape, plan.dtype) if carries else None
     recorded = None
