@@ -95,7 +95,7 @@ def test_the_state_has_as_few_axes_as_the_function_can_do_with() -> None:
         return -y
 
     assert run(declared(), v=0.0, y=np.ones((3, 2))).system.y_shape == (3, 2)
-    with pytest.raises(ShapeError, match=r"declared: no state of the declared shape \(None, 2\) fits .* y of shape \(3, 3\)"):
+    with pytest.raises(ShapeError, match=r"expected a state of the declared shape \(None, 2\), got .* y of shape \(3, 3\)"):
         sw.integrate(declared(), "rk4", v=0.0, y=np.ones((3, 3)), dt=0.1, steps=1)
 
 
@@ -323,6 +323,17 @@ def test_what_cannot_be_traced_is_said_with_its_line(function: Any) -> None:
         first = function.__code__.co_firstlineno
         (line,) = re.findall(r"test_equations\.py, line (\d+)", text)
         assert first < int(line) <= first + 3
+
+
+def test_parameters_may_have_any_name() -> None:
+    @sw.system
+    def spring(t: Any, v: Any, y: Any, *, name: Any = 1.0, function: Any = 1.0, quick_sines: Any = 1.0, values: Any = 1.0) -> Any:
+        return -name * function * quick_sines * values * y
+
+    runs = [sw.integrate(spring(**{name: 4.0}), "rk4", v=0.0, y=1.0, dt=0.1, steps=3) for name in spring.parameters]
+    expected = sw.integrate(sw.Oscillator(2.0, form="physical"), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
+    for run in runs:
+        np.testing.assert_allclose(run.y, expected.y, rtol=1e-12)
 
 
 def test_what_is_wrong_with_parameters() -> None:

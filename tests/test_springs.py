@@ -408,7 +408,7 @@ def test_an_undamped_net_takes_energy_control_and_a_damped_one_does_not() -> Non
         (
             {"layout": np.zeros((3, 3)), "dim": 2},
             ShapeError,
-            "dim and layout: expected as many dimensions in all, got dim of 2, layout of 3",
+            "dim and layout: expected one number of dimensions, got dim of 2, layout of 3",
         ),
         ({"damping": -0.1}, ArgumentError, "damping: expected numbers of zero or more"),
         ({"drag": [0.1, 0.1]}, ShapeError, r"drag: expected 3 particles \(or 1\)"),

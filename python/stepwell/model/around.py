@@ -1,8 +1,8 @@
-"""What is around a system's own equations: its parts, each of which wraps what is within it.
+"""The parts around a system's own equations, such as surfaces, controls and forces. Each wraps the system and the parts within.
 
-``System.around`` lists them from the inside out. The order of all kinds is ``ORDER`` of ``reference/around.py``; the core has the
-same in ``rust/core/src/model/around/mod.rs``. Whoever steps, traces or describes a system goes through that list, so that a new
-kind of part is one class here, one that wraps in ``reference/``, and one in the core.
+``System.around`` lists them from the inside out. The order of all kinds is ``ORDER`` of ``reference/around.py``, and is the same
+in the core, in ``rust/core/src/model/around/mod.rs``. All code that steps, traces or describes a system goes through that list,
+so a new kind of part is one class here, one that wraps in ``reference/``, and one in the core.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from .inputs import Input, Sampled, Sinusoid
 
 
 class Part(Immutable, ValueEquality, ABC):
-    """One thing around a system's equations.
+    """The base class of parts around a system's equations.
 
     Attributes:
-        kind: its place in ``ORDER``.
-        velocity_term: what of it depends on the velocity, so that methods for ÿ = a(t, y) refuse it; or None.
+        kind: its name in ``ORDER``.
+        velocity_term: the name of a term of it that depends on the velocity, so that methods for ÿ = a(t, y) refuse it; or None.
         acts_on_rates: whether it changes the rates in every stage. Otherwise it changes the state after a step.
         is_scaled: whether attempts at adaptive steps have it in the rates for a step of 1, which are multiplied by the step.
     """
@@ -45,7 +45,7 @@ class Part(Immutable, ValueEquality, ABC):
 
     @property
     def inputs(self) -> dict[str, Input]:
-        """Its inputs, by name; of a part without any there are none."""
+        """Its inputs by name."""
         return {}
 
     @property
@@ -63,10 +63,10 @@ class Part(Immutable, ValueEquality, ABC):
 
     @abstractmethod
     def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> Any:
-        """The NumPy reference ``s``, scaled to the step h, with this around it; parameters are numbers or symbols."""
+        """The NumPy reference ``s``, scaled to the step h, with this part around it; parameters are numbers or symbols."""
 
     def member(self, one: Callable[..., Array]) -> Self:
-        """The same for one member of a batch: ``one(numbers)`` takes its number, ``one(numbers, n)`` with n axes of their own."""
+        """The part for one member of a batch; ``one(numbers, n)`` takes the member's from numbers with n axes of their own."""
 
         def of(value: Any) -> Any:
             if isinstance(value, Sinusoid):
@@ -78,11 +78,11 @@ class Part(Immutable, ValueEquality, ABC):
         return changed(self, **{name: of(value) for name, value in vars(self).items()})
 
     def repr_arguments(self) -> list[str]:
-        """How the repr of a system shows it, among its arguments."""
+        """The texts that show the part among the arguments in the repr of a system."""
         return [repr(self)]
 
 
-#: The parameter that is the force from outside.
+#: The name of the parameter that is the force from outside.
 FORCE = "added.force"
 
 
@@ -99,20 +99,20 @@ class Force(Part):
         self.axes = axes
 
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
-        """None: they are those of a run."""
+        """None, because its numbers belong to the run."""
         return {}
 
     def own_axes(self, name: str) -> int:
-        """Those of the block."""
+        """The axes of the block."""
         return self.axes
 
     def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> Any:
-        """The force, added."""
+        """The system with the force added to its rates."""
         return reference.Forced(s, h, parameters[FORCE])
 
 
 class StickFriction(Part):
-    """Coulomb's friction that sticks; ``limit`` is by how much it slows each velocity in a unit of time, over the batch."""
+    """Coulomb's friction that sticks; ``limit`` is the deceleration of each velocity, which broadcasts over the batch."""
 
     kind = "friction"
     velocity_term = "friction"
@@ -127,11 +127,11 @@ class StickFriction(Part):
 
     @property
     def keeps_energy(self) -> bool:
-        """Only where there is none."""
+        """Whether the friction is zero for all members."""
         return not self.limit.any()
 
     def repr_arguments(self) -> list[str]:
-        """Nothing: it is among the arguments of its system."""
+        """None, because it is among the arguments of its system."""
         return []
 
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
@@ -139,5 +139,5 @@ class StickFriction(Part):
         return {"friction.limit": self.limit}
 
     def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> Any:
-        """Friction around all other forces."""
+        """The system with friction around all other forces."""
         return reference.Rubbing(s, h, parameters["friction.limit"])

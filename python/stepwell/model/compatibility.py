@@ -1,4 +1,4 @@
-"""What goes with what: systems, methods, controls, and runs that continue others."""
+"""Checks of combinations: of systems, methods, controls and options of a run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .systems import Sampled, System
 
 
 def fits_together(system: System, method: Method) -> None:
-    """Raise if the method cannot do the system."""
+    """Raise if the method cannot step the system."""
     if not method.needs_acceleration:
         return
     if not system.second_order:
@@ -32,7 +32,7 @@ def fits_together(system: System, method: Method) -> None:
 
 
 def not_of_a_step(control: Any) -> None:
-    """Raise if a control cannot go with steps whose length changes."""
+    """Raise if a control does not go with adaptive steps."""
     if getattr(control, "relative", None) is not None and control.gain is None:
         raise UnsupportedError(
             f"tolerance: {control!r} relates its gain to steps of fixed length; give gain in place of relative"
@@ -44,13 +44,13 @@ def not_of_a_step(control: Any) -> None:
 
 
 def forced(system: System) -> None:
-    """Raise if a system has no v̇ that a force could be added to."""
+    """Raise if a system has no v̇ to which a force could be added."""
     if prod(system.v_shape) == 0:
         raise UnsupportedError(f"force: it is added to the rates of v, and {system!r} has no v; give it an input or a parameter")
 
 
 def velocities(system: System, v: Any) -> Any:
-    """The velocities that were given; a system without velocities needs none."""
+    """The argument ``v``, which only a system without velocities may leave out."""
     if v is None and system.v_shape == (0,):
         return 0.0
     if v is None:
@@ -70,7 +70,7 @@ def fits_own_times(system: System, single: bool) -> None:
 
 
 def goes_back(system: System, control: Any) -> None:
-    """Raise if a system has no past that steps back in time could find."""
+    """Raise if a system has no unique past, so that steps back in time have no meaning."""
     if system.stick_friction is not None:
         raise UnsupportedError(
             f"dt: below zero time runs back, and friction that sticks forgets how fast it was: {system!r} at rest has many "
@@ -90,9 +90,9 @@ def goes_back(system: System, control: Any) -> None:
 
 
 def goes_on_by_a_rule(system: System) -> None:
-    """Raise if an input cannot be carried by a power of the transition matrix."""
-    for name, given in system.given_inputs().items():
-        if isinstance(given, Sampled) and not given.constant:
+    """Raise if the power form cannot advance an input over many steps."""
+    for name, each in system.given_inputs().items():
+        if isinstance(each, Sampled) and not each.constant:
             raise UnsupportedError(
                 f"form: many steps are one power only if the inputs go on by a rule, as constants and sinusoids do, but {name} "
                 f"changes from sample to sample; use form='matrix' or 'direct'"
@@ -100,7 +100,7 @@ def goes_on_by_a_rule(system: System) -> None:
 
 
 def goes_with_series(system: System, control: Any) -> None:
-    """Raise unless the rates are as smooth within a step as the last terms of a series say."""
+    """Raise unless the rates are smooth within a step, so that the last terms of a series estimate its error."""
     instead = "use another method, such as dop853"
     if system.samples[0] < np.inf:
         raise UnsupportedError(f"tolerance: a series does not see that samples of an input change within a step; {instead}")

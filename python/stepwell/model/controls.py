@@ -1,4 +1,4 @@
-"""Control terms, which keep a quantity that should be constant from drifting (§12, Appendix D)."""
+"""Control terms, which keep quantities that should be constant from drifting (§12, Appendix D)."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ FORMS: tuple[ControlForm, ...] = ("limited", "printed")
 
 
 class OfEnergy(Part):
-    """What acts on the energy of a system, to keep it constant."""
+    """The base class of parts that keep the energy of a system constant."""
 
     kind = "control"
 
     @property
     def keeps_energy(self) -> bool:
-        """It is meant to."""
+        """Always, since that is its purpose."""
         return True
 
     def repr_arguments(self) -> list[str]:
-        """Nothing: a system shows its control by itself."""
+        """None, because the repr of a system shows its control last."""
         return []
 
 
 class EnergyControl(OfEnergy):
     """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity.
 
-    It pushes in every stage of a method; by PEFRL, in whose stages v and y belong to different times, after every step. With a
-    tolerance ``gain`` is needed: ``relative`` relates to steps of fixed length.
+    It pushes in every stage of a method; with PEFRL, in whose stages v and y belong to different times, after every step. A run
+    with a tolerance needs ``gain``, since ``relative`` refers to steps of fixed length.
 
     In the document's form (Appendix D) a step multiplies velocities by 1 − h·C·ΔE. This overflows where h·C·K passes 1; K is the
     kinetic energy, which is not bounded at close encounters. The limited form integrates the decay of ΔE by backward Euler
-    instead, and scales velocities by a factor between ½ and 2: it is the same to first order and stays finite.
+    instead, and scales velocities by a factor between ½ and 2: it agrees to first order and stays finite.
 
     Args:
         gain: C, in 1 per energy and unit of time; broadcasts over the batch.
@@ -82,7 +82,7 @@ class EnergyControl(OfEnergy):
         return f"EnergyControl({strength}, form={self.form!r})"
 
     def aimed(self, kinetic: Array, energy: Array, dt: float) -> EnergyControl:
-        """The same control with numbers for its gain and its target, from the energies at the start."""
+        """The control with numbers for its gain and its target, from the energies at the start."""
         gain = self.gain
         if gain is None:
             if not (kinetic > 0).all():
@@ -91,7 +91,7 @@ class EnergyControl(OfEnergy):
         return changed(self, gain=gain, target=np.asarray(energy) if self.target is None else self.target)
 
     def overshoots(self, dt: float, kinetic: Callable[[], Array]) -> tuple[str, Any] | None:
-        """What to say if h·C·K is 1 or more at the start in the printed form, and of which members; or None."""
+        """A warning if h·C·K is 1 or more at the start in the printed form, with the members concerned; or None."""
         if self.form != "printed" or self.gain is None:
             return None
         strength = dt * self.gain * kinetic()
@@ -104,13 +104,13 @@ class EnergyControl(OfEnergy):
         return text, strength >= 1.0
 
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
-        """Its form, when it acts, its gain and its target."""
+        """Its form, whether it acts between steps, its gain and its target."""
         numbers = {"control.gain": np.asarray(self.gain), "control.target": np.asarray(self.target)}
         words = {"control": "energy", "control.form": self.form} | ({"control.when": "between"} if self.between else {})
         return words | numbers
 
     def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> reference.Controlled:
-        """The system, pushed."""
+        """The system with the push."""
         gain, target = parameters["control.gain"], parameters["control.target"]
         return reference.Controlled(s, h, self.form, gain, target, between=self.between)
 
@@ -161,11 +161,11 @@ class Control(Immutable, ValueEquality):
         return f"Control({self.invariant!r}, gain={self.gain}, form={self.form!r})"
 
     def aimed(self, kinetic: Array, value: Array, dt: float) -> Control:
-        """The same control with its target in numbers."""
+        """The control with a number for its target."""
         return self if self.target is not None else changed(self, target=np.asarray(value))
 
     def overshoots(self, dt: float, kinetic: Callable[[], Array]) -> tuple[str, Any] | None:
-        """What to say if h·gain is 1 or more in the printed form, and of which members; or None."""
+        """A warning if h·gain is 1 or more in the printed form, with the members concerned; or None."""
         strength = dt * self.gain
         if self.form != "printed" or not (largest := np.max(strength)) >= 1.0:
             return None
@@ -176,27 +176,26 @@ class Control(Immutable, ValueEquality):
         return text, strength >= 1.0
 
     def own_parameters(self) -> dict[str, Any]:
-        """Its parameters, which stand among those of the equations: it is a part of the rates."""
+        """Its parameters, which are among those of the equations, because it is a part of the rates."""
         return {"control.gain": self.gain, "control.target": np.asarray(self.target)}
 
 
 class ConstraintControl(Immutable, ValueEquality):
-    """Adds to the rates of a system what returns its own constraint; the system has the equations.
+    """The base class of controls of a system's own constraint; the system has the equations.
 
     Attributes:
-        constraint: which constraint it keeps, as a system names it in ``System.constraint``.
-        of_a_step: whether its number is relative to a step of fixed length, so that adaptive steps refuse it.
-        strength: its number, broadcasts over the batch.
+        constraint: the name of the constraint, as in ``System.constraint``.
+        of_a_step: whether its strength is relative to a step of fixed length, so that adaptive steps refuse it.
+        strength: its strength, which broadcasts over the batch.
     """
 
     constraint: ClassVar[str]
-    #: Whether its number is relative to a step of fixed length.
     of_a_step: ClassVar[bool] = False
     strength: Array
 
     @property
     def batch(self) -> Shape:
-        """The shape of its number."""
+        """The shape of its strength."""
         return self.strength.shape
 
     def __repr__(self) -> str:
@@ -281,7 +280,7 @@ class Projection(OfEnergy):
     def __init__(self, way: str = "scaling", *, target: Any = None) -> None:
         own = isinstance(way, str) and way.isidentifier()
         self.way = way if own else checks.known("way", way, WAYS)
-        #: The invariant that is kept, of a system of the user's own.
+        #: The name of the invariant, in a system of own equations.
         self.invariant = "energy" if self.way in WAYS else self.way
         self.target = None if target is None else checks.numbers("target", target)
 
@@ -296,7 +295,7 @@ class Projection(OfEnergy):
         return f"Projection({self.way!r})"
 
     def aimed(self, kinetic: Array, energy: Array, dt: float) -> Projection:
-        """The same projection with a number for its target."""
+        """The projection with a number for its target."""
         return self if self.target is not None else changed(self, target=np.asarray(energy))
 
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
@@ -304,12 +303,12 @@ class Projection(OfEnergy):
         return {"control": "projection", "control.way": self._known_way, "control.target": np.asarray(self.target)}
 
     def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> reference.Projected:
-        """The system whose states are projected."""
+        """The system with projection after every step."""
         return reference.Projected(s, h, self._known_way, parameters["control.target"])
 
     @property
     def _known_way(self) -> str:
-        """How the core projects: onto an invariant along its gradient."""
+        """The way of the core, which projects onto an invariant as ``"nacozy"`` does, along the gradient."""
         return self.way if self.way in WAYS else "nacozy"
 
 
@@ -317,7 +316,7 @@ AnyControl = EnergyControl | Projection | Control | ConstraintControl
 
 
 def a_control(value: Any) -> Any:
-    """Return the argument ``control`` if it is one, or None; it may have been read from a file of arrays."""
+    """Return the argument ``control`` if it is a control or None; it may have been read from a file of arrays."""
     if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind == "O":
         value = value.item()
     if value is not None and not isinstance(value, (EnergyControl, Projection, Control, ConstraintControl)):

@@ -1,4 +1,4 @@
-"""Inputs x(t) and accelerations a(t): a number, a sinusoid, or samples held in between."""
+"""Inputs x(t) and accelerations a(t): a number, a sinusoid, or samples."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 #: Beyond this angle the spacing of floating-point numbers is too coarse to locate a time within a period.
 LAST_ANGLE = 2.0**50
-#: The same of float32, where such an angle is as far from its neighbours.
+#: The angle at which the spacing of float32 is as coarse.
 LAST_SINGLE_ANGLE = 2.0**21
 
 
@@ -47,7 +47,7 @@ class Sinusoid(Immutable, ValueEquality):
         return f"Sinusoid(amplitude={brief(self.amplitude)}, omega={brief(self.omega)}, phase={brief(self.phase)})"
 
     def check(self, last: float) -> None:
-        """Raise if the angle leaves the range of the sine by a time."""
+        """Raise if the angle leaves the range of the sine up to a time."""
         angle = float(np.abs(self.omega).max() * abs(last) + np.abs(self.phase).max())
         if angle > LAST_ANGLE:
             raise ArgumentError(
@@ -55,7 +55,7 @@ class Sinusoid(Immutable, ValueEquality):
             )
 
     def jumps(self, begin: float, end: float) -> Array:
-        """When it or a derivative jumps: never."""
+        """The times at which it or a derivative jumps: none."""
         return np.empty(0)
 
     def signal(self) -> Sine:
@@ -63,25 +63,26 @@ class Sinusoid(Immutable, ValueEquality):
         return Sine(self.amplitude, self.omega, self.phase)
 
 
-#: What is between samples.
+#: The kinds of interpolation between samples.
 INTERPOLATIONS: tuple[Interpolation, ...] = ("hold", "linear", "cubic")
 
 
 class Sampled(Immutable, ValueEquality):
-    """Samples at equal intervals, and what is between them.
+    """Samples at equal intervals, with a kind of interpolation between them.
 
     | ``interpolation`` | between two samples | use |
     |---|---|---|
-    | ``"hold"`` | the first of them (zero-order hold) | what a computer or a converter puts out |
-    | ``"linear"`` | a straight line, as ``np.interp`` | what was measured |
-    | ``"cubic"`` | a cubic (Hermite), with derivatives from up to five neighbouring samples | samples of something smooth |
+    | ``"hold"`` | the first of them (zero-order hold) | the output of a computer or a converter |
+    | ``"linear"`` | a straight line, as ``np.interp`` | measurements |
+    | ``"cubic"`` | a cubic (Hermite), with derivatives from up to five neighbouring samples | samples of a smooth function |
 
-    Before the first sample there is the first, after the last the last.
+    Before the first sample the value is the first, after the last sample the last.
 
-    A step of fixed length sees the mean of held samples over the step. Where samples begin with steps, so that the interval is a
-    multiple of dt, that is the sample itself, and each method has its order. Where a sample begins within a step, the error is of
-    second order in dt. Curves are functions of the time, evaluated wherever in a step a method asks. A straight line errs by the
-    second power of the interval and has kinks; cubics err by the fourth, and their first derivative is continuous.
+    A step of fixed length sees the mean of held samples over the step. If samples begin with steps, so that the interval is a
+    multiple of dt, that is the sample itself, and each method has its order. If a sample begins within a step, the error is of
+    second order in dt. Curves are functions of the time, which a method evaluates anywhere in a step. The error of straight lines
+    is of second order in the interval, and they have kinks; that of cubics is of fourth order, and their first derivative is
+    continuous.
 
     Args:
         values: the samples along the first axis, the batch along the others.
@@ -89,7 +90,7 @@ class Sampled(Immutable, ValueEquality):
         start: time of the first sample.
         interpolation: one of the table.
 
-    A time that falls short of a sample's time by rounding alone already gets that sample.
+    A time that is before a sample's time by rounding alone already has that sample.
 
     Example:
         >>> steps = sw.Sampled([0.0, 1.0, 0.5], interval=2.0)  # 0 until t = 2, 1 until 4, then 0.5
@@ -127,14 +128,14 @@ class Sampled(Immutable, ValueEquality):
 
     @property
     def times(self) -> Array:
-        """When the samples are, shape (samples,)."""
+        """The times of the samples, shape (samples,)."""
         return np.asarray(self.start + self.interval * np.arange(len(self.values)), np.float64)
 
     def jumps(self, begin: float, end: float) -> Array:
-        """When the input or its first derivatives jump, from ``begin`` to ``end``, ascending.
+        """The times from ``begin`` to ``end`` at which the input or its first derivatives jump, ascending.
 
-        Held samples jump where a sample differs from the one before it, some roundings early. Curves have a kink where the slope
-        changes (linear) or a jump of the second derivative (cubic), at each sample.
+        Held samples jump where a sample differs from the one before it, some roundings early. Curves have a kink (linear) or a
+        jump of the second derivative (cubic) at each sample.
         """
         times: Array = self.times
         if self.constant:
@@ -145,7 +146,7 @@ class Sampled(Immutable, ValueEquality):
         return times[(begin <= times) & (times <= end)]
 
     def over_steps(self, first: Any, dt: float) -> Sampled:
-        """The means over steps from ``first`` on in place of held samples of which a step has several; else itself.
+        """The means over steps from ``first`` on, if a step has several held samples; else the input itself.
 
         ``first`` is one time or one for each member.
         """
@@ -167,7 +168,7 @@ class Sampled(Immutable, ValueEquality):
         return Sampled(values, dt, float(ends[0]))
 
     def check(self, last: float) -> None:
-        """Do nothing: samples are defined at any time."""
+        """Do nothing, because samples are defined at any time."""
 
     def signal(self) -> Constant | Stepped | Curve:
         """The reference signal."""
@@ -175,8 +176,8 @@ class Sampled(Immutable, ValueEquality):
             return Constant(np.asarray(self.values[0]))
         if self.interpolation == "hold":
             origin = None if self._origin is None else Held(self._origin[np.newaxis], 1.0, 0.0)
-            held, since = (Held(each, self.interval, self.start) for each in (self.values, self.times))
-            return Stepped(held, since, origin)
+            table, since = (Held(each, self.interval, self.start) for each in (self.values, self.times))
+            return Stepped(table, since, origin)
         slopes = np.diff(self.values, axis=0) / self.interval
         pieces = [self.values[:-1], slopes]
         if self.interpolation == "cubic":
@@ -186,7 +187,7 @@ class Sampled(Immutable, ValueEquality):
                 (3.0 * slopes - 2.0 * at[:-1] - at[1:]) / self.interval,
                 (at[:-1] + at[1:] - 2.0 * slopes) / self.interval**2,
             ]
-        # A piece before the first sample and one behind the last are constant.
+        # The pieces before the first sample and after the last are constant.
         ends = [self.values[[0]], self.values[[-1]]]
         nothing = np.zeros_like(ends[0])
         tables = [np.concatenate([ends[0], pieces[0], ends[1]])]
@@ -197,7 +198,7 @@ class Sampled(Immutable, ValueEquality):
 
 
 def _at(values: Array, numbers: Any, batch: Shape) -> Array:
-    """Those of the values that have these numbers, of which each member may have its own, over the batch."""
+    """The values at these indices, which may differ from member to member, over the batch."""
     if numbers.ndim == 1:
         return np.asarray(values[numbers])
     wide, each = (
@@ -207,31 +208,31 @@ def _at(values: Array, numbers: Any, batch: Shape) -> Array:
     return np.take_along_axis(wide, each, axis=0)
 
 
-#: Samples from which a derivative is found: it is exact for polynomials up to one degree less.
+#: The most samples for a derivative, which is exact for polynomials of a lower degree.
 NEIGHBOURS = 5
 
 
 def _derivatives(values: Array, interval: float) -> Array:
-    """The derivative at each sample of the polynomial through it and its nearest neighbours, five in all if there are as many."""
+    """The derivative at each sample of the polynomial through it and its nearest neighbours, ``NEIGHBOURS`` in all."""
     n = min(NEIGHBOURS, len(values))
-    made = np.empty(values.shape)
+    derivatives = np.empty(values.shape)
     for i in range(n):
-        # The first rows have too few neighbours before them, the last too few behind them; between them all are alike.
+        # The first rows have too few neighbours before them, the last too few after them; the rows between have equal weights.
         weights = _weights(n, i) / interval
         middle = i == n // 2
         first, count = (0, len(values) - n + 1) if middle else (0 if i < n // 2 else len(values) - n, 1)
-        made[first + i : first + i + count] = sum(w * values[first + k : first + k + count] for k, w in enumerate(weights))
-    return made
+        derivatives[first + i : first + i + count] = sum(w * values[first + k : first + k + count] for k, w in enumerate(weights))
+    return derivatives
 
 
 def _weights(n: int, at: int) -> Array:
-    """By what n samples at 0, 1, … are multiplied for the derivative of their polynomial at one of them."""
+    """The weights of n samples at 0, 1, … in the derivative of their polynomial at one of them."""
     powers = np.vander(np.arange(n) - at, increasing=True).T.astype(np.float64)
     return np.linalg.solve(powers, np.eye(n)[1]) if n > 1 else np.zeros(1)
 
 
 class Pulse(Sampled):
-    """Samples that a method meets wherever in a step it asks: by them it is found what it does with an input there."""
+    """Held samples that a method evaluates anywhere in a step; the analysis finds the effect of an input by them."""
 
     def signal(self) -> Constant | Held:  # type: ignore[override]
         """The reference signal."""
@@ -242,12 +243,12 @@ Input = Sinusoid | Sampled
 
 
 def as_input(argument: str, value: Any) -> Input | None:
-    """An input from the argument of a user: a constant is one sample, held forever."""
+    """A user's argument as an input; a constant becomes one sample, held forever."""
     if value is None or isinstance(value, (Sinusoid, Sampled)):
         return value
     return Sampled(checks.numbers(argument, value)[np.newaxis], interval=1.0)
 
 
-def signal(given: Input | None) -> Constant | Held | Sine | Stepped | Curve | None:
+def signal(value: Input | None) -> Constant | Held | Sine | Stepped | Curve | None:
     """The reference signal of an input, or None."""
-    return None if given is None else given.signal()
+    return None if value is None else value.signal()

@@ -1,7 +1,7 @@
 """The names by which a method is found: its own, its title, and the other names of its record.
 
-A name that means another method elsewhere (a false friend) is never suggested, but explained. Everything here follows from the
-records, so a method with a new name needs no change of this file.
+A name that means another method elsewhere (a false friend) is never suggested, but explained. All names come from the records, so
+a new name needs no change of this file.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..errors import UnknownNameError
 
 
 class Named(Protocol):
-    """What a method's record says of its names."""
+    """The names in a method's record."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -32,23 +32,23 @@ class Named(Protocol):
 
 M = TypeVar("M", bound=Named)
 
-#: Below this similarity (``difflib``, 0 to 1) two names are not taken for one with a typing error.
+#: The least similarity (``difflib``, 0 to 1) at which one name may be a misspelling of the other.
 MIN_SIMILARITY = 0.5
 
-#: Of two names whose similarities differ by no more than this, both may have been meant.
+#: If the similarities of two names differ by no more than this, both are suggested.
 AS_NEAR = 0.2
 
 #: A method's own name is suggested unless another of its names is closer by more than this.
 OWN_NAME_FIRST = 0.1
 
-#: Of a longer text only so many characters are compared.
+#: The most characters of a text that are compared.
 MAX_LENGTH = 200
 
 #: Words that a name may have or lack.
 OPTIONAL_WORDS = ("the", "method", "rule", "scheme", "integrator")
 
 
-#: Methods of a kind that is not here, by their usual names in the spelling of ``spelling``, and what there is instead.
+#: Kinds of methods that stepwell does not have, by patterns of their names in the form of ``spelling``; and the explanation.
 NOT_HERE = {
     r"implicit_.*|.*_implicit|backward_euler|crank_nicolson|i?bdf\d?|.*radau.*|lsod[aei]?r?|l?vode|cvode|(esd|sd|d)irk.*|"
     r"tr_?bdf2|rosenbrock.*|ros\d.*|rodas.*|kvaerno\d?|kencarp\d+|lobatto.*|gauss_legendre.*|newmark.*|hht.*|generali[sz]ed_alpha|"
@@ -67,12 +67,12 @@ NOT_HERE = {
 
 
 class Names(NamedTuple):
-    """All names of the records, in the spelling of ``spelling``.
+    """All names of the records, in the form of ``spelling``.
 
     Attributes:
-        methods: a name to the methods that have it; more than one if it is ambiguous.
-        qualified: a name without its remark in parentheses to the methods and full names: RK2 of "RK2 (trapezoidal)".
-        friends: the name of another method, which is not here, to what it is and the methods nearest to it.
+        methods: the methods that have a name; more than one if it is ambiguous.
+        qualified: for a name without its remark in parentheses, as RK2 of "RK2 (trapezoidal)", the methods and full names.
+        friends: for the name of a method that stepwell does not have, its usual name and the methods nearest to it.
         written: each name as the records write it.
     """
 
@@ -83,7 +83,7 @@ class Names(NamedTuple):
 
 
 def spelling(name: str) -> str:
-    """A name without what people write differently: case, accents, hyphens, spaces, an apostrophe, "the" and "method"."""
+    """A name in a form that does not depend on case, accents, hyphens, spaces, apostrophes, "the" and "method"."""
     plain = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c)).casefold()
     words = re.sub(r"[^a-z0-9]+", " ", re.sub(r"['’]s(?![a-z])", "", plain)).split()
     return "_".join([word for word in words if word not in OPTIONAL_WORDS] or words)
@@ -91,36 +91,36 @@ def spelling(name: str) -> str:
 
 def names_of(methods: Iterable[Named]) -> Names:
     """The names in the records of these methods."""
-    found = Names({}, {}, {}, {})
+    names = Names({}, {}, {}, {})
     methods = list(methods)
     for method in methods:
         for name in (method.name, method.title, *method.other_names):
-            holders = found.methods.setdefault(spelling(name), [])
+            holders = names.methods.setdefault(spelling(name), [])
             if method.name not in holders:
                 holders.append(method.name)
-            found.written.setdefault(spelling(name), name)
+            names.written.setdefault(spelling(name), name)
             if (short := spelling(_without_remark(name))) != spelling(name):
-                found.qualified.setdefault(short, []).append((method.name, name))
-    for method in methods:  # the name of a method is that method, whatever is told of it elsewhere
-        found.methods[spelling(method.name)] = [method.name]
+                names.qualified.setdefault(short, []).append((method.name, name))
+    for method in methods:  # a method's own name is never ambiguous
+        names.methods[spelling(method.name)] = [method.name]
     direct = [(method.name, *friend.partition(", which is ")[::2]) for method in methods for friend in method.false_friends]
-    # Who is confused with a method by its own name is nearer to it than who is by one of its other names.
+    # A false friend by its own name is nearer than one by another of its names.
     indirect = [(holder, real, "") for holder, _, real in direct if real]
     named = {spelling(name) for _, name, _ in direct}
     for holder, name, real in [*direct, *(each for each in indirect if spelling(each[1]) not in named)]:
         key = spelling(name)
-        if key not in found.methods and spelling(_without_remark(name)) not in found.methods:
-            what, near = found.friends.get(key, ("", []))
-            found.friends[key] = max(what, real, key=len), [*near, holder]
-            found.written.setdefault(key, name)
-    return found
+        if key not in names.methods and spelling(_without_remark(name)) not in names.methods:
+            what, near = names.friends.get(key, ("", []))
+            names.friends[key] = max(what, real, key=len), [*near, holder]
+            names.written.setdefault(key, name)
+    return names
 
 
 def resolved(name: str, methods: dict[str, M]) -> M:
-    """The method of a name that is not simply its own.
+    """The method of any name but its own.
 
     Raises:
-        UnknownNameError: if several methods have that name; if it is the name of a method that is not here; if there is none.
+        UnknownNameError: if several methods have that name, if stepwell does not have that method, or if there is none.
     """
     names, key = _names(tuple(methods.values())), spelling(name[:MAX_LENGTH])
     shown = short(name)
@@ -130,11 +130,11 @@ def resolved(name: str, methods: dict[str, M]) -> M:
     if holders:
         raise UnknownNameError(f"method: {shown} is the name of several methods: {', '.join(holders)}; give one of these.")
     if key in names.qualified:
-        told = "; ".join(f"{full} is {holder!r}" for holder, full in names.qualified[key])
-        raise UnknownNameError(f"method: {shown} does not say which: {told}. Known: {', '.join(methods)}.")
+        full_names = "; ".join(f"{full} is {holder!r}" for holder, full in names.qualified[key])
+        raise UnknownNameError(f"method: {shown} does not say which: {full_names}. Known: {', '.join(methods)}.")
     if key in names.friends or _why_not_here(key):
-        told = _explained(shown.strip("'"), key, names)
-        raise UnknownNameError(f"method: {told} Known: {', '.join(methods)}.")
+        meaning = _explained(shown.strip("'"), key, names)
+        raise UnknownNameError(f"method: {meaning} Known: {', '.join(methods)}.")
     raise UnknownNameError(f"method: there is no {shown}{_hint(key, names)} Known: {', '.join(methods)}.")
 
 
@@ -143,37 +143,37 @@ def _why_not_here(key: str) -> str | None:
 
 
 def _hint(key: str, names: Names) -> str:
-    """What was meant, if it was written wrongly: the method of the nearest name, or why the nearest is not here, or both."""
+    """The end of a message with the method of the nearest name, or why stepwell does not have the nearest, or both."""
     own = [each for each, holders in names.methods.items() if each in holders]
     like, name = max(_nearest(key, own), _nearest(key, names.methods, margin=OWN_NAME_FIRST))
     like_friend, friend = _nearest(key, names.friends)
-    told = []
+    hints = []
     if name and like >= like_friend - AS_NEAR:
-        told.append(f"did you mean {' or '.join(repr(each) for each in names.methods[name])}?")
+        hints.append(f"did you mean {' or '.join(repr(each) for each in names.methods[name])}?")
     if friend and like_friend >= like - AS_NEAR:
-        told.append(_explained(names.written[friend], friend, names))
-    return f"; {' '.join(told)}" if told else "."
+        hints.append(_explained(names.written[friend], friend, names))
+    return f"; {' '.join(hints)}" if hints else "."
 
 
 def _nearest(key: str, known: Iterable[str], margin: float = 0.0) -> tuple[float, str]:
-    """The similarity of the nearest name, less a margin, and that name; nothing if none is near."""
+    """The similarity of the nearest name, less a margin, and that name; 0 and an empty name if none is near."""
     near = difflib.get_close_matches(key, list(known), n=1, cutoff=MIN_SIMILARITY)
     return (difflib.SequenceMatcher(None, near[0], key).ratio() - margin, near[0]) if near else (0.0, "")
 
 
 def _explained(name: str, key: str, names: Names) -> str:
-    """What the name of a method that is not here means, and which methods are the nearest."""
+    """The meaning of the name of a method that stepwell does not have, and the nearest methods."""
     if why := _why_not_here(key):
         return f"{name} is {why}"
     what, near = names.friends[key]
     real = spelling(what) if what else key
     near = names.friends[real][1] if real in names.friends else near
-    said = f"{name} is {what}, which is not here" if what else f"{names.written[key]} is not here"
-    return f"{said}; nearest, but not the same: {', '.join(dict.fromkeys(near))}."
+    text = f"{name} is {what}, which is not here" if what else f"{names.written[key]} is not here"
+    return f"{text}; nearest, but not the same: {', '.join(dict.fromkeys(near))}."
 
 
 def _without_remark(name: str) -> str:
-    """A name without words in parentheses at its end; numbers there are orders, and stay."""
+    """A name without words in parentheses at its end; numbers in parentheses are orders, and stay."""
     return re.sub(r"\s*\([^()]*[a-z]{2}[^()]*\)$", "", name)
 
 

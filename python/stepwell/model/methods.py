@@ -16,7 +16,7 @@ from ..errors import ArgumentError
 
 
 class Steps(Protocol):
-    """What a file in ``reference/steppers`` defines. ``start`` and ``finish`` are there if the method has a carry."""
+    """The functions of a file in ``reference/steppers``; only a method with a carry has ``start`` and ``finish``."""
 
     def step(self, s: Scaled, t: float, h: float, v: Array, y: Array, /) -> Blocks:
         """One step."""
@@ -45,26 +45,26 @@ class Method(Immutable):
     title: str
     #: Standard names of the same method.
     other_names: tuple[str, ...]
-    #: Methods with which it is easily confused.
+    #: Methods that are easily confused with it.
     false_friends: tuple[str, ...]
     #: Order of convergence.
     order: int
-    #: Function evaluations per step of fixed length (of both rates: rate evaluations). Of a series those of a linear system; of
-    #: others it may be more, see ``stepwell.stability.operations``.
+    #: Function evaluations per step of fixed length (of both rates: rate evaluations). For a series, those of a linear system;
+    #: other systems may need more, see ``stepwell.stability.operations``.
     evaluations: int
     #: Function evaluations of an attempt at an adaptive step; 0 if it does not estimate its error.
     attempt_evaluations: int
     #: The family of methods to which it belongs.
     family: str
-    #: Whether its steps are sums of the solution's series; with a tolerance it then has the order that takes least work.
+    #: Whether its steps sum the Taylor series of the solution; with a tolerance it then takes the order that needs least work.
     has_series: bool
-    #: The undamped oscillator is stable for Φ = ω₀·dt below this; 0 means never.
+    #: The undamped oscillator is stable for Φ = ω₀·dt below this limit; 0 means never.
     limit: float
     #: Times within a step at which rates are evaluated, as fractions of the step.
     nodes: tuple[float, ...]
     #: Whether it needs a second-order system whose forces do not depend on the velocity.
     needs_acceleration: bool
-    #: What it carries between steps in place of v, or None.
+    #: The name of what it carries between steps in place of v, or None.
     carry: str | None
     #: Ways to start it, the default first.
     starts: tuple[str, ...]
@@ -88,7 +88,7 @@ class Method(Immutable):
         return "it is that of the core; another method is chosen by its name, stepwell.method(name)"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """There is one object for each name: a copy or an unpickled method is that object."""
+        """Each name has one object, which a copy or an unpickled method is."""
         return method, (self.name,)
 
     @property
@@ -97,7 +97,7 @@ class Method(Immutable):
         return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))
 
     def start_choice(self, start: str | None) -> int:
-        """The number of a start, for the core."""
+        """The number that the core has for a start."""
         if start is None:
             return 0
         if not self.starts:
@@ -131,7 +131,7 @@ class Method(Immutable):
         return f"{self.evaluations} function evaluation{'s' * (self.evaluations != 1)}"
 
     def _repr_html_(self) -> str:
-        """The same as a table, for notebooks."""
+        """The method as a table, for notebooks."""
         return facts(
             f"{self.title} ({self.name})",
             [
@@ -148,7 +148,7 @@ class Method(Immutable):
 
 
 def _section(method: Method) -> int:
-    """The number of the document's section; what has none comes last."""
+    """The number of the document's section, 99 without one."""
     number = re.search(r"\d+", method.section)
     return int(number[0]) if number else 99
 

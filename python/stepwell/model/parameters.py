@@ -1,4 +1,4 @@
-"""Parameters by name: arrays with axes of their own first, then those of the batch; signals; words. How others take them."""
+"""Parameters by name: arrays (axes of their own first, then those of the batch), signals and strings, and their other forms."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import Array, Shape
 from ..reference.signal import COMPOSED, Held, converted
 
-#: Parameters as the core takes them: names with words, whole numbers, lists of whole numbers (as bytes, four for each), rows of
+#: Parameters as the core takes them: names with strings, whole numbers, lists of whole numbers (as bytes, four for each), rows of
 #: numbers for each member (or one for all), and tables of samples: start, interval, a row for each sample.
 CoreParameters = list[tuple[str, Any]]
 
@@ -20,12 +20,12 @@ CONTIGUOUS = (8,)
 
 
 def flat(parameters: dict[str, Any], batch: Shape) -> CoreParameters:
-    """Parameters as the core takes them: those that are None are left out, a list is its length and its elements."""
+    """Parameters as the core takes them: None is left out, and a list becomes its length and its elements."""
     entries: CoreParameters = []
     for name, value in parameters.items():
         if value is None:
             continue
-        if type(value) is np.ndarray:  # the most frequent case, first because the others take longer
+        if type(value) is np.ndarray:  # the most frequent case, and the others take longer to recognise
             entries.append((name, rows(value, batch)))
             continue
         match value:
@@ -44,9 +44,9 @@ def flat(parameters: dict[str, Any], batch: Shape) -> CoreParameters:
 
 
 def rows(values: Array, batch: Shape, own: int | None = None) -> Array:
-    """Numbers as rows for the core, of one for each member or one for all.
+    """Numbers as rows for the core, with one number for each member or one for all.
 
-    ``own`` is how many axes there are before those of the batch; if None, those that are more than the batch has.
+    ``own`` is the number of axes before those of the batch; if None, all axes that the batch does not have.
     """
     if not batch:
         return np.ascontiguousarray(values).reshape(-1, 1)
@@ -69,12 +69,12 @@ def is_common(values: Array, own: int) -> bool:
 
 
 def aligned(values: Array, own: int, batch: Shape) -> Array:
-    """Numbers with so many axes of their own first, and then as many axes as the batch has."""
+    """Numbers with ``own`` axes of their own first, and then as many axes as the batch has."""
     return values.reshape((*values.shape[:own], *(1,) * (len(batch) - values.ndim + own), *values.shape[own:]))
 
 
 def in_a_row(values: Array, batch: Shape, own: int | None = None) -> Array:
-    """Numbers with one batch axis, of all members or of length 1 if they share them, behind the axes of their own."""
+    """Numbers with one batch axis after their own: over all members, or of length 1 if all members share them."""
     own = max(0, values.ndim - len(batch)) if own is None else own
     over = values.shape[own:]
     if is_common(values, own):
@@ -83,19 +83,19 @@ def in_a_row(values: Array, batch: Shape, own: int | None = None) -> Array:
 
 
 def of_shape(parameters: dict[str, Any], batch: Shape) -> dict[str, Any]:
-    """Parameters with one batch axis, for a batch of which that is the last."""
+    """Parameters with one batch axis, reshaped for a batch whose last axis that is."""
     if len(batch) == 1:
         return parameters
     return with_numbers(parameters, lambda values, own: values.reshape((*values.shape[:-1], *(1,) * (len(batch) - 1), -1)))
 
 
 def with_numbers(parameters: dict[str, Any], change: Callable[[Array, int | None], Array]) -> dict[str, Any]:
-    """Parameters whose numbers were changed.
+    """Parameters whose numbers are changed.
 
-    ``change`` gets numbers, and how many axes of their own they have: None for those that are more than the batch has.
+    ``change`` takes numbers, and how many axes of their own they have: None for all axes that the batch does not have.
     """
 
-    def table(held: Held) -> Held:
-        return Held(change(held.values, 1), held.interval, held.start)
+    def table(samples: Held) -> Held:
+        return Held(change(samples.values, 1), samples.interval, samples.start)
 
     return {name: converted(value, lambda each: change(each, None), table) for name, value in parameters.items()}

@@ -1,4 +1,4 @@
-"""Quaternions of attitudes, scalar first, as ``RigidBody`` has them: made of a turn, multiplied, and as a matrix.
+"""Quaternions of attitudes, scalar first, as ``RigidBody`` has them: by a turn, multiplied, and as a matrix.
 
 A quaternion stands along the first axis, shape (4, …); the other axes broadcast. For the saved states of a run of one member,
 whose times come first, give ``run.y.T``.
@@ -117,7 +117,7 @@ def matrix(q: Any) -> Array:
 
 
 def _along(argument: str, value: Any, n: int) -> Array:
-    """So many numbers along the first axis."""
+    """An argument as an array with n numbers along the first axis."""
     numbers = checks.numbers(argument, value)
     if numbers.ndim == 0 or len(numbers) != n:
         raise ShapeError(f"{argument}: expected {n} numbers along the first axis, got shape {numbers.shape}")

@@ -20,16 +20,16 @@ from .parameters import aligned
 if TYPE_CHECKING:
     from ..base.literals import ContactWay
 
-#: Arguments with components along their first axis.
+#: The arguments whose first axis has the components of a vector.
 VECTORS = ("normal", "centre")
 
 WAYS: tuple[ContactWay, ...] = ("safe", "restitution", "flip", "spring")
 
 
 class Surface(Immutable, ValueEquality, ABC):
-    """A plane or a sphere that points meet; see ``Floor`` and ``Sphere``."""
+    """The base class of surfaces that points meet: see ``Floor`` and ``Sphere``."""
 
-    #: What kind of surface it is, and the names of its arguments besides those that all have.
+    #: The kind of surface, and the names of its arguments besides those of every surface.
     kind: ClassVar[str]
     own: ClassVar[tuple[str, ...]]
 
@@ -61,19 +61,19 @@ class Surface(Immutable, ValueEquality, ABC):
 
     @abstractmethod
     def _shapes(self) -> dict[str, Shape]:
-        """The batch shapes of its own arguments."""
+        """The batch shapes of the arguments in ``own``."""
 
     @property
     @abstractmethod
     def dim(self) -> int | None:
-        """In how many dimensions it is; None if in any."""
+        """The number of its dimensions; None if it fits any."""
 
     @abstractmethod
     def place(self, dim: int) -> dict[str, Any]:
-        """Where it is, by name, in so many dimensions; vectors have their components along the first axis."""
+        """The parameters of its place by name, for so many dimensions; vectors have their components along the first axis."""
 
     def parameters(self, dim: int) -> dict[str, Any]:
-        """Its parameters by name, in so many dimensions."""
+        """Its parameters by name, for so many dimensions."""
         common: dict[str, Any] = {"way": self.way}
         if self.way == "spring":
             common["omega"] = self.omega
@@ -82,7 +82,7 @@ class Surface(Immutable, ValueEquality, ABC):
         return common | {"friction": self.friction} | self.place(dim)
 
     def member(self, one: Callable[..., Array]) -> Surface:
-        """The same for one member of a batch."""
+        """The surface for one member of a batch."""
         numbers = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         return changed(self, **{name: one(value, 1 if name in VECTORS else 0) for name, value in numbers.items()})
 
@@ -100,7 +100,7 @@ class Surface(Immutable, ValueEquality, ABC):
 class Floor(Surface):
     """A plane that points stay above: normal·y ≥ offset.
 
-    | way | what happens to a point that is behind the surface after a step | energy |
+    | way | effect on a point that is behind the surface after a step | energy |
     |---|---|---|
     | ``"safe"`` | it leaves with e² of the energy of impact, as late as it arrived; or it rests | never added |
     | ``"restitution"`` | its normal velocity becomes −e times what it was, if it points inward | may be added |
@@ -149,7 +149,7 @@ class Floor(Surface):
 
     @property
     def dim(self) -> int | None:
-        """In how many dimensions its normal is; None without one."""
+        """The number of dimensions of its normal; None without one."""
         return None if self.normal is None else len(self.normal)
 
     def place(self, dim: int) -> dict[str, Any]:
@@ -167,10 +167,10 @@ class Sphere(Surface):
         centre: shape (dim,) or (dim, *batch), in units of length.
         radius: in units of length, above zero; broadcasts over the batch.
         inside: whether points are inside.
-        restitution: as of ``Floor``, and so are the others.
-        friction: Coulomb's coefficient.
-        way: what happens.
-        omega: ω of the spring.
+        restitution: e, as of ``Floor``.
+        friction: Coulomb's coefficient, as of ``Floor``.
+        way: the way of contact, as of ``Floor``.
+        omega: ω of the spring, as of ``Floor``.
 
     Raises:
         ArgumentError: what is wrong with which argument.
@@ -204,7 +204,7 @@ class Sphere(Surface):
 
     @property
     def dim(self) -> int:
-        """In how many dimensions it is."""
+        """The number of dimensions of its centre."""
         return len(self.centre)
 
     def place(self, dim: int) -> dict[str, Any]:
@@ -217,7 +217,7 @@ MOST_DIMENSIONS = 3
 
 
 def _vector(argument: str, value: Any) -> Array:
-    """A vector, its components along the first axis."""
+    """An argument as a vector, whose components are along the first axis."""
     vector = checks.numbers(argument, value)
     if vector.ndim == 0 or not 1 <= len(vector) <= MOST_DIMENSIONS:
         raise ShapeError(
@@ -227,7 +227,7 @@ def _vector(argument: str, value: Any) -> Array:
 
 
 def _unit(vector: Array) -> Array:
-    """A vector of length 1."""
+    """The vector of length 1 in the direction of another."""
     size = np.abs(vector).max(axis=0)
     if not (size > 0.0).all():
         raise ArgumentError("normal: expected a vector with a direction, got one of length 0")
@@ -253,7 +253,7 @@ class Surfaces(Part):
         return checks.batch_shape(batches(self.surfaces))
 
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
-        """How many there are, and of each its kind, its way and its numbers."""
+        """The number of surfaces, and for each its kind, its way and its numbers."""
         parameters: dict[str, Any] = {"contacts": len(self.surfaces)}
         for i, surface in enumerate(self.surfaces):
             parameters[f"contact_{i}"] = surface.kind
@@ -262,15 +262,15 @@ class Surfaces(Part):
         return parameters
 
     def own_axes(self, name: str) -> int:
-        """One, of vectors."""
+        """One for vectors, else none."""
         return 1 if name.endswith(VECTORS) else 0
 
     def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> contact.Touching:
-        """The system whose points meet them."""
+        """The system with contact of its points."""
         return contact.Touching(s, h, contact.surfaces(h, parameters))
 
     def member(self, one: Callable[..., Array]) -> Surfaces:
-        """The same for one member of a batch."""
+        """The surfaces for one member of a batch."""
         return Surfaces(tuple(surface.member(one) for surface in self.surfaces))
 
     def repr_arguments(self) -> list[str]:
@@ -279,7 +279,7 @@ class Surfaces(Part):
 
 
 def floors(argument: Any) -> tuple[Surface, ...]:
-    """The argument ``floor``: a surface, a list of them, or None."""
+    """The surfaces of the argument ``floor``: a surface, a list of them, or None."""
     if argument is None:
         return ()
     surfaces = tuple(argument) if isinstance(argument, (list, tuple)) else (argument,)
@@ -290,15 +290,15 @@ def floors(argument: Any) -> tuple[Surface, ...]:
 
 
 def around(surfaces: tuple[Surface, ...]) -> tuple[Part, ...]:
-    """What surfaces put around a system: nothing, if there are none."""
+    """The parts around a system that surfaces make: none without surfaces."""
     return (Surfaces(surfaces),) if surfaces else ()
 
 
 def batches(surfaces: tuple[Surface, ...]) -> dict[str, Shape]:
-    """The batch shapes of surfaces, with a name for each."""
+    """The batch shapes of surfaces by their names."""
     return {f"floor {i}": surface.batch for i, surface in enumerate(surfaces)}
 
 
 def dimensions(surfaces: tuple[Surface, ...]) -> dict[str, int]:
-    """In how many dimensions surfaces are, where that is known, with a name for each."""
+    """The numbers of dimensions of surfaces by their names, without those that fit any."""
     return {f"floor {i}": surface.dim for i, surface in enumerate(surfaces) if surface.dim is not None}

@@ -1,7 +1,7 @@
 """Scenes: a system, its start, a step and, where there is one, the exact solution.
 
-A file in ``builtin/`` is a scene: its name is the scene's name, and it holds a function of that name that makes the
-scene. So ``stepwell.scenes.clover()`` is made by ``builtin/clover.py``, and nothing else needs to know of it.
+Each file in ``builtin/`` is a scene and has its name, as does the function in it that makes the scene:
+``stepwell.scenes.clover()`` is that of ``builtin/clover.py``. A new file needs no entry elsewhere.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ __all__ = ["Scene", "scene", "scenes"]
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Every scene as it is made without arguments, by name.
+    """Every scene with its default arguments, sorted by name.
 
     Example:
         >>> sw.scenes.scenes()[0]
@@ -42,9 +42,9 @@ def scene(name: str | Scene) -> Scene:
     """The scene of that name, or the scene of a file of your own.
 
     Args:
-        name: a name of ``scenes``, for its default arguments; with others behind it, ``energy_control:pair=printed,eps=0``; or a
-            Python file that defines a ``Scene``, ``my_scene.py``. If it defines several, the name of
-            the variable follows: ``my_scene.py:fast``. The file is run.
+        name: the name of a scene in ``scenes``, with its default arguments or with others, as in
+            ``energy_control:pair=printed,eps=0``; or a Python file that defines a ``Scene``, ``my_scene.py``, which is run. If it
+            defines several, the name of the variable follows: ``my_scene.py:fast``.
 
     Raises:
         DTypeError: if it is neither a scene nor a name.
@@ -67,12 +67,12 @@ def scene(name: str | Scene) -> Scene:
 
 
 def _arguments_of(name: str) -> tuple[str, ...]:
-    """The arguments that a scene of the package takes, by its name; none if there is no such scene."""
+    """The names of the arguments of a built-in scene; none if there is no scene of that name."""
     return tuple(inspect.signature(_makers()[name]).parameters) if name in _makers() else ()
 
 
 def _arguments(name: str, make: Callable[..., Scene], written: str) -> dict[str, Any]:
-    """The keyword arguments that ``pair=printed,eps=0`` stands for: numbers where possible, else words."""
+    """The keyword arguments in a text such as ``pair=printed,eps=0``: numbers where possible, else strings."""
     arguments: dict[str, Any] = {}
     for each in written.split(","):
         key, equals, value = (part.strip() for part in each.partition("="))
@@ -88,11 +88,11 @@ def _arguments(name: str, make: Callable[..., Scene], written: str) -> dict[str,
     return arguments
 
 
-#: A user's file, and a variable of it.
+#: A user's file, and the name of a variable in it.
 FILE = re.compile(r"(.+\.py)(?::(\w+))?")
 
 
-#: Modules that were made of such files.
+#: Modules that were loaded from such files.
 _LOADED: set[str] = set()
 
 
@@ -135,7 +135,7 @@ def _makers() -> dict[str, Callable[..., Scene]]:
 
 
 def _remembering(make: Callable[..., Scene]) -> Callable[..., Scene]:
-    """Wrap ``make`` so that the ``exact`` of its scenes can be pickled: it keeps the call that made it."""
+    """Wrap ``make`` so that the ``exact`` of its scenes can be pickled, as the call that made the scene."""
 
     @wraps(make)
     def remembering(*args: Any, **kwargs: Any) -> Scene:
@@ -146,7 +146,7 @@ def _remembering(make: Callable[..., Scene]) -> Callable[..., Scene]:
 
 
 class Exact:
-    """The exact solution of a scene of the package; it is pickled as the call that made the scene."""
+    """The exact solution of a built-in scene; it is pickled as the call that made the scene."""
 
     def __init__(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any], solution: table.Exact) -> None:
         self.call, self.solution = (name, args, kwargs), solution

@@ -24,12 +24,12 @@ from ..model.systems.base import a_system
 from ..runs.integration import integrate, quietly
 from ..runs.result import Run
 
-#: So many times of the horizon give the exact solution's scale. Where a block differs by more than STEEP of its largest length
-#: from one to the next, a peak may hide between: so many more are taken there, and again between those, down to SHORTEST of the
-#: horizon and up to MAX_SAMPLES in all.
+#: The scale of the exact solution is that of SCALE_SAMPLES times over the horizon. Where a block changes by more than STEEP of
+#: its largest length from one time to the next, there may be a peak between them: MORE_SAMPLES are added there, and again between
+#: those, down to an interval of SHORTEST of the horizon and up to MAX_SAMPLES in all.
 SCALE_SAMPLES, STEEP, MORE_SAMPLES, SHORTEST, MAX_SAMPLES = 1001, 0.25, 15, 1e-12, 40_000
 
-#: n steps of horizon/n end at the horizon but for two roundings, each of 2⁻⁵³ of the time.
+#: n steps of horizon/n end at the horizon up to two roundings, each of 2⁻⁵³ of the time.
 TIME_ROUNDING = 2.0**-51
 
 
@@ -214,7 +214,7 @@ class Scene(ValueEquality):
         return self.state_error_at(run.t, run.v, run.y)
 
     def state_error_at(self, t: Array, v: Array, y: Array) -> Array:
-        """The same of states at these times, wherever they come from."""
+        """The ``state_error`` of states at these times, from any source."""
         exact, known = self._solution(t)
         with np.errstate(all="ignore"):
             errors = [
@@ -237,7 +237,7 @@ class Scene(ValueEquality):
         return self.energy_error_at(run.t, run.energy)
 
     def energy_error_at(self, t: Array, energy: Array) -> Array:
-        """The same of energies at these times, wherever they come from."""
+        """The ``energy_error`` of energies at these times, from any source."""
         (true_v, true_y), known = self._solution(t)
         with np.errstate(all="ignore"):
             error = np.abs(energy - self.energies(true_v, true_y)) / self._kinetic_scale
@@ -275,7 +275,7 @@ class Scene(ValueEquality):
 
     @cached_property
     def _sampled(self) -> tuple[Array, Array]:
-        """The exact blocks at evenly spaced times, and at more where they change much from one to the next."""
+        """The exact blocks at evenly spaced times, and at more times where they change much in between."""
         t = np.linspace(0.0, self.horizon, SCALE_SAMPLES)
         states = self._solution(t)[0]
         between = np.arange(1, MORE_SAMPLES + 1) / (MORE_SAMPLES + 1)
@@ -304,7 +304,7 @@ class Scene(ValueEquality):
         return self.system.v_shape, self.system.y_shape
 
     def _solution(self, t: Array) -> tuple[tuple[Array, Array], np.ndarray[Any, np.dtype[np.bool_]]]:
-        """The exact blocks, and the times at which they are known. Later ones repeat the last known state."""
+        """The exact blocks, and a mask of the times at which they are known; at later times they are the last known state."""
         if self.exact is None:
             raise ArgumentError(f"scene: {self.name} has no exact solution, so there is no error to measure")
         blocks = self.exact(np.minimum(t, self.until))
@@ -323,7 +323,7 @@ class Scene(ValueEquality):
         return (v, y), t <= self.until * (1.0 + TIME_ROUNDING)
 
     def energies(self, v: Array, y: Array) -> Array:
-        """The energy of each of several states."""
+        """The energies of several states, whose first axis is the time."""
         with np.errstate(all="ignore"):
             return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
 
@@ -347,12 +347,12 @@ class Scene(ValueEquality):
 
 
 def quiet_run(scene: Scene, method: str | Method, dt: float | None = None, **options: Any) -> Run:
-    """The same as ``scene.run``, for what judges the run by itself: nothing is looked for in it, and nothing warned of."""
+    """A run as by ``scene.run``, without its diagnostics and warnings, for callers that judge the run themselves."""
     return quietly(scene.system, method, **scene.options_of_run(dt=dt, **options))
 
 
 def _relative(length: Array, scale: float) -> Array:
-    """Lengths divided by a scale. Where that is zero, as of an empty block, zero stays zero and others are infinite."""
+    """Lengths divided by a scale. If that is zero, as for an empty block, zero stays zero and other lengths become infinite."""
     return length / scale if scale else np.where(length == 0.0, 0.0, np.inf)
 
 

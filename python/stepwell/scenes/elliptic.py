@@ -1,4 +1,4 @@
-"""Jacobi's elliptic functions, by which pendulums and tops are known."""
+"""Jacobi's elliptic functions, for the exact solutions of pendulums and tops."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from ..base.arrays import Array
 
-#: The arithmetic-geometric mean doubles its digits with every step; this many are enough for any amplitude that a float can tell
-#: from 180°.
+#: The most iterations of the arithmetic-geometric mean, which doubles its digits with each: enough for any amplitude that is not
+#: 180° as a float.
 MAX_ITERATIONS = 40
 
 
@@ -25,7 +25,7 @@ def elliptic(u: Array, modulus: float, complement: float) -> tuple[Array, Array,
     for n in range(len(a) - 1, 0, -1):
         angle = 0.5 * (angle + np.arcsin(np.clip(c[n] / a[n] * np.sin(angle), -1.0, 1.0)))
     sn, cn = np.sin(angle), np.cos(angle)
-    # 1 − k²·sn², as a sum of what is not negative.
+    # 1 − k²·sn², as a sum of terms that are not negative.
     return sn, cn, np.sqrt(complement * complement + modulus * modulus * cn * cn)
 
 

@@ -1,4 +1,4 @@
-"""The free rigid body of three different moments: ω by Jacobi's functions, and the attitude by one more sum."""
+"""The free rigid body of three different moments: ω by Jacobi's functions, the attitude by a Fourier series."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from ..base.immutable import ValueEquality
 from ..model import quaternion
 from .elliptic import elliptic, quarter
 
-#: The series of the turn about the angular momentum ends where its terms are this small beside the first.
+#: The series of the turn about the angular momentum ends where its terms, relative to the first, are below this.
 NEGLIGIBLE = 1e-18
 
-#: It is sampled at this many points of a period at first and at most.
+#: The number of points of a period at which it is sampled, at first and at most.
 SAMPLES, MOST_SAMPLES = 128, 1 << 16
 
 
 class FreeTop(ValueEquality):
-    """Both blocks of a free body as functions of time, from its start at t = 0, but for rounding.
+    """Both blocks of a free body as functions of time, from its start at t = 0, exact but for rounding.
 
-    ω is by Jacobi's functions (Landau and Lifshitz, Mechanics, § 37). The angular momentum stands still in space, and its
-    direction ℓ = J·ω/|L| in the body is known with ω; what is missing of the attitude is a turn χ about it. With B the shortest
+    ω follows from Jacobi's functions (Landau and Lifshitz, Mechanics, § 37). The angular momentum is fixed in space, and its
+    direction ℓ = J·ω/|L| in the body follows from ω, so all of the attitude is known but a turn χ about it. With B the shortest
     turn that takes ℓ to the third axis, χ̇ = ω₃ + (ℓ₁ω₁ + ℓ₂ω₂)/(1 + ℓ₃). That is periodic and smooth, so the integral of its
     Fourier series is exact but for rounding.
 
@@ -39,11 +39,11 @@ class FreeTop(ValueEquality):
     def __init__(self, inertia: tuple[float, float, float], v: tuple[float, ...], q: tuple[float, ...]) -> None:
         self.inertia, self.v, self.q = inertia, v, q
         low, middle, high = inertia
-        # L² − 2E·J₂ tells about which axis ℓ goes: that of the largest moment if it is positive, else that of the smallest.
+        # ℓ goes about the axis of the largest moment if L² − 2E·J₂ is positive, else about that of the smallest.
         excess = low * v[0] ** 2 * (low - middle) + high * v[2] ** 2 * (high - middle)
         if excess == 0.0:
             raise ValueError("the motion has no period")
-        self.turn = np.array([1.0, 0.0, 0.0, 0.0])  # from body axes to axes of which the third is the one that ℓ goes about
+        self.turn = np.array([1.0, 0.0, 0.0, 0.0])  # from body axes to axes whose third is the one that ℓ goes about
         axes = np.eye(3)
         if excess < 0.0:  # the axes 1 and 3 change places, and all change their signs
             self.turn = np.array([0.0, math.sqrt(0.5), 0.0, -math.sqrt(0.5)])
@@ -54,7 +54,7 @@ class FreeTop(ValueEquality):
         self.axes = axes
         a, b, c = self.moments = np.abs(axes) @ np.array(inertia)
         w = axes @ v
-        from_c = a * w[0] ** 2 * (c - a) + b * w[1] ** 2 * (c - b)  # 2E·c − L², as a sum of what has one sign
+        from_c = a * w[0] ** 2 * (c - a) + b * w[1] ** 2 * (c - b)  # 2E·c − L², as a sum of terms of one sign
         from_a = b * w[1] ** 2 * (b - a) + c * w[2] ** 2 * (c - a)  # L² − 2E·a
         self.sizes = np.sqrt([from_c / (a * (c - a)), from_c / (b * (c - b)), from_a / (c * (c - a))])
         self.sizes[1] *= math.copysign(1.0, c - a)  # with descending moments the motion runs the other way round
@@ -70,7 +70,7 @@ class FreeTop(ValueEquality):
 
     @property
     def period(self) -> float:
-        """The time after which ω comes back."""
+        """The period of ω."""
         return 4.0 * self.quarter / self.rate
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
@@ -125,7 +125,7 @@ class FreeTop(ValueEquality):
 
 
 def _inverse(q: Array) -> Array:
-    """The turn back."""
+    """The inverse of a turn."""
     return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
 
 

@@ -1,4 +1,4 @@
-"""Arguments of scenes whose squares and quotients must be numbers."""
+"""Checks of scenes' arguments whose squares and quotients must be finite."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def within(argument: str, value: Any, least: float, most: float, unit: str = "")
     return checked
 
 
-#: The smallest and the largest of numbers above zero whose squares, quotients and products must be numbers above zero.
+#: The range of numbers whose squares, quotients and products are finite and above zero.
 SMALLEST, LARGEST = 1e-100, 1e100
 
 

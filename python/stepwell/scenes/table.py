@@ -1,4 +1,4 @@
-"""A motion that takes long to compute, from a table."""
+"""A table of an exact solution that takes long to compute."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from ..base.immutable import ValueEquality
 
 Exact = Callable[[Array], tuple[Array, Array]]
 
-#: Intervals of the table at first, and at most.
+#: The number of intervals at first, and the most in all.
 FIRST_INTERVALS, MAX_INTERVALS = 200, 20_000
 
-#: Chebyshev nodes of the interpolation in an interval, and points between some of them at which it is checked. Four will do, for
-#: the error of a polynomial through such nodes is alike between all of them; each time that is asked for costs a step of the run.
+#: The Chebyshev nodes of the interpolation in an interval, and points between nodes at which it is checked. Four suffice, because
+#: the error of a polynomial through such nodes is similar between all of them, and each point costs a step of the run.
 NODES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 14))
 CHECK_POINTS = (0.5 * (NODES[1:] + NODES[:-1]))[[0, 4, 8, 12]]
 
-#: Of each node the product of its distances to the others.
+#: For each node the product of its distances to the others.
 NODE_PRODUCTS = [float(np.prod(node - np.delete(NODES, j))) for j, node in enumerate(NODES)]
 
 
 def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float) -> Exact:
-    """A faster function that is the same within ``close``, in the scales, up to a time: by a polynomial over each interval.
+    """A faster function, by a polynomial over each interval, that differs by at most ``close`` times the scales up to a time.
 
-    Intervals are halved until that is so; where it would take too many, it is the same function.
+    Intervals are halved until that holds; if it takes too many, the function itself is returned.
     """
     begins, length, number = np.linspace(0.0, until, FIRST_INTERVALS, endpoint=False), until / FIRST_INTERVALS, 0
     good: list[tuple[Array, Array, Array, Array]] = []
@@ -34,7 +34,7 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
         number += len(begins)
         if number > MAX_INTERVALS:
             return exact
-        # At the nodes and between them, to see how good it is.
+        # At the nodes, and between them for the check.
         times = begins[:, np.newaxis] + length * np.concatenate([NODES, CHECK_POINTS])
         blocks = [block.reshape(*times.shape, *block.shape[1:]) for block in exact(np.minimum(times, until).ravel())]
         close_enough = np.ones(len(begins), dtype=bool)
@@ -49,20 +49,20 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
     starts, lengths, v, y = (np.concatenate(each) for each in zip(*good, strict=True))
     order = np.argsort(starts)
     starts, lengths = starts[order], lengths[order]
-    # For each node the numbers of a state as rows, since operations on long rows are the fastest.
+    # The numbers of a state are rows for each node, because operations on long rows are the fastest.
     tables = [np.ascontiguousarray(block[order].reshape(*block.shape[:2], -1).transpose(1, 2, 0)) for block in (v, y)]
 
     return Table(starts, lengths, tables, [block.shape[2:] for block in (v, y)])
 
 
 class Table(ValueEquality):
-    """A motion from a table: a polynomial over each interval.
+    """A motion by a table: a polynomial over each interval.
 
     Args:
-        starts: where the intervals begin, ascending.
-        lengths: how long they are.
-        tables: of v and of y, shape (nodes, numbers of the block, intervals).
-        shapes: of the blocks.
+        starts: the times at which the intervals begin, ascending.
+        lengths: their lengths.
+        tables: the values of v and of y at the nodes, shape (nodes, numbers of the block, intervals).
+        shapes: the shapes of the blocks.
     """
 
     def __init__(self, starts: Array, lengths: Array, tables: list[Array], shapes: list[Shape]) -> None:

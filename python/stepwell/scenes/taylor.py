@@ -1,6 +1,6 @@
-"""Orbits of bodies to more digits than a float holds, by Taylor series in decimal numbers.
+"""Orbits of bodies to more digits than a float has, by Taylor series in decimal numbers.
 
-For scenes without a formula for their solution. Python's ``decimal`` gives the same digits everywhere and needs no library.
+They are for scenes whose solution has no formula. Python's ``decimal`` gives the same digits everywhere and needs no library.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..errors import ArgumentError
 
-#: Digits of every number, the error of a step that is aimed at, relative to the state, and the terms of the series.
+#: The digits of every number, the tolerance of a step relative to the state, and the terms of the series.
 DIGITS = 40
 TOLERANCE = 1e-30
 TERMS = 32
@@ -27,16 +27,16 @@ Series = list[Decimal]
 class Orbit:
     """The orbit of bodies under Newton's law, as a function of time.
 
-    The series of every step is kept, so that a time within it costs a polynomial. Steps are made when a time behind the
-    last one is asked for, and never twice. The series of a power is by the usual recurrence (Moore, *Interval Analysis*,
-    1966), the step by the last two terms (Jorba and Zou, *Experimental Mathematics* 14, 2005).
+    The series of every step is stored, so that a time within a step costs one polynomial. A call with a time after the last step
+    makes further steps. The series of a power follows from the usual recurrence (Moore, *Interval Analysis*, 1966), the step
+    from the last two terms (Jorba and Zou, *Experimental Mathematics* 14, 2005).
 
     Args:
         masses: one for each body, G = 1.
         v: velocities at t = 0, shape (bodies, dim).
         y: places at t = 0, likewise.
-        period: if the motion repeats itself, in units of time; times are then folded into one period.
-        tolerance: error of a step that is aimed at, relative to the state.
+        period: the period of a periodic motion, in units of time; times are then folded into one period.
+        tolerance: the tolerance of a step, relative to the state.
     """
 
     def __init__(
@@ -47,16 +47,17 @@ class Orbit:
         self.tolerance = tolerance
         self.shape = y.shape
         self._state = [[Decimal(x) for x in block.ravel().tolist()] for block in (v, y)]
-        #: Where each step begins, and where the last one ends. They are floats, so that a float's place in a step is exact.
+        #: The times at which each step begins, and that at which the last one ends. They are floats, so that the place of a
+        #: float within a step is exact.
         self._times = [0.0]
-        #: The terms of each step at its end, shape (terms, 2, bodies·dim): for a time within, they are scaled down.
+        #: The terms of each step at its end, shape (terms, 2, bodies·dim); for a time within the step they are scaled down.
         self._terms: list[Array] = []
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
         """Velocities and places at times of shape (n,): two arrays of shape (n, bodies, dim).
 
         Raises:
-            ArgumentError: if a time is before the start, but for less than the first step.
+            ArgumentError: if a time is before the start by more than the first step.
         """
         t = np.asarray(t, dtype=np.float64)
         if self.period is not None:
@@ -120,13 +121,13 @@ class Orbit:
 
 
 class TurningOrbit(Orbit):
-    """The orbit of a body without mass around two that circle each other, in the frame that turns with them, likewise.
+    """The orbit of a body without mass around two that circle each other, in the frame that turns with them; see ``Orbit``.
 
     Args:
         mu: the light body's share of the mass; it stands at (1 − μ, 0), the heavy one at (−μ, 0).
         v: velocity at t = 0, shape (2,).
         y: place at t = 0, likewise.
-        tolerance: error of a step that is aimed at, relative to the state.
+        tolerance: the tolerance of a step, relative to the state.
     """
 
     def __init__(self, mu: float, v: Array, y: Array, tolerance: float = TOLERANCE) -> None:
@@ -174,7 +175,7 @@ class _Pair:
         if k == 0:
             self.cube.append(1 / (first * first.sqrt()))
         else:
-            # From s·u̇ = p·ṡ·u for u = s^p, p = −3/2; twice everything, so that the factors are whole: 2·k + n of s_n·u_(k − n).
+            # From s·u̇ = p·ṡ·u for u = s^p, p = −3/2, all doubled so that the factors are whole: 2·k + n for s_n·u_(k − n).
             back = self.cube[::-1]
             plain, sloped = (sum(map(mul, series[1:], back), Decimal(0)) for series in (self.square, self.slope))
             self.cube.append(-((k + k) * plain + sloped) / (2 * k * first))
@@ -193,7 +194,7 @@ def _square(a: Series, k: int) -> Decimal:
 
 
 def _radius(v: list[Series], y: list[Series], k: int, tolerance: float) -> float:
-    """The step at which term k of each block is small enough, relative to the block."""
+    """The longest step with which term k of each block, relative to the block, is within the tolerance."""
     steps = []
     for block in (v, y):
         scale = max(float(abs(series[0])) for series in block) or 1.0

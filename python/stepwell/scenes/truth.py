@@ -1,4 +1,4 @@
-"""The reference solution of a scene without a formula: a run to a tight tolerance, as long as a less tight one agrees with it."""
+"""The reference solution of a scene without a formula: a run to a tight tolerance, valid while a check run agrees with it."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from ..runs.integration import quietly
 from ..runs.result import Run
 from .base import Scene
 
-#: The method of the reference solution, its tolerance, and that of the run which checks it. A part of it that stops early is made
-#: with so many times its tolerance: from rest no step is short enough for a tight one to meet the onset of a force.
+#: The method of the reference solution, its tolerance, and that of the check run. A part that stops early is repeated with these
+#: multiples of its tolerance: from rest, no step is short enough to meet a tight one at the onset of a force.
 METHOD, TIGHT_TOLERANCE, CHECK_TOLERANCE, LOOSER = "dop853", 1e-14, 1e-13, (1e2, 1e4)
 
-#: The two agree where their difference, relative to the blocks' largest lengths, is below this: a thousandth of the least error
-#: that a chart of such a scene shows. Except for rounding, the reference is ten times as accurate as the run that checks it.
+#: The two runs agree where their difference, relative to the blocks' largest lengths, is below this: a thousandth of the least
+#: error that a chart of such a scene shows. Except for rounding, the reference is ten times as accurate as the check run.
 MAX_DIFFERENCE = 1e-8
 
-#: Steps are held short, so that what acts for a moment is not stepped over: to a power of two of at most this share of the
-#: horizon, so that a horizon that is a little longer leaves the run as it is, and of the check to this part of it. A step looks
-#: at a dozen times within it, so both runs see what lasts for two steps of the reference. The two lengths are in no simple ratio,
-#: so the runs do not check the same times: what only one of them sees is where they disagree, which ends what is known.
+#: The longest step of the reference is a power of two of at most this share of the horizon, so that no short pulse is missed, and
+#: that a slightly longer horizon does not change the run; that of the check run is this part of it. A step evaluates rates at a
+#: dozen times, so both runs see a pulse that lasts for two steps of the reference. The two lengths are in no simple ratio, so the
+#: runs evaluate different times: where only one sees a shorter pulse, they disagree, and the solution is unknown from there on.
 LONGEST_STEP, PART_OF_CHECK = 1e-3, 1.0 / 1.618
 
-#: Times at which they are compared, and from how many of them the reference can be continued.
+#: The number of times at which the runs are compared, and of those from which the reference can be continued.
 SAMPLES, RESTARTS = 400, 20
 
-#: The most steps of such a run, including rejected ones. Beyond the time that they reach, the solution is unknown.
+#: The most steps of such a run, including rejected ones. After the time that they reach, the solution is unknown.
 MAX_STEPS = 2_000_000
 
 
@@ -42,8 +42,8 @@ class Tight:
     """The run of a scene to a tight tolerance, as a function of time; it does not depend on the times of earlier calls.
 
     Args:
-        scene: what moves; its control is left out.
-        tolerance: of the run.
+        scene: the scene, whose control is left out.
+        tolerance: the tolerance of the run.
         part: its longest step, as a part of that of the reference.
     """
 
@@ -78,13 +78,13 @@ class Tight:
         return v, y
 
     def _place(self, time: float, state: tuple[Array, Array], on: dict[str, Any] | None) -> None:
-        """Add a place from which to continue: by the run's own continuation, or from the state alone."""
+        """Add a place from which to continue: by resuming the run, or from the state alone."""
         if on is None:
             on = {"resume": self._run(np.array([time]), self._fresh(time, state, self.tolerance))}
         self._places.append((time, state, on))
 
     def _fresh(self, time: float, state: tuple[Array, Array], tolerance: float) -> dict[str, Any]:
-        """Arguments of a run that starts from this state."""
+        """The arguments of a run that starts from this state."""
         return {"v": state[0], "y": state[1], "t0": time, "tolerance": tolerance} | self._options
 
     def _part(self, at: Array, i: int) -> tuple[Run, bool]:
@@ -117,19 +117,19 @@ class Tight:
 
 
 def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
-    """The scene with an ``exact`` solution: its own, or else a tight run, known as long as a less tight one agrees.
+    """The scene with an ``exact`` solution: its own, or else a tight run, valid while a check run agrees.
 
     Args:
-        scene: any.
-        agrees: the largest difference of the two runs up to which the motion counts as known, in the blocks' largest lengths so
-            far.
+        scene: a scene.
+        agrees: the largest difference of the two runs with which the motion counts as known, relative to the blocks' largest
+            lengths so far.
 
     Returns:
-        A scene whose ``exact`` and ``until`` are set. A scene that has an exact solution is returned as it is. The true motion is
+        A scene whose ``exact`` and ``until`` are set. A scene that has an exact solution is returned as it is. The solution is
         that without a control.
 
     Raises:
-        ArgumentError: if it has no exact solution, and adaptive steps do not go with its system.
+        ArgumentError: if the scene has no exact solution, and its system does not go with adaptive steps.
     """
     if scene.exact is not None:
         return scene
@@ -154,7 +154,7 @@ def _agreeing(run: tuple[Array, Array], check: tuple[Array, Array], agrees: floa
         axes = tuple(range(1, a.ndim))
         with np.errstate(all="ignore"):
             apart, length = (np.sqrt((x * x).sum(axis=axes)) for x in (a - b, a))
-            # Up to the next time, for what sets in at one of them has no length there but roundings of that time.
+            # The largest length up to the next time: a motion that sets in at a time has only the length of roundings there.
             longest = np.fmax.accumulate(np.append(length, length[-1]))[1:]
             known &= apart <= agrees * longest
     return known

@@ -1,9 +1,9 @@
 """Your own equations: a function in NumPy style becomes a system.
 
-| file | what it is |
+| file | contents |
 |---|---|
 | ``definition.py`` | ``stepwell.system``, and the definition that it returns |
-| ``trace.py`` | runs the function, with symbols or with the numbers of a batch |
+| ``trace.py`` | running the function, with symbols or with the numbers of a batch |
 | ``values.py`` | its arguments: scalars, arrays, comparisons |
 | ``arrays.py`` | NumPy's functions for these |
 | ``namespace.py`` | the names ``np`` and ``math`` within the function |

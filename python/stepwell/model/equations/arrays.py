@@ -1,4 +1,4 @@
-"""NumPy's functions for the values with which a user's function is run."""
+"""NumPy's functions for the scalars and arrays with which a user's function is run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .values import (
     wrapped,
 )
 
-#: Functions of numbers, element by element, by NumPy's names.
+#: Functions of numbers, which apply element by element, by NumPy's names.
 _OWN = (
     "sin cos tan arcsin arccos arctan arctan2 sinh cosh tanh exp exp2 expm1 log log2 "
     "log10 log1p sqrt cbrt hypot power square sign copysign floor ceil trunc round mod minimum maximum deg2rad rad2deg"
@@ -70,34 +70,34 @@ QUICK_SINES: ContextVar[bool] = ContextVar("quick_sines", default=False)
 _QUICK = {"sin": trig.sin, "cos": trig.cos}
 
 
-def elementwise_named(name: str, *given: Any) -> Any:
-    """A function of numbers by NumPy's name."""
+def elementwise_named(name: str, *arguments: Any) -> Any:
+    """The result of a function of numbers, by NumPy's name."""
     if name in _QUICK and QUICK_SINES.get():
-        return elementwise(name, _QUICK[name], *given)
+        return elementwise(name, _QUICK[name], *arguments)
     if name in COMPARISONS:
-        return compared(name, *given)
+        return compared(name, *arguments)
     if name in ("divide", "true_divide"):
-        return folded(operator.truediv, map(_as_operand, given))
+        return folded(operator.truediv, map(_as_operand, arguments))
     if name == "floor_divide":
-        return folded(operator.floordiv, map(_as_operand, given))
+        return folded(operator.floordiv, map(_as_operand, arguments))
     if name == "reciprocal":
-        return 1.0 / _as_operand(given[0])
+        return 1.0 / _as_operand(arguments[0])
     if name in ("logical_and", "bitwise_and"):
-        return folded(operator.and_, given)
+        return folded(operator.and_, arguments)
     if name in ("logical_or", "bitwise_or"):
-        return folded(operator.or_, given)
+        return folded(operator.or_, arguments)
     if name in ("logical_not", "invert"):
-        return ~given[0]
+        return ~arguments[0]
     if name == "matmul":
-        return matmul(*given)
+        return matmul(*arguments)
     if name not in ELEMENTWISE:
         raise unknown(name)
-    return elementwise(name, ELEMENTWISE[name], *given)
+    return elementwise(name, ELEMENTWISE[name], *arguments)
 
 
 def unknown(name: str) -> TraceError:
-    """Raise the error for a function that does not exist."""
-    import difflib  # a mistake may take its time
+    """The error for a function that own equations do not have; its message names the nearest ones."""
+    import difflib  # needed for errors only
 
     known = sorted({*ELEMENTWISE, *FUNCTIONS, *(each.__name__ for each in MOVING)})
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.5) or ["sin", "exp", "where", "sum", "dot"]
@@ -111,7 +111,7 @@ def _as_operand(x: Any) -> Any:
     return x if isinstance(x, Operators) else array(x) if np.ndim(x) else Scalar(float(x))
 
 
-def ufunc_of(ufunc: Any, method: str, given: Any, options: Any) -> Any:
+def ufunc_of(ufunc: Any, method: str, arguments: Any, options: Any) -> Any:
     """The result of an element-by-element function of NumPy."""
     if options:
         raise TraceError(
@@ -119,22 +119,22 @@ def ufunc_of(ufunc: Any, method: str, given: Any, options: Any) -> Any:
         )
     if method != "__call__":
         raise TraceError(f"np.{ufunc.__name__}.{method} is not known to own equations; write np.sum, np.prod or a loop")
-    return elementwise_named(ufunc.__name__, *given)
+    return elementwise_named(ufunc.__name__, *arguments)
 
 
-def function_of(function: Any, given: Any, options: Any) -> Any:
+def function_of(function: Any, arguments: Any, options: Any) -> Any:
     """The result of another function of NumPy."""
     name = getattr(function, "__name__", str(function))
     if function in MOVING:
-        return _moved(function, given, options)
+        return _moved(function, arguments, options)
     if name in ELEMENTWISE and not options:
-        return elementwise_named(name, *given)
+        return elementwise_named(name, *arguments)
     if name not in FUNCTIONS:
         raise unknown(name)
     try:
-        if name in _OF_ARRAYS and isinstance(given[0], Scalar):
+        if name in _OF_ARRAYS and isinstance(arguments[0], Scalar):
             raise of_shape(f"np.{name}: expected an array, got one number")
-        return FUNCTIONS[name](*given, **options)
+        return FUNCTIONS[name](*arguments, **options)
     except TypeError as error:
         raise TraceError(f"np.{name}: {error}") from None
 
@@ -143,8 +143,8 @@ def function_of(function: Any, given: Any, options: Any) -> Any:
 _WIDENING = {np.atleast_1d, np.atleast_2d, np.broadcast_to, np.expand_dims, np.repeat, np.tile}
 
 
-def _moved(function: Any, given: Any, options: Any) -> Any:
-    if given and isinstance(given[0], Scalar) and function not in _WIDENING:
+def _moved(function: Any, arguments: Any, options: Any) -> Any:
+    if arguments and isinstance(arguments[0], Scalar) and function not in _WIDENING:
         raise of_shape(f"np.{function.__name__}: expected an array, got one number")
 
     def plain(x: Any) -> Any:
@@ -154,12 +154,12 @@ def _moved(function: Any, given: Any, options: Any) -> Any:
             return type(x)(map(plain, x))
         return x
 
-    made = function(*map(plain, given), **options)
-    return [wrapped(each) for each in made] if isinstance(made, list) else wrapped(made)
+    result = function(*map(plain, arguments), **options)
+    return [wrapped(each) for each in result] if isinstance(result, list) else wrapped(result)
 
 
 def reduced(name: str, function: Callable[[Any, Any], Any], x: Any, axis: Any, keepdims: bool) -> Any:
-    """A function over the elements along an axis, or several, or all, from the first to the last."""
+    """The elements along an axis, several axes or all, combined by a function of two from the first to the last."""
     if isinstance(x, Scalar):
         raise of_shape(f"np.{name}: expected an array, got one number")
     items = array(x).items
@@ -169,10 +169,10 @@ def reduced(name: str, function: Callable[[Any, Any], Any], x: Any, axis: Any, k
     if 0 in items.shape:
         raise TraceError(f"np.{name}: expected at least one element, got shape {items.shape}")
     rows = items.transpose(*axes, *rest).reshape(-1, *shape)
-    made = folded(function, (wrapped(row) for row in rows))
+    result = folded(function, (wrapped(row) for row in rows))
     if not keepdims:
-        return made
-    return wrapped(objects(made).reshape([1 if each in axes else items.shape[each] for each in range(items.ndim)]))
+        return result
+    return wrapped(objects(result).reshape([1 if each in axes else items.shape[each] for each in range(items.ndim)]))
 
 
 def _axis(name: str, axis: int, axes: int) -> int:
@@ -194,10 +194,10 @@ def where(condition: Any, a: Any = None, b: Any = None) -> Any:
     """One of two values, element by element, chosen by a comparison."""
     if a is None or b is None:
         raise TraceError("np.where: expected a condition and two values, of which one is taken")
-    given = [objects(each) for each in (condition, a, b)]
-    if any(each.ndim for each in given):
-        return wrapped(np.frompyfunc(where, 3, 1)(*given))
-    truth, yes, no = (each[()] for each in given)
+    items = [objects(each) for each in (condition, a, b)]
+    if any(each.ndim for each in items):
+        return wrapped(np.frompyfunc(where, 3, 1)(*items))
+    truth, yes, no = (each[()] for each in items)
     if not isinstance(truth, (Truth, bool, np.bool_)):
         raise TraceError("np.where: expected a comparison such as y > 0 as the condition, got a number; write y != 0")
     if not isinstance(truth, Truth) or isinstance(truth.value, bool):
@@ -213,7 +213,7 @@ def clip(a: Any, a_min: Any = None, a_max: Any = None, *, min: Any = None, max: 
     return a if most is None else elementwise("minimum", functions.minimum, a, most)
 
 
-#: The most products of a matrix that are traced, in a second or two.
+#: The most products of a matrix that are traced; so many take a second or two.
 MOST_PRODUCTS = 1_000_000
 
 
@@ -238,17 +238,17 @@ def matmul(a: Any, b: Any) -> Any:
             f"@: shapes {left.shape} and {right.shape} make {products} products, which are written out one by one; up to "
             f"{MOST_PRODUCTS} can be traced. A linear system as large as that is sw.LinearSystem"
         )
-    made = np.empty((len(rows), len(columns)), dtype=object)
-    # Of plain values, which are a tenth of the work of scalars.
-    of_rows, of_columns = ([[value_of(each) for each in part] for part in parts] for parts in (rows, columns))
-    for i, row in enumerate(of_rows):
-        for j, column in enumerate(of_columns):
-            made[i, j] = Scalar(folded(operator.add, map(operator.mul, row, column)))
-    return wrapped(made.reshape([n for n, items in ((len(rows), left), (len(columns), right)) if items.ndim == 2]))
+    sums = np.empty((len(rows), len(columns)), dtype=object)
+    # Plain values take a tenth of the time of scalars.
+    row_values, column_values = ([[value_of(each) for each in part] for part in parts] for parts in (rows, columns))
+    for i, row in enumerate(row_values):
+        for j, column in enumerate(column_values):
+            sums[i, j] = Scalar(folded(operator.add, map(operator.mul, row, column)))
+    return wrapped(sums.reshape([n for n, items in ((len(rows), left), (len(columns), right)) if items.ndim == 2]))
 
 
 def cross(a: Any, b: Any) -> Any:
-    """As ``np.cross`` of vectors in space, or in the plane, where it is one number; along the last axis."""
+    """As ``np.cross`` of vectors along the last axis, in space or in the plane, where the product is one number."""
     a, b = array(a), array(b)
     sizes = a.shape[-1], b.shape[-1]
     if sizes == (2, 2):
@@ -262,7 +262,7 @@ def cross(a: Any, b: Any) -> Any:
 
 
 def outer(a: Any, b: Any) -> Any:
-    """Products of all elements of one with all of the other."""
+    """The products of each element of one array with each of the other."""
     return array(a).ravel().reshape(-1, 1) * array(b).ravel().reshape(1, -1)
 
 
@@ -286,7 +286,7 @@ def diff(a: Any, n: int = 1, axis: int = -1) -> Any:
 
 
 def cumsum(a: Any, axis: Any = None) -> Any:
-    """Sums from the first element to each."""
+    """The sums from the first element to each."""
     items = np.moveaxis(array(a).items, axis, 0) if axis is not None else array(a).items.reshape(-1)
     rows = [wrapped(items[0])]
     for row in items[1:]:
@@ -294,12 +294,12 @@ def cumsum(a: Any, axis: Any = None) -> Any:
     return np.moveaxis(np.stack(rows), 0, axis or 0) if array(rows[0] if rows else a).ndim else np.stack(rows)
 
 
-#: The most points of a table that is written out; each makes four operations.
+#: The most points of a table; each makes four operations of a step.
 MOST_POINTS = 256
 
 
 def interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Any:
-    """As ``np.interp``: straight lines between the points of a table whose places are known."""
+    """As ``np.interp``: straight lines between the points of a table whose ``xp`` are known numbers."""
     if period is not None:
         raise TraceError("np.interp: period= is not known to own equations; write np.mod(x, period)")
     places = objects(xp)
@@ -317,8 +317,8 @@ def interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period
         raise TraceError("np.interp: expected places xp that ascend")
     if len(at) > MOST_POINTS:
         raise TraceError(
-            f"np.interp: a table of {len(at)} points is too long to be written out, of more than {MOST_POINTS}; of the time, "
-            f"give it as a parameter: sw.Sampled(values, interval, start, interpolation='linear')"
+            f"np.interp: expected a table of at most {MOST_POINTS} points, each of which makes operations of a step, got "
+            f"{len(at)}; a table of the time is a parameter: sw.Sampled(values, interval, start, interpolation='linear')"
         )
     return elementwise(
         "interp", lambda x: _on_lines(x, at, [value_of(each) for each in values], value_of(left), value_of(right)), x
@@ -342,17 +342,17 @@ def _on_lines(x: Any, at: Any, values: list[Any], left: Any, right: Any) -> Any:
 
 
 def zeros_like(a: Any, dtype: Any = None) -> Any:
-    """As many zeros as there are elements; nothing can be written to them."""
+    """An array of zeros of the same shape; nothing can be written to it."""
     return np.zeros(np.shape(objects(a)))
 
 
 def ones_like(a: Any, dtype: Any = None) -> Any:
-    """As many ones as there are elements."""
+    """An array of ones of the same shape."""
     return np.ones(np.shape(objects(a)))
 
 
 def full_like(a: Any, fill_value: Any, dtype: Any = None) -> Any:
-    """As many of one value as there are elements."""
+    """An array of one value, of the same shape."""
     return wrapped(np.broadcast_to(objects(fill_value), np.shape(objects(a))))
 
 
@@ -380,13 +380,13 @@ FUNCTIONS: dict[str, Any] = {
     "real": lambda a: a,
     "trace": lambda a: reduced("sum", operator.add, np.diagonal(a), None, False),
 } | {name: _reduction(name) for name in ("sum", "prod", "mean", "min", "max", "all", "any")}
-#: Functions that in NumPy also accept a number, and here arrays alone.
+#: Functions that accept arrays only; NumPy's accept a number, too.
 _OF_ARRAYS = {"inner", "vdot", "outer", "diff", "cumsum", "size", "trace", "amin", "amax"}
 FUNCTIONS |= {"amin": FUNCTIONS["min"], "amax": FUNCTIONS["max"]}
 
 
 def names() -> list[str]:
-    """All functions of NumPy that own equations know, by name."""
+    """The names of NumPy's functions that own equations may use."""
     moving = {each.__name__ for each in MOVING}
     return sorted(
         {*ELEMENTWISE, *FUNCTIONS, *COMPARISONS, *moving, "divide", "matmul", "logical_and", "logical_or", "logical_not"}

@@ -17,23 +17,23 @@ from ...errors import ArgumentError, DTypeError, UnknownNameError
 from ..inputs import Sampled, Sinusoid
 from .invariants import Invariant, invariant
 
-#: What the error of an adaptive step is relative to.
+#: The numbers whose size the error of an adaptive step is relative to.
 Scale = Literal["component", "row", "block"]
 SCALES = get_args(Scale)
 
 
 class Definition:
-    """A kind of system, defined by a function; ``stepwell.system`` returns it. Called with parameters it gives a ``System``.
+    """A kind of system, defined by a function; ``stepwell.system`` returns it. Called with parameters, it returns a ``System``.
 
     Attributes:
         function: the function.
         order: 1 for ẏ, 2 for v̇ with ẏ = v.
-        blocks: 2 if the function gives (v̇, ẏ).
-        shape: the declared shapes of the blocks v and y; None where the state tells.
+        blocks: 2 if the function returns (v̇, ẏ).
+        shape: the declared shapes of the blocks v and y; None for one that is taken from the state.
         quick_sines: whether sine and cosine are those of the built-in systems.
         scale: what the error of an adaptive step is relative to: each "component", "row" or "block".
         parameters: names and defaults.
-        own_axes: how many axes of its own each parameter has, as its default does.
+        own_axes: how many axes of its own each parameter has: as many as its default.
         invariants: the declared invariants, by name.
     """
 
@@ -60,21 +60,21 @@ class Definition:
         """Whether the function takes v."""
         return self.order == 2 or self.blocks == 2
 
-    def __call__(self, /, **given: Any) -> Any:
-        """The system with these parameters; others have their defaults.
+    def __call__(self, /, **values: Any) -> Any:
+        """The system with these parameters; the others have their defaults.
 
         Args:
-            given: by name: a number, an array over the batch (whose axes come after the parameter's own, if the default has
-                some), a ``Sinusoid``, a ``Sampled``, or a function of the time in NumPy style.
+            **values: parameters by name, each a number, an array over the batch (whose axes come after the parameter's own, if
+                the default has some), a ``Sinusoid``, a ``Sampled``, or a function of the time in NumPy style.
 
         Raises:
             ArgumentError: if there is no such parameter, or a value is not a finite number.
         """
-        for name in given:
+        for name in values:
             if name not in self.parameters:
                 known = ", ".join(self.parameters) or "none"
                 raise UnknownNameError(f"{self.name}: there is no parameter {checks.short(name)}. Known: {known}.")
-        return registry.task("own_system")(self, {**self.parameters, **given})
+        return registry.task("own_system")(self, {**self.parameters, **values})
 
     def invariant(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """Declare a quantity that is constant in the exact solution; a decorator.
@@ -101,8 +101,8 @@ class Definition:
             ... def energy(v, y, *, omega):
             ...     return 0.5 * v**2 + omega**2 * (1 - np.cos(y))
         """
-        made = invariant(self.name, ("v", "y") if self.has_v else ("y",), self.parameters, function)
-        self.invariants[made.name] = made
+        declared = invariant(self.name, ("v", "y") if self.has_v else ("y",), self.parameters, function)
+        self.invariants[declared.name] = declared
         return function
 
     def __repr__(self) -> str:
@@ -115,44 +115,44 @@ class Definition:
         return self
 
     def __reduce__(self) -> Any:
-        found: Any = sys.modules.get(self.__module__)
+        definition: Any = sys.modules.get(self.__module__)
         for part in self.__qualname__.split("."):
-            found = getattr(found, part, None)
-        if found is not self:
+            definition = getattr(definition, part, None)
+        if definition is not self:
             raise ArgumentError(
                 f"{self.name}: an own system is pickled by the name of its function, so expected one at the top of a module, "
                 f"got {self.__module__}.{self.__qualname__}"
             )
-        return _found, (self.__module__, self.__qualname__)
+        return _definition, (self.__module__, self.__qualname__)
 
 
-def _found(module: str, name: str) -> Any:
-    """A definition, by reference."""
+def _definition(module: str, name: str) -> Any:
+    """The definition of that name in a module."""
     import importlib
 
-    found: Any = importlib.import_module(module)
+    definition: Any = importlib.import_module(module)
     for part in name.split("."):
-        found = getattr(found, part)
-    return found
+        definition = getattr(definition, part)
+    return definition
 
 
 def _changes(value: Any) -> bool:
-    """Whether a parameter changes in time."""
+    """Whether the value of a parameter is an input or a function of the time."""
     return isinstance(value, (Sinusoid, Sampled)) or callable(value)
 
 
-#: Names of the parameters of functions, by what they follow from; and of how many functions.
+#: A cache of the names of functions' parameters, and its most entries.
 _NAMES: dict[Any, tuple[str, ...]] = {}
 MOST_NAMES = 1024
 
 
 def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
     """Names and defaults of the arguments after the time and the state."""
-    # The attributes of a function, such as the one that a decorator wraps, may say that its arguments are others.
+    # Attributes of a function, such as the ``__wrapped__`` of a decorated one, may change its signature.
     if isinstance(function, FunctionType) and not vars(function):
-        parameters = _known(function, state)
+        parameters = _from_code(function, state)
     else:
-        parameters = _checked(function, state)
+        parameters = _from_signature(function, state)
     for parameter, default in parameters.items():
         if not _changes(default):
             numbers = checks.numbers(f"{function.__name__}: default of {parameter}", default)
@@ -161,31 +161,31 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
     return parameters
 
 
-def _known(function: FunctionType, state: int) -> dict[str, Any]:
-    """The same of a function whose code alone tells its arguments, which are looked at once."""
+def _from_code(function: FunctionType, state: int) -> dict[str, Any]:
+    """Names and defaults by the code of a function; the names are cached."""
     code, positional, named = function.__code__, function.__defaults__ or (), function.__kwdefaults__ or {}
     key = code, len(positional), tuple(named), state
     if (names := _NAMES.get(key)) is None:
         if len(_NAMES) >= MOST_NAMES:
             _NAMES.clear()
-        names = _NAMES[key] = tuple(_checked(function, state))
+        names = _NAMES[key] = tuple(_from_signature(function, state))
     last = dict(zip(code.co_varnames[code.co_argcount - len(positional) : code.co_argcount], positional, strict=True))
     return {name: named[name] if name in named else last[name] for name in names}
 
 
-def _checked(function: Callable[..., Any], state: int) -> dict[str, Any]:
-    """The same as ``inspect`` tells them, which takes as long as all else; raise if these are no arguments of such a function."""
+def _from_signature(function: Callable[..., Any], state: int) -> dict[str, Any]:
+    """Names and defaults by ``inspect``, which is slow; raise if the arguments are not those of rates."""
     name = function.__name__
     expected = "(t, v, y, *, …)" if state == 3 else "(t, y, *, …)"
     signature = inspect.signature(function)
-    given = list(signature.parameters.values())
-    positional = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
+    arguments = list(signature.parameters.values())
+    positional = [each for each in arguments if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
     if len(positional) < state or any(each.default is not each.empty for each in positional[:state]):
         first_order = "; for ẏ = f(t, y) write sw.system(order=1)" if state == 3 and len(positional) == 2 else ""
-        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))}){first_order}")
+        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, arguments))}){first_order}")
     checks.argument_order(name, function, ("t", "v", "y") if state == 3 else ("t", "y"), signature)
     parameters = {}
-    for each in given:
+    for each in arguments:
         if each in positional[:state]:
             continue
         if each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD, each.POSITIONAL_ONLY):
@@ -212,10 +212,10 @@ def system(
     quick_sines: bool = False,
     scale: Scale = "component",
 ) -> Any:
-    """Make a kind of system of a function: your own equations, in NumPy style, as fast as built-in ones.
+    """Make a kind of system from a function: your own equations, in NumPy style, as fast as built-in ones.
 
     The function is run once for a system, with symbols in place of numbers, and its operations are recorded; it is not called
-    during a step. Write it for one member: parameters and states may be batches all the same.
+    during a step. Write it for one member; parameters and states may still be batches.
 
     Args:
         function: ``f(t, v, y, *, parameters)`` that returns v̇, while ẏ is v; with ``order=1``, ``f(t, y, *, parameters)`` that
@@ -226,15 +226,14 @@ def system(
         blocks: 2 for a function that returns both rates.
         shape: the shape of the state of a member, with None for a length that is open; with ``blocks=2`` a pair of shapes. If it
             is not given, it is taken from the initial state of a run: its first axes, as few as the function accepts.
-
-        quick_sines: sine and cosine at half the operations, as the built-in systems have them: right to a unit in the last place
-            of 1 for angles up to 10⁶ rad, where the others are right to a unit in their own last place.
-        scale: to what the error of an adaptive step is relative: to the largest that each ``"component"`` has been, so that the
-            units of one do not matter to another; to the length of each ``"row"`` along the last axis, for a state of shape
-            (bodies, 3) whose directions are equivalent; or to the length of each whole ``"block"``, v and y.
+        quick_sines: sine and cosine at half the operations, as the built-in systems compute them: within a unit in the last place
+            of 1 for angles up to 10⁶ rad, while the default is within a unit in the last place of the result.
+        scale: the size to which the error of an adaptive step is relative: the largest value that each ``"component"`` has had,
+            so that components may have different units; the length of each ``"row"`` along the last axis, for a state of shape
+            (bodies, 3) whose directions are equivalent; or the length of each whole ``"block"``, v and y.
 
     Returns:
-        A ``Definition``: called with parameters by name, it gives a ``System``.
+        A ``Definition``: called with parameters by name, it returns a ``System``.
 
     Raises:
         ArgumentError: what is wrong with the function's arguments.

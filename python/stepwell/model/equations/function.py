@@ -1,4 +1,4 @@
-"""A user's function for blocks of known shapes, as what is traced of it sees it."""
+"""A user's function for blocks of known shapes, as the modules that trace it see it."""
 
 from typing import Any, Protocol
 
@@ -6,7 +6,7 @@ from ...base.arrays import Array, Shape
 
 
 class TracedFunction(Protocol):
-    """What ``trace.Equations`` is to its invariants and to its rates of series.
+    """The part of ``trace.Equations`` that its invariants and its rates of series use.
 
     Attributes:
         v_shape: shape of a member's velocity block.
@@ -20,13 +20,13 @@ class TracedFunction(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the function."""
+        """The name of the function."""
 
     def own_axes(self, name: str) -> int:
         """How many axes of its own a parameter has."""
 
-    def rates(self, t: Any, v: Array, y: Array, given: dict[str, Any], /) -> tuple[Array, Array]:
+    def rates(self, t: Any, v: Array, y: Array, values: dict[str, Any], /) -> tuple[Array, Array]:
         """v̇ and ẏ."""
 
-    def of_state(self, invariant: Any, t: Any, v: Array, y: Array, given: dict[str, Any], /) -> Any:
+    def of_state(self, invariant: Any, t: Any, v: Array, y: Array, values: dict[str, Any], /) -> Any:
         """The value of an invariant."""

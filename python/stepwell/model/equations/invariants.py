@@ -1,4 +1,4 @@
-"""Invariants of users' own systems: quantities that are constant in the exact solution; gradients come from their tapes."""
+"""Invariants of users' own systems: quantities that are constant in the exact solution. Their gradients come from their tapes."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class Invariant(NamedTuple):
     """A quantity that is constant in the exact solution.
 
     Attributes:
-        name: of the function.
-        function: of v and y, or of y alone in a first-order system, and of parameters of the system by name.
-        parameters: their names.
-        takes_time: whether the function takes the time before the state, as rates do. It may not depend on it.
+        name: the name of the function.
+        function: a function of v and y, or of y alone in a first-order system, and of parameters of the system by name.
+        parameters: the names of these parameters.
+        takes_time: whether the function takes the time before the state, as rates do. It may not depend on the time.
     """
 
     name: str
@@ -37,13 +37,13 @@ class Invariant(NamedTuple):
 
 
 def invariant(system: str, state: tuple[str, ...], parameters: Collection[str], function: Any) -> Invariant:
-    """A function as an invariant of a system with this name, state and parameters; see ``Definition.invariant``."""
+    """The invariant that a function declares, for a system of this name, state and parameters; see ``Definition.invariant``."""
     if not inspect.isfunction(function):
         raise ArgumentError(f"{system}: expected a function as an invariant, got {type(function).__name__}")
     name = f"{system}: {function.__name__}"
     arguments = list(inspect.signature(function).parameters.values())
     in_place = [each for each in arguments if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
-    # With the time there is one argument more before the parameters.
+    # The time is one more argument before the parameters.
     takes_time = len(in_place) > len(state) and in_place[len(state)].name not in parameters
     n = len(state) + takes_time
     expected = f"({', '.join(state)}, *, …) or (t, {', '.join(state)}, *, …)"
@@ -61,10 +61,10 @@ def invariant(system: str, state: tuple[str, ...], parameters: Collection[str], 
 
 
 class Traced:
-    """An invariant of a system of known shapes: its value, and its gradient, as operations.
+    """An invariant of a system of known shapes: its value and its gradient as operations.
 
     Args:
-        invariant: what it is.
+        invariant: the invariant.
         equations: the system.
         single: whether the operations are those of float32.
     """
@@ -83,8 +83,8 @@ class Traced:
         state = map(self._tape.state, count())
         v, y = _symbols(equations.v_shape, state), _symbols(equations.y_shape, state)
         with recording() as self._marks:
-            made = equations.of_state(invariant, self._tape.time(), v, y, parameters)
-        self._value = made if isinstance(made, _core.Symbol) else self._tape.number(float(made))
+            value = equations.of_state(invariant, self._tape.time(), v, y, parameters)
+        self._value = value if isinstance(value, _core.Symbol) else self._tape.number(float(value))
         self._state = [*v.flat, *y.flat]
         self._of_value = MarkedReplay(self._tape, [self._value], self._marks)
         if any(name == "time" for name, *_ in self._of_value.lines):
@@ -95,7 +95,7 @@ class Traced:
 
     @cached_property
     def _of_gradient(self) -> Replay:
-        from ...reference.tape.modes import gradient  # slow to import, and only gradients need it
+        from ...reference.tape.modes import gradient  # slow to import, and only controls and projections need it
 
         along = gradient(self._tape, self._value, self._state, self._marks)
         square = along[0] * along[0]
@@ -107,43 +107,43 @@ class Traced:
     def _in_single(self) -> Traced:
         return Traced(self.invariant, self.equations, single=True)
 
-    def value(self, v: Any, y: Any, given: dict[str, Any]) -> Any:
-        """The invariant of a state."""
-        of = self._in_single if _are_single(v, y) else self
-        return of._made(of._of_value, v, y, given)[0]
+    def value(self, v: Any, y: Any, values: dict[str, Any]) -> Any:
+        """The value of the invariant for a state."""
+        traced = self._in_single if _are_single(v, y) else self
+        return traced._replayed(traced._of_value, v, y, values)[0]
 
-    def gradient(self, v: Any, y: Any, given: dict[str, Any]) -> tuple[list[Any], list[Any], Any]:
-        """Its derivatives by the numbers of v and of y, and the square of their length."""
-        of = self._in_single if _are_single(v, y) else self
-        *along, square = of._made(of._of_gradient, v, y, given)
+    def gradient(self, v: Any, y: Any, values: dict[str, Any]) -> tuple[list[Any], list[Any], Any]:
+        """The derivatives by the numbers of v and of y, and the sum of their squares."""
+        traced = self._in_single if _are_single(v, y) else self
+        *along, square = traced._replayed(traced._of_gradient, v, y, values)
         n_v = prod(self.equations.v_shape)
         return along[:n_v], along[n_v:], square
 
-    def _made(self, operations: Replay, v: Any, y: Any, given: dict[str, Any]) -> list[Any]:
+    def _replayed(self, operations: Replay, v: Any, y: Any, values: dict[str, Any]) -> list[Any]:
         equations = self.equations
         state = [*_numbers(v, equations.v_shape), *_numbers(y, equations.y_shape)]
         numbers: list[Any] = []
         for name in self.invariant.parameters:
-            value = np.asarray(given[name])
+            value = np.asarray(values[name])
             numbers += _numbers(value, value.shape[: equations.own_axes(name)])
         with np.errstate(all="ignore"):
             return operations(state, numbers)
 
 
 def _are_single(*blocks: Any) -> bool:
-    """Whether a state is one of symbols of float32."""
+    """Whether the blocks hold symbols of float32."""
     of_symbols = (np.asarray(block) for block in blocks)
     return any(getattr(each, "single", False) for block in of_symbols if block.dtype == object for each in block.flat)
 
 
 def _symbols(shape: Any, symbols: Any) -> Any:
-    made = np.empty(shape, dtype=object)
+    block = np.empty(shape, dtype=object)
     for index in np.ndindex(*shape):
-        made[index] = next(symbols)
-    return made
+        block[index] = next(symbols)
+    return block
 
 
 def _numbers(block: Any, shape: Any) -> list[Any]:
-    """The numbers of a block, each of the shape of the batch, or symbols."""
+    """The numbers of a block, each an array over the batch or a symbol."""
     block = np.asarray(block)
     return [block[index] for index in np.ndindex(*shape)]

@@ -1,8 +1,8 @@
 """The names ``np`` and ``math`` within a user's function.
 
-Most of NumPy's functions let values of other types define the result. ``np.array`` does not, and ``math`` accepts floats alone.
-So in a user's function, and in functions of the same module that it calls, these names are bound to modules that accept its
-values.
+Most of NumPy's functions leave the result to the type of their arguments. ``np.array`` does not, and ``math`` accepts floats
+only. So in a user's function, and in the functions of its module that it calls, ``np`` and ``math`` are modules that accept
+scalars and arrays of symbols.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .values import Operators, array
 
 
 def _holds(x: Any) -> bool:
-    """Whether it contains a value that is not known yet."""
+    """Whether a value is or contains one that is not known yet."""
     if isinstance(x, Operators):
         return True
     if isinstance(x, np.ndarray):
@@ -28,14 +28,14 @@ def _holds(x: Any) -> bool:
     return isinstance(x, (list, tuple)) and any(map(_holds, x))
 
 
-def _array(given: Any, *rest: Any, **options: Any) -> Any:
-    return array(given) if _holds(given) else np.array(given, *rest, **options)
+def _array(value: Any, *rest: Any, **options: Any) -> Any:
+    return array(value) if _holds(value) else np.array(value, *rest, **options)
 
 
-def _asarray(given: Any, *rest: Any, **options: Any) -> Any:
-    if isinstance(given, Operators):
-        return given
-    return array(given) if _holds(given) else np.asarray(given, *rest, **options)
+def _asarray(value: Any, *rest: Any, **options: Any) -> Any:
+    if isinstance(value, Operators):
+        return value
+    return array(value) if _holds(value) else np.asarray(value, *rest, **options)
 
 
 class _Module:
@@ -56,8 +56,8 @@ OF_MATH = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arcta
 def _of_math(name: str, function: Any) -> Any:
     numpy_name = OF_MATH.get(name, name)
 
-    def of_any(*given: Any) -> Any:
-        return elementwise_named(numpy_name, *given) if any(map(_holds, given)) else function(*given)
+    def of_any(*arguments: Any) -> Any:
+        return elementwise_named(numpy_name, *arguments) if any(map(_holds, arguments)) else function(*arguments)
 
     return of_any
 
@@ -86,7 +86,7 @@ _MEANING: dict[int, Any] = {
 
 
 def rebound(function: Any, seen: dict[int, Any] | None = None) -> Any:
-    """The same function with ``np`` and ``math`` replaced, also in the functions of its module that it calls."""
+    """A copy of a function with ``np`` and ``math`` replaced, also in the functions of its module that it calls."""
     if not isinstance(function, FunctionType):
         return function
     seen = {} if seen is None else seen
@@ -116,7 +116,7 @@ def rebound(function: Any, seen: dict[int, Any] | None = None) -> Any:
 
 
 def _names_of(code: Any) -> set[str]:
-    """All names in a function's code and in that of the functions within it."""
+    """The names in a function's code and in the code of the functions within it."""
     names = set(code.co_names)
     for each in code.co_consts:
         if hasattr(each, "co_names"):

@@ -1,9 +1,9 @@
-"""Functions that were traced before: what a function computes, as far as it can be told without running it.
+"""Recognising functions that were traced before, without running them.
 
-Two functions are the same if their code is, and so is everything that the code may read: captured variables, globals by the
-names in it, defaults, and the functions among these likewise. Numbers and arrays count by value, so a global that was changed
-since makes another function. What may change unseen, such as an object or a module other than NumPy and ``math``, is told by
-nothing: then a function is like no other and is traced anew.
+Two functions compute the same if their code is equal and so is everything that the code may read: captured variables, globals by
+the names in it, defaults, and the functions among these likewise. Numbers and arrays count by value, so a function whose global
+was changed since is another one. A function that reads something that may change unseen, such as an object or a module other
+than NumPy and ``math``, is not recognised, and is traced again.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-#: Of larger arrays, lists and dictionaries it takes longer to compare the contents than to trace.
+#: Comparing larger arrays, lists and dictionaries takes longer than tracing.
 MOST_BYTES, MOST_ITEMS = 1 << 16, 64
-#: What a function may read of these does not change.
+#: Modules whose attributes do not change.
 MODULES: tuple[ModuleType, ...] = (np, math)
 #: Functions of Python that read nothing but their arguments.
 PURE = {abs, all, any, bool, divmod, enumerate, float, int, isinstance, len, list, map, max, min, pow, range, reversed, round}
@@ -26,21 +26,21 @@ PURE |= {slice, sorted, str, sum, tuple, zip}
 
 
 class Unknown(Exception):  # noqa: N818 (not an error: the function is traced)
-    """It cannot be told what a function computes."""
+    """Something that a function reads may change unseen."""
 
 
-def told(function: Any) -> Any:
-    """What tells a function from all others.
+def identity(function: Any) -> Any:
+    """A value that is equal for functions that compute the same.
 
     Raises:
-        Unknown: if something that it reads may change unseen.
+        Unknown: if something that the function reads may change unseen.
     """
     return _of(function, [])
 
 
 @lru_cache(maxsize=1024)
 def _names(code: CodeType) -> tuple[str, ...]:
-    """The names of globals that code may read, with those of the functions within it."""
+    """The names of globals that code and the functions within it may read."""
     names: set[str] = set()
     for each in dis.get_instructions(code):
         if each.opname == "IMPORT_NAME":
@@ -100,5 +100,5 @@ def _of_function(function: FunctionType, seen: list[Any]) -> Any:
 
 
 def _is_pure(value: Any) -> bool:
-    """Whether a name of Python's own reads nothing but its arguments; classes of errors do not."""
+    """Whether a built-in of Python reads nothing but its arguments, as classes of errors do."""
     return value in PURE or (isinstance(value, type) and issubclass(value, BaseException))

@@ -1,4 +1,4 @@
-"""Users' functions in Taylor series: what a series must know of the functions in the rates, and rates of series."""
+"""Users' functions in Taylor series: the derivatives of functions that a series needs, and the rates of series."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Functions = list[tuple[Any, list[tuple[Any, Any]], tuple[float, float] | None]]
 def derivatives_of_functions(tape: Any, marks: Marks) -> Functions:
     """The marked values on a tape, each with its bounds, the values that it depends on and its derivatives by them.
 
-    Derivatives join the tape. That of a function may be another function, such as the cosine of a sine; then that one's
-    derivative joins, too. A remainder a − b·⌊a/b⌋ also depends on a whole number, which shows that it is made of pieces.
+    Derivatives join the tape. If a derivative is a function itself, as the cosine is that of the sine, its own derivative joins,
+    too. A remainder a − b·⌊a/b⌋ also depends on a whole number, which shows that it is made of pieces.
     """
-    found: Functions = []
+    functions: Functions = []
     with recording(marks):
         done: set[int] = set()
         while waiting := [id for id in marks if id not in done]:
@@ -38,12 +38,12 @@ def derivatives_of_functions(tape: Any, marks: Marks) -> Functions:
                 if mark.name in ("mod", "remainder"):
                     a, b = (each if isinstance(each, _core.Symbol) else tape.number(each) for each in mark.arguments)
                     by.append(((a / b).floor(), -b))
-                found.append((value, by, series.BRANCHES.get(mark.name)))
-    return found
+                functions.append((value, by, series.BRANCHES.get(mark.name)))
+    return functions
 
 
-class _Told:
-    """An input whose value is told."""
+class _Value:
+    """An input whose value is known."""
 
     def __init__(self, value: Any) -> None:
         self.value = value
@@ -54,11 +54,11 @@ class _Told:
 
 
 class Line(int):
-    """A line of a tape, in place of its value."""
+    """The number of a line of a tape, in place of its value."""
 
 
 class MarkedReplay(Replay):
-    """Values of a tape, carried out once more, in which functions are known as such.
+    """The operations of values on a tape, repeated for other operands, with the functions among them marked.
 
     On series a function follows its own rule, since roundings and operations on bits have none; on symbols its value is marked.
 
@@ -97,7 +97,7 @@ class MarkedReplay(Replay):
         return sorted(needed)
 
     def __call__(self, state: Sequence[Any], numbers: Sequence[Any], t: Any = None) -> list[Any]:
-        """The values, for numbers, arrays that broadcast, symbols, or series and arrays of them."""
+        """The values for numbers, arrays that broadcast, symbols, series, or arrays of series."""
         if not series.among((t, *state)):
             return super().__call__(state, numbers, t)
         batch = np.broadcast_shapes(*(np.shape(each) for each in (t, *numbers, *state)))
@@ -126,7 +126,7 @@ class MarkedReplay(Replay):
         return [values[place] for place in self.places]
 
     def _on_tape(self, values: list[Any], symbol: Any) -> list[Any]:
-        """The values on another tape, where functions are marked as on this one."""
+        """The values on another tape, with functions marked as on this one."""
         on_tape = super()._on_tape(values, symbol)
         for line, function in self.functions.items():
             arguments = [on_tape[each] if isinstance(each, Line) else each for each in function.arguments]
@@ -135,12 +135,12 @@ class MarkedReplay(Replay):
 
 
 def _objects(x: Any) -> Any:
-    """An array of objects, of one if x is no array."""
+    """An array of objects, without axes if x is no array."""
     if isinstance(x, np.ndarray):
         return x.astype(object)
-    made = np.empty((), dtype=object)
-    made[()] = x
-    return made
+    array = np.empty((), dtype=object)
+    array[()] = x
+    return array
 
 
 class Rates:
@@ -148,10 +148,10 @@ class Rates:
 
     Args:
         equations: the function.
-        given: its parameters by name.
+        values: the parameters by name.
     """
 
-    def __init__(self, equations: TracedFunction, given: dict[str, Any]) -> None:
+    def __init__(self, equations: TracedFunction, values: dict[str, Any]) -> None:
         self.equations = equations
         tape, marks = _core.Tape(), Marks()
         numbers, state = map(tape.param, count()), map(tape.state, count())
@@ -162,25 +162,25 @@ class Rates:
                 block[index] = next(of)
             return block
 
-        told: dict[str, Any] = {}
-        for name, value in given.items():
+        parameters: dict[str, Any] = {}
+        for name, value in values.items():
             if hasattr(value, "at"):
-                told[name] = _Told(next(numbers))
+                parameters[name] = _Value(next(numbers))
             else:
                 own = np.shape(value)[: equations.own_axes(name)]
-                told[name] = value if callable(value) else symbols(own, numbers)
+                parameters[name] = value if callable(value) else symbols(own, numbers)
         v, y = symbols(equations.v_shape, state), symbols(equations.y_shape, state)
         with recording(marks):
-            rates = equations.rates(tape.time(), v, y, told)
+            rates = equations.rates(tape.time(), v, y, parameters)
         roots = [each if isinstance(each, _core.Symbol) else tape.number(float(each)) for block in rates for each in block.flat]
         self.operations = MarkedReplay(tape, roots, marks)
 
-    def __call__(self, t: Any, v: Any, y: Any, given: dict[str, Any]) -> tuple[Any, Any]:
+    def __call__(self, t: Any, v: Any, y: Any, values: dict[str, Any]) -> tuple[Any, Any]:
         """v̇ and ẏ of arrays of series whose last axes are those of a batch."""
         equations = self.equations
         v, y, t = (np.asarray(each, dtype=object) for each in (v, y, t))
         rows: list[Any] = []
-        for name, value in given.items():
+        for name, value in values.items():
             if hasattr(value, "at"):
                 rows.append(np.asarray(value.at(t[()]), dtype=object))
             elif not callable(value):
@@ -189,6 +189,6 @@ class Rates:
         state = [block[index] for block, own in ((v, equations.v_shape), (y, equations.y_shape)) for index in np.ndindex(own)]
         state = [np.asarray(each, dtype=object) for each in state]
         batch = np.broadcast_shapes(t.shape, *(each.shape for each in (*rows, *state)))
-        made = np.array(self.operations(state, rows, t), dtype=object).reshape((-1, *batch))
+        rates = np.array(self.operations(state, rows, t), dtype=object).reshape((-1, *batch))
         n_v = len(state) - int(np.prod(equations.y_shape))
-        return made[:n_v].reshape((*equations.v_shape, *batch)), made[n_v:].reshape((*equations.y_shape, *batch))
+        return rates[:n_v].reshape((*equations.v_shape, *batch)), rates[n_v:].reshape((*equations.y_shape, *batch))

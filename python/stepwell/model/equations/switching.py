@@ -1,13 +1,13 @@
 """Switching times: when rates change from one piece to another by the time alone, whatever the state does.
 
 A user's function that compares the time with a number, as ``np.where((t > 5) & (t < 6), 1.0, 0.0)`` does, jumps there or has a
-kink. Adaptive steps see rates at a few times only, and would pass over what lies between. But the comparison is on the tape: it
-is solved for the time by inverting the operations on it one after the other, from the outside in. So ``np.sin(omega * t) > 0.9``,
+kink. Adaptive steps evaluate rates at a few times only, and would miss a pulse between them. But the comparison is on the tape:
+it is solved for the time by inverting the operations one after the other, from the outside in. So ``np.sin(omega * t) > 0.9``,
 ``t % period < 0.1``, ``abs(t - middle) < width`` and ``np.interp(t, …)`` are solved, for the parameters of each member. The time
 must stand once in a comparison, or once in each of some factors whose product is compared with zero.
 
-A narrow bell or ramp would be passed over, too, though it is smooth. It has a middle, at which the argument of an even power, an
-exponential or the like is zero. A step that ends there sees it.
+Steps would miss a narrow bell or ramp, too, though it is smooth. It has a middle, at which the argument of an even power, an
+exponential or the like is zero. A step that ends there does not miss it.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from .series import Line
 if TYPE_CHECKING:
     from .series import Rates
 
-#: A condition that switches more often than this within a run is no pulse that steps could pass over without a sign.
+#: A condition that switches more often than this within a run is not searched: steps cannot miss all of its pulses.
 MOST_PERIODS = 4096
-#: How many values of the argument of a periodic function tell how far it goes.
+#: The range of the argument of a periodic function is that of so many samples.
 ARGUMENT_SAMPLES = 33
-#: What inversion finds is off by roundings of the numbers on the way, and rates switch where their own roundings let them: it is
-#: sought within so many roundings of the time, the fewest that hold it.
+#: An inverted time is off by roundings on the way, and rates switch where their own roundings let them: the switch is searched
+#: within so many roundings of the time, the fewest that contain it.
 WIDER = (1.0, 2.0**6, 2.0**16, 2.0**28)
 
 
 def numbers_of(parameters: dict[str, Any], own_axes: Callable[[str], int]) -> list[Array | None]:
-    """The numbers of parameters one after the other, as the rates have them; None is an input."""
+    """The numbers of parameters one after the other, in the order of the rates' tape; None is an input."""
     numbers: list[Array | None] = []
     for name, value in parameters.items():
         if hasattr(value, "at"):
@@ -50,9 +50,9 @@ def numbers_of(parameters: dict[str, Any], own_axes: Callable[[str], int]) -> li
 
 
 class Switch(NamedTuple):
-    """Rates change where ``left`` is ``right``, or with a period where it is whole periods away from it: lines or numbers.
+    """Rates change where ``left`` equals ``right``, or with a period where they differ by whole periods.
 
-    ``smooth`` is whether that is the middle of a bell or a ramp.
+    Each is a line or a number. ``smooth`` is whether that is the middle of a bell or a ramp.
     """
 
     left: Any
@@ -79,12 +79,12 @@ KINKS: dict[str, Callable[..., list[Switch]]] = {
     "maximum": lambda x, y: [Switch(x, y)],
     "clip": lambda x, low, high: [Switch(x, low), Switch(x, high)],
 }
-#: Functions that make a bell or a ramp with its middle where their first argument is zero.
+#: Functions that make a bell or a ramp whose middle is where their first argument is zero.
 WITH_MIDDLE = {"exp", "exp2", "expm1", "tanh", "cosh", "arctan", "hypot", "power"}
-#: What these make of the time repeats itself, and is no single bell or ramp.
+#: Periodic functions, whose values are no single bell or ramp.
 REPEATING = {"sin", "cos", "tan", "mod", "remainder"}
 
-#: Where a function of one argument has a value: the arguments within one period, and the period.
+#: The inverses of functions of one argument: the arguments within one period at which they have a value, and the period.
 INVERSES: dict[str, tuple[Callable[[Any], Sequence[Any]], float | None]] = {
     "abs": (lambda y: (-y, y), None),
     "square root": (lambda y: (np.where(y < 0.0, np.nan, y * y),), None),
@@ -107,7 +107,8 @@ INVERSES: dict[str, tuple[Callable[[Any], Sequence[Any]], float | None]] = {
     "log1p": (lambda y: (np.expm1(y),), None),
 }
 
-#: The operand that makes an operation of two have a value, by the value and the other operand: the first one, and the second.
+#: The inverses of operations of two operands: the first operand by the value and the second, and the second by the value and the
+#: first.
 OPERANDS: dict[str, tuple[Callable[[Any, Any], Any], Callable[[Any, Any], Any]]] = {
     "add": (lambda value, other: value - other, lambda value, other: value - other),
     "subtract": (lambda value, other: value + other, lambda value, other: other - value),
@@ -120,18 +121,18 @@ class Switches:
     """The switches of a function's rates.
 
     Args:
-        rates: its operations, with the functions among them.
-        numbers: those of parameters, one after the other; None is an input, which knows its own jumps.
+        rates: the operations of the rates, with the functions among them.
+        numbers: the numbers of the parameters, one after the other; None is an input, which knows its own jumps.
     """
 
     def __init__(self, rates: Rates, numbers: Sequence[Array | None]) -> None:
         self.tape = [Operation(name, tuple(of), extra) for name, of, extra in rates.operations.lines]
         self.functions = rates.operations.functions
-        #: Of each line whether it changes with the time; None if with the state or an input, too.
+        #: For each line whether it depends on the time; None if it depends on the state or an input, too.
         self.changes: list[bool | None] = []
-        #: Of each line what it is a whole power of, and the exponent.
+        #: For each line the base and the exponent of the whole power that it is.
         self.powers: list[tuple[Any, int]] = []
-        #: Of each line whether a function in it repeats itself.
+        #: For each line whether it depends on a periodic function.
         self.repeats: list[bool] = []
         for line, (name, of, extra) in enumerate(self.tape):
             mark = self.functions.get(line)
@@ -146,7 +147,7 @@ class Switches:
         switches = [each for line in rates.operations.needed for each in self._jumps(line)]
         switches += [each for line in rates.operations.needed if line in values for each in self._bends(line)]
         solvable = [each for each in switches if self._solvable(each)]
-        #: The times with which the time itself is compared, where they are constants of the function; and all other switches.
+        #: The constants of the function with which the time itself is compared, and all other switches.
         self.constants = np.unique([time for each in solvable if (time := self._constant_time(each)) is not None])
         self.switches = [each for each in solvable if self._constant_time(each) is None]
         self._replays: dict[int, Replay] = {}
@@ -155,7 +156,7 @@ class Switches:
         return mark.name in REPEATING or any(isinstance(each, Line) and self.repeats[each] for each in mark.arguments)
 
     def _constant_time(self, switch: Switch) -> float | None:
-        """The constant with which a switch compares the time itself; None if it does something else."""
+        """The constant with which a switch compares the time itself; None for other switches."""
         sides = [self.tape[each] if isinstance(each, Line) else each for each in switch[:2]]
         for time, other in (sides, sides[::-1]):
             if switch.period is None and isinstance(time, Operation) and time.name == "time":
@@ -165,13 +166,13 @@ class Switches:
         return None
 
     def of_line(self, line: int) -> Replay:
-        """The operations that a line needs, and its place among them."""
+        """The operations that compute a line."""
         if line not in self._replays:
             self._replays[line] = Replay(*needed(self.tape, [line]))
         return self._replays[line]
 
     def _of_values(self, roots: Sequence[int]) -> set[int]:
-        """Lines whose values reach the rates, and not only the truth of a comparison."""
+        """Lines whose values reach the rates otherwise than through a comparison."""
         reached, waiting = set(), list(roots)
         while waiting:
             line = waiting.pop()
@@ -182,7 +183,7 @@ class Switches:
         return reached
 
     def _jumps(self, line: int) -> list[Switch]:
-        """Where a line jumps, or the truth of a comparison changes."""
+        """The switches at which a line jumps, or the truth of a comparison changes."""
         name, of, _ = self.tape[line]
         if (mark := self.functions.get(line)) is not None:
             return JUMPS[mark.name](*mark.arguments) if mark.name in JUMPS else []
@@ -191,7 +192,7 @@ class Switches:
         return JUMPS["floor"](Line(of[0])) if name == "floor" else []
 
     def _bends(self, line: int) -> list[Switch]:
-        """Where a line has a kink, or the middle of a bell or a ramp."""
+        """The switches at which a line has a kink, or the middle of a bell or a ramp."""
         if (mark := self.functions.get(line)) is not None:
             middle = [Switch(mark.arguments[0], 0.0, smooth=True)] if mark.name in WITH_MIDDLE else []
             return KINKS[mark.name](*mark.arguments) if mark.name in KINKS else middle
@@ -205,9 +206,9 @@ class Switches:
         return once and not (switch.smooth and any(self.repeats[each] for each in lines))
 
     def times(self, numbers: Sequence[Array | None], begin: float, end: float) -> Array:
-        """When members switch from ``begin`` to ``end``, and once before and after, shape (times, *batch); NaN is no time.
+        """The times at which members switch, from ``begin`` to ``end`` and some around, shape (times, *batch); NaN is no time.
 
-        ``numbers`` are those of the parameters, with axes that broadcast to those of the batch.
+        ``numbers`` are the numbers of the parameters, with axes that broadcast to those of the batch.
         """
         if not self.switches:
             return self.constants
@@ -218,7 +219,7 @@ class Switches:
 
 
 class Solving:
-    """The solution for the time, with numbers for parameters. Values have shape (values, *batch)."""
+    """The switches solved for the time, for numbers of the parameters. Values have shape (values, *batch)."""
 
     def __init__(self, switches: Switches, numbers: Sequence[Array | None], begin: float, end: float) -> None:
         self.of_line, self.tape, self.functions = switches.of_line, switches.tape, switches.functions
@@ -246,7 +247,7 @@ class Solving:
                 waiting += self._inverted(line, values)
 
     def _inverted(self, line: Any, values: Array) -> Iterator[tuple[Any, Array]]:
-        """Where a line has one of these values: its operands that change, and the values that they have there."""
+        """The operands of a line that depend on the time, with the values that they have where the line has one of these."""
         name, of, _ = self.tape[line]
         operands: Sequence[Any] = [Line(each) for each in of]
         if (mark := self.functions.get(line)) is not None:
@@ -279,14 +280,14 @@ class Solving:
                 yield argument, each if turn is None else self._periodic(argument, each, np.asarray(turn))
 
     def _root(self, base: Any, exponent: Array, values: Array) -> Iterator[tuple[Any, Array]]:
-        """Where a power has one of these values."""
+        """The base of a power, with the values that it has where the power has one of these."""
         size, odd = np.abs(values) ** (1.0 / exponent), exponent % 2.0 == 1.0
         yield base, np.where(odd, np.copysign(size, values), np.where(values < 0.0, np.nan, size))
         if not odd.all():
             yield base, np.where(odd | (values < 0.0), np.nan, -size)
 
     def _periodic(self, line: Any, values: Array, period: Array) -> Array:
-        """Values that are whole periods away from these, as far as the line goes and one more; none if there are too many."""
+        """Values whole periods away from these, over the range of the line and one more; none if there are too many."""
         seen, period = self._at(line, self.samples), np.abs(period)
         places = [(edge - values) / period for edge in (seen.min(axis=0), seen.max(axis=0))]
         first, last = np.floor(np.nanmin(places)) - 1.0, np.ceil(np.nanmax(places)) + 1.0
@@ -297,7 +298,7 @@ class Solving:
         return periodic.reshape(-1, *periodic.shape[2:])
 
     def _exact(self, times: Array, switch: Switch) -> Array:
-        """The same times to the last bits: where the piece changes, if there is one change around."""
+        """These times to the last bits: where the piece changes, if it changes once nearby."""
         rounding = np.spacing(np.maximum(np.abs(times), np.finfo(np.float64).eps))
         for roundings in WIDER:
             before, after = times - roundings * rounding, times + roundings * rounding
@@ -314,7 +315,7 @@ class Solving:
         return np.where(changes, after, times)
 
     def _piece(self, switch: Switch, times: Array) -> Array:
-        """Which piece rates take: whether a comparison holds, or the number of the period."""
+        """The piece that the rates take: whether a comparison holds, or the number of the period."""
         left, right = (self._at(each, times) if isinstance(each, Line) else each for each in switch[:2])
         return np.asarray(left < right if switch.period is None else np.floor((left - right) / self._constant(switch.period)))
 
@@ -322,7 +323,7 @@ class Solving:
         return isinstance(what, Line) and bool(self.changes[what])
 
     def _constant(self, what: Any) -> Array:
-        """The number of each member that does not change with the time, shape (*batch)."""
+        """The value of a line that does not depend on the time, or a number, for each member, shape (*batch)."""
         each = np.asarray(self._at(what, 0.0) if isinstance(what, Line) else what, np.float64)
         return each.reshape((self.axes - each.ndim) * (1,) + each.shape)
 

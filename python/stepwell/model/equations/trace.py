@@ -1,4 +1,4 @@
-"""Runs a user's function: with symbols, or with the numbers of every member of a batch."""
+"""Running a user's function: with symbols, or with the numbers of every member of a batch."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .series import Rates
     from .switching import Switches
 
-#: The most lines of a traceback that are searched for the user's own.
+#: The most frames of a traceback that are searched for the user's function.
 MOST_FRAMES = 200
 
 #: The most characters of a line of the user's file in a message.
@@ -38,13 +38,13 @@ class Equations:
     """A user's function for blocks of known shapes.
 
     Attributes:
-        definition: the function, of t, v, y (or t and y) and parameters by name, and which rates it gives.
+        definition: the function, of t, v, y (or t and y) and parameters by name, and which rates it returns.
         v_shape: shape of a member's velocity block.
         y_shape: shape of a member's coordinate block.
         own_shapes: the lengths of each parameter's own axes; None for a parameter that depends on time.
         kept: the name of the invariant that a control or a projection keeps, or None.
-        limited: whether the control is of the limited form.
-        pushed: whether there is a control.
+        limited: whether that is a control in the limited form.
+        pushed: whether it is a control, which pushes, and not a projection.
     """
 
     kept: str | None = None
@@ -65,7 +65,7 @@ class Equations:
         return self.v_shape, self.y_shape
 
     def batches(self, v: Any, y: Any) -> tuple[Shape, Shape]:
-        """The axes of both blocks behind their own."""
+        """The batch axes of both blocks, which come after their own."""
         return np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :]
 
     def own_axes(self, name: str) -> int:
@@ -74,7 +74,7 @@ class Equations:
 
     @property
     def invariants(self) -> dict[str, Traced]:
-        """Those that were declared, by name."""
+        """The declared invariants, by name."""
         from .invariants import Traced
 
         for name, each in self.definition.invariants.items():
@@ -83,17 +83,17 @@ class Equations:
         return self._invariants
 
     def keeping(self, name: str, *, limited: bool, pushed: bool) -> Equations:
-        """The same, with an invariant that is kept."""
-        kept = copy.copy(self)
-        kept.kept, kept.limited, kept.pushed = name, limited, pushed
-        return kept
+        """These equations with an invariant that a control or a projection keeps."""
+        equations = copy.copy(self)
+        equations.kept, equations.limited, equations.pushed = name, limited, pushed
+        return equations
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "_invariants": {}, "_series": None, "_switches": None}
 
     @property
     def name(self) -> str:
-        """Of the function."""
+        """The name of the function."""
         return self.definition.name
 
     @property
@@ -113,57 +113,57 @@ class Equations:
     def __deepcopy__(self, memo: Any) -> Equations:
         return self  # it is immutable
 
-    def rates(self, t: Any, v: Numbers, y: Numbers, given: dict[str, Any]) -> tuple[Numbers, Numbers]:
+    def rates(self, t: Any, v: Numbers, y: Numbers, values: dict[str, Any]) -> tuple[Numbers, Numbers]:
         """v̇ and ẏ: symbols from symbols, arrays over all members from numbers. Where ẏ is v, it is not computed."""
         if among((t, v, y)):
-            return self._of_series(given)(t, v, y, given)
+            return self._of_series(values)(t, v, y, values)
         batch = np.broadcast_shapes(np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :], np.shape(t))
         with np.errstate(all="ignore"):
-            parameters = {name: self._parameter(name, value, t, batch) for name, value in given.items()}
+            parameters = {name: self._parameter(name, value, t, batch) for name, value in values.items()}
             state = [scalars(y, len(self.y_shape))]
             if self.definition.has_v:
                 state.insert(0, scalars(v, len(self.v_shape)))
-            made = self._called(Scalar(t), state, parameters)
-        dv, dy = self._checked(made)
+            result = self._called(Scalar(t), state, parameters)
+        dv, dy = self._checked(result)
         v_dot = np.empty((*self.v_shape, *batch)) if dv is None else _numbers(dv, self.v_shape, batch)
         return v_dot, v if dy is None else _numbers(dy, self.y_shape, batch)
 
-    def _of_series(self, given: dict[str, Any]) -> Rates:
-        """The rates of series, traced when they are first asked for."""
+    def _of_series(self, values: dict[str, Any]) -> Rates:
+        """The rates of series, traced on first use."""
         from .series import Rates
 
         if self._series is None:
-            self._series = Rates(self, given)
+            self._series = Rates(self, values)
         return self._series
 
     @property
     def constant_switching_times(self) -> Numbers | None:
-        """Those that depend on nothing; None if they depend on parameters or on the run, or were not sought yet."""
+        """The switching times that depend on nothing; None if they depend on parameters or the run, or were not computed yet."""
         return None if self._switches is None or self._switches.switches else self._switches.constants
 
-    def switching_times(self, given: dict[str, Any], begin: float, end: float) -> Numbers:
-        """When the rates change from one piece to another by the time alone, shape (times, *batch)."""
+    def switching_times(self, values: dict[str, Any], begin: float, end: float) -> Numbers:
+        """The times at which the rates change from one piece to another whatever the state is, shape (times, *batch)."""
         from .switching import Switches, numbers_of
 
-        numbers = numbers_of(given, self.own_axes)
+        numbers = numbers_of(values, self.own_axes)
         if self._switches is None:
-            self._switches = Switches(self._of_series(given), numbers)
+            self._switches = Switches(self._of_series(values), numbers)
         return self._switches.times(numbers, begin, end)
 
-    def of_state(self, invariant: Invariant, t: Any, v: Numbers, y: Numbers, given: dict[str, Any]) -> Any:
+    def of_state(self, invariant: Invariant, t: Any, v: Numbers, y: Numbers, values: dict[str, Any]) -> Any:
         """The value of an invariant for a state of symbols: one symbol, or a known number."""
         state = [scalars(y, len(self.y_shape))]
         if self.definition.has_v:
             state.insert(0, scalars(v, len(self.v_shape)))
         if invariant.takes_time:
             state.insert(0, Scalar(t))
-        parameters = {name: scalars(value, self.own_axes(name)) for name, value in given.items()}
+        parameters = {name: scalars(value, self.own_axes(name)) for name, value in values.items()}
         name = f"{self.name}: {invariant.name}"
-        made = objects(self._run(rebound(invariant.function), name, *state, **parameters))
-        if made.ndim or not isinstance(made[()], Scalar):
-            got = f"an array of shape {made.shape}" if made.ndim else kind_of(made[()])
+        result = objects(self._run(rebound(invariant.function), name, *state, **parameters))
+        if result.ndim or not isinstance(result[()], Scalar):
+            got = f"an array of shape {result.shape}" if result.ndim else kind_of(result[()])
             raise TraceError(f"{name}: expected one number of a state, got {got}")
-        return made[()].value
+        return result[()].value
 
     def _parameter(self, name: str, value: Any, t: Any, batch: Shape) -> Any:
         if callable(value):
@@ -175,69 +175,69 @@ class Equations:
     def _called(self, t: Scalar, state: list[Any], parameters: dict[str, Any]) -> Any:
         return self._run(rebound(self.definition.function), self.name, t, *state, **parameters)
 
-    def _run(self, function: Callable[..., Any], name: str, *given: Any, **named: Any) -> Any:
-        return run_by(function, name, self.definition.quick_sines, *given, **named)
+    def _run(self, function: Callable[..., Any], name: str, /, *arguments: Any, **parameters: Any) -> Any:
+        return run_function(function, name, self.definition.quick_sines, *arguments, **parameters)
 
-    def _checked(self, made: Any) -> tuple[Any, Any]:
-        """The rates of v and of y as objects; None for one that the function does not return."""
+    def _checked(self, result: Any) -> tuple[Any, Any]:
+        """The rates of v and y as arrays of objects; None for one that the function does not return."""
         if self.definition.blocks == 2:
-            if not isinstance(made, (tuple, list)) or len(made) != 2:
-                raise TraceError(f"{self.name}: expected a pair (v̇, ẏ), since blocks=2, got {kind_of(made)}")
-            return self._block("v̇", made[0], self.v_shape), self._block("ẏ", made[1], self.y_shape)
+            if not isinstance(result, (tuple, list)) or len(result) != 2:
+                raise TraceError(f"{self.name}: expected a pair (v̇, ẏ), since blocks=2, got {kind_of(result)}")
+            return self._block("v̇", result[0], self.v_shape), self._block("ẏ", result[1], self.y_shape)
         if self.definition.order == 2:
-            return self._block("v̇", made, self.v_shape), None
-        return None, self._block("ẏ", made, self.y_shape)
+            return self._block("v̇", result, self.v_shape), None
+        return None, self._block("ẏ", result, self.y_shape)
 
-    def _block(self, what: str, made: Any, shape: Shape) -> Any:
+    def _block(self, what: str, value: Any, shape: Shape) -> Any:
         try:
-            items = array(made).items
+            items = array(value).items
         except TraceError as error:
-            raise TraceError(f"{self.name}: expected {what} of shape {shape}, got {kind_of(made)} ({error})") from None
+            raise TraceError(f"{self.name}: expected {what} of shape {shape}, got {kind_of(value)} ({error})") from None
         if items.shape != shape:
             raise of_shape(f"{self.name}: expected {what} of shape {shape}, that of its block, got shape {items.shape}")
         return items
 
 
-def run_by(function: Callable[..., Any], name: str, quick_sines: bool, *given: Any, **named: Any) -> Any:
-    """Call a user's function; what it raises is told with its name and the line, even if the function itself catches that."""
+def run_function(function: Callable[..., Any], name: str, quick_sines: bool, /, *arguments: Any, **parameters: Any) -> Any:
+    """Call a user's function. An error is raised again with its name and the line, even if the function itself catches it."""
     refused: list[TraceError] = []
     before, outer = QUICK_SINES.set(quick_sines), REFUSED.set(refused)
     try:
-        made = function(*given, **named)
+        result = function(*arguments, **parameters)
     except RecursionError:
         raise
     except Exception as error:
-        raise _told(error, function, name) from error
+        raise _located(error, function, name) from error
     finally:
         REFUSED.reset(outer)
         QUICK_SINES.reset(before)
     if refused:
-        raise _told(refused[0], function, name) from refused[0]
-    return made
+        raise _located(refused[0], function, name) from refused[0]
+    return result
 
 
-def _told(error: Exception, function: Any, name: str) -> TraceError:
-    """The error of a user's function with its name and the line."""
+def _located(error: Exception, function: Any, name: str) -> TraceError:
+    """The error of a user's function, with the function's name and the line in its message."""
     line = _line_of(error, getattr(function, "__code__", None))
     known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
-    said = str(known) if isinstance(known, TraceError) else _in_words(error)
+    text = str(known) if isinstance(known, TraceError) else _in_words(error)
     if (package := _abroad(error, function)) and isinstance(known, TraceError):
-        said += (
+        text += (
             f". It was asked by {package}, whose functions are for numbers alone and cannot be traced; a table of the time is a "
             f"parameter: sw.Sampled(values, interval, interpolation='linear' or 'cubic')"
         )
-    told = TraceError(f"{name}{line}: {said}")
-    told.of_shape = known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
-    return told
+    located = TraceError(f"{name}{line}: {text}")
+    located.of_shape = known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
+    return located
 
 
-def kind_of(made: Any) -> str:
-    """What a function returned, in a word or two."""
-    return "nothing: is there a return?" if made is None else f"{type(made).__name__}"
+def kind_of(value: Any) -> str:
+    """A function's result in a word or two."""
+    return "nothing: is there a return?" if value is None else type(value).__name__
 
 
 def scalars(numbers: Any, axes: int) -> Any:
-    """Numbers, or symbols, as scalars: the first axes are those of the array, the others those of a batch."""
+    """Numbers or symbols as scalars: the first axes are the array's own, the others those of a batch."""
     numbers = np.asarray(numbers)
     if axes == 0:
         return Scalar(numbers[()])
@@ -248,12 +248,12 @@ def scalars(numbers: Any, axes: int) -> Any:
 
 
 def _numbers(items: Any, shape: Shape, batch: Shape) -> Numbers:
-    """The values of scalars as one array: of objects if they are symbols."""
+    """The values of scalars as one array, of objects if they are symbols."""
     values = [each.value if isinstance(each, Scalar) else each for each in (objects(each)[()] for each in items.flat)]
     if any(hasattr(value, "xor_bits") for value in values):
-        made = np.empty(len(values), dtype=object)
-        made[:] = values
-        return made.reshape(shape)
+        block = np.empty(len(values), dtype=object)
+        block[:] = values
+        return block.reshape(shape)
     # Analysis steps numbers whose imaginary part is infinitesimal.
     numbers = np.empty((len(values), *batch), dtype=np.result_type(np.float64, *(np.asarray(value).dtype for value in values)))
     for i, value in enumerate(values):
@@ -262,17 +262,17 @@ def _numbers(items: Any, shape: Shape, batch: Shape) -> Numbers:
 
 
 def _in_words(error: BaseException) -> str:
-    """What Python says of a value that is not what the function takes it for."""
-    match re.fullmatch(r"(cannot unpack non-iterable )?'?(Scalar|Array)'? object(.*)", str(error)):
-        case re.Match() as found if "not callable" in found[3]:
+    """Python's message, or a clearer one where the function uses a scalar or an array as something else."""
+    if match := re.fullmatch(r"(cannot unpack non-iterable )?'?(Scalar|Array)'? object(.*)", str(error)):
+        if "not callable" in match[3]:
             return "y is the state at t, and no function of the time: delays such as y(t − τ) are not here"
-        case re.Match() as found if found[2] == "Scalar" and not found[3].startswith(" has no attribute"):
+        if match[2] == "Scalar" and not match[3].startswith(" has no attribute"):
             return "expected an array, got one number"
     return f"{type(error).__name__}: {error}"
 
 
 def _abroad(error: BaseException, function: Any) -> str:
-    """The package, other than the function's, this one and NumPy, whose code asked for a number; empty if none did."""
+    """The package other than the function's own, stepwell and NumPy whose code needed a number; empty if none did."""
     own = _package(getattr(function, "__globals__", {}))
     packages = [_package(frame.f_globals) for frame, _ in walk_tb(error.__traceback__)]
     inner = next((each for each in reversed(packages) if each not in ("stepwell", "numpy", own)), "")
@@ -284,17 +284,17 @@ def _package(names: dict[str, Any]) -> str:
 
 
 def _line_of(error: BaseException, code: Any) -> str:
-    """Where in the file of the function the error was raised: the last line there."""
-    found, frame = None, error.__traceback__
+    """The last line in the function's file that the error passed through, as part of a message."""
+    last, frame = None, error.__traceback__
     for _ in range(MOST_FRAMES):
         if frame is None:
             break
         if code is not None and frame.tb_frame.f_code.co_filename == code.co_filename:
-            found = frame
+            last = frame
         frame = frame.tb_next
-    if found is None:
+    if last is None:
         return ""
-    file, line = found.tb_frame.f_code.co_filename, found.tb_lineno
+    file, line = last.tb_frame.f_code.co_filename, last.tb_lineno
     text = linecache.getline(file, line).strip()
     text = text if len(text) <= MOST_OF_A_LINE else f"{text[:MOST_OF_A_LINE]}…"
     return f" ({file.replace(chr(92), '/').rsplit('/', 1)[-1]}, line {line}{f': {text}' if text else ''})"

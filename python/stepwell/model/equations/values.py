@@ -1,8 +1,8 @@
 """The arguments with which a user's function is run, in place of the numbers and arrays of a state.
 
 A ``Scalar`` holds one number: a symbol, which writes the tape of a step, or, for the NumPy reference, an array with that number
-for every member of a batch. An ``Array`` holds scalars in a shape. Both behave like NumPy's arrays, one operation after the
-other in a fixed order; for an operation that cannot be traced, the error says what to write instead.
+for every member of a batch. An ``Array`` holds scalars in a shape. Both behave like NumPy's arrays, with the operations in a
+fixed order; for an operation that cannot be traced, the error says what to write instead.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from ...reference import bits, functions
 
 
 def of_shape(text: str) -> TraceError:
-    """A function was run with an array of a wrong shape; another shape may fit."""
+    """The error of a function that was run with an array of a wrong shape; another shape may fit."""
     error = TraceError(text)
     error.of_shape = True
     return error
 
 
-#: The functions of whole arrays, by name: their module, which builds on the classes below, puts them here.
+#: The functions of whole arrays, by name: ``arrays.py``, which builds on the classes below, puts them here.
 ARRAY_FUNCTIONS: dict[str, Callable[..., Any]] = {}
 #: Numbers that are known while a function is traced.
 _KNOWN = (int, float, np.integer, np.floating)
 
 
 def value_of(x: Any) -> Any:
-    """What a scalar holds, or a known number as one; None if it is neither."""
+    """The value of a scalar, or a known number as a float; None if it is neither."""
     if isinstance(x, Truth):
         return functions.where(x.value, 1.0, 0.0)
     if isinstance(x, Scalar):
@@ -47,7 +47,7 @@ def value_of(x: Any) -> Any:
 
 
 def _mask(x: Any) -> Any:
-    """The value of a truth."""
+    """The value of a comparison."""
     if isinstance(x, Truth):
         return x.value
     if isinstance(x, (bool, np.bool_)):
@@ -55,12 +55,12 @@ def _mask(x: Any) -> Any:
     raise TraceError("expected a comparison such as y > 0, got a number; write y != 0 to compare it with zero")
 
 
-def elementwise(name: str, function: Callable[..., Any], *given: Any) -> Any:
-    """A function of numbers over scalars and arrays, element by element, as NumPy broadcasts them."""
-    if not any(isinstance(each, (Array, np.ndarray, list, tuple)) and np.ndim(objects(each)) for each in given):
-        values = [value_of(objects(each)[()] if isinstance(each, (Array, np.ndarray)) else each) for each in given]
+def elementwise(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """A function of numbers, applied to scalars and arrays element by element, as NumPy broadcasts them."""
+    if not any(isinstance(each, (Array, np.ndarray, list, tuple)) and np.ndim(objects(each)) for each in arguments):
+        values = [value_of(objects(each)[()] if isinstance(each, (Array, np.ndarray)) else each) for each in arguments]
         if any(value is None for value in values):
-            wrong = next(each for each, value in zip(given, values, strict=True) if value is None)
+            wrong = next(each for each, value in zip(arguments, values, strict=True) if value is None)
             raise TraceError(f"{name}: expected numbers, got {type(wrong).__name__}")
         return Scalar(function(*values))
 
@@ -68,50 +68,50 @@ def elementwise(name: str, function: Callable[..., Any], *given: Any) -> Any:
         return elementwise(name, function, *scalars)
 
     try:
-        made = np.frompyfunc(of_scalars, len(given), 1)(*map(objects, given))
+        items = np.frompyfunc(of_scalars, len(arguments), 1)(*map(objects, arguments))
     except ValueError as error:
         raise of_shape(f"{name}: {error}") from None
-    return wrapped(made)
+    return wrapped(items)
 
 
 def objects(x: Any) -> Any:
-    """The scalars of a value as an array of objects; a value without scalars is returned unchanged."""
+    """The elements of a value as an array of objects, without axes if the value has none."""
     if isinstance(x, Array):
         return x.items
     if isinstance(x, (list, tuple)):
         return array(x).items
     if isinstance(x, np.ndarray):
         return x.astype(object)
-    made = np.empty((), dtype=object)
-    made[()] = x
-    return made
+    item = np.empty((), dtype=object)
+    item[()] = x
+    return item
 
 
-def wrapped(made: Any) -> Any:
-    """Objects as an ``Array``, a single one as itself."""
-    if not isinstance(made, np.ndarray):
-        return made if isinstance(made, Scalar) or value_of(made) is None else Scalar(value_of(made))
-    return Array(made) if made.ndim else wrapped(made[()])
+def wrapped(items: Any) -> Any:
+    """An array of objects as an ``Array``; a single number as a ``Scalar``."""
+    if not isinstance(items, np.ndarray):
+        return items if isinstance(items, Scalar) or value_of(items) is None else Scalar(value_of(items))
+    return Array(items) if items.ndim else wrapped(items[()])
 
 
-def array(given: Any) -> Array:
-    """An array of what lists, tuples and arrays of numbers and scalars hold, as ``np.array`` makes it."""
-    if isinstance(given, Array):
-        return given
-    if isinstance(given, (list, tuple)):
-        parts = [objects(each) for each in given]
+def array(value: Any) -> Array:
+    """The array of lists, tuples and arrays of numbers and scalars, as ``np.array`` makes it."""
+    if isinstance(value, Array):
+        return value
+    if isinstance(value, (list, tuple)):
+        parts = [objects(each) for each in value]
         shapes = {part.shape for part in parts}
         if len(shapes) > 1:
             raise of_shape(f"expected parts of one shape in an array, got shapes {', '.join(map(str, sorted(shapes)))}")
-        made = np.empty((len(parts), *(shapes.pop() if shapes else ())), dtype=object)
+        items = np.empty((len(parts), *(shapes.pop() if shapes else ())), dtype=object)
         for i, part in enumerate(parts):
-            made[i] = part if part.ndim else part[()]
-        return Array(made)
-    made = objects(given)
-    for each in made.flat:
+            items[i] = part if part.ndim else part[()]
+        return Array(items)
+    items = objects(value)
+    for each in items.flat:
         if value_of(each) is None:
             raise TraceError(f"expected numbers in an array, got {type(each).__name__}")
-    return Array(made)
+    return Array(items)
 
 
 class Operators:
@@ -234,11 +234,11 @@ class Operators:
             raise TraceError(f"own equations do not know .{name} of a value. Known: {known}")
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *given: Any, **options: Any) -> Any:
-        return ARRAY_FUNCTIONS["ufunc_of"](ufunc, method, given, options)
+    def __array_ufunc__(self, ufunc: Any, method: str, *arguments: Any, **options: Any) -> Any:
+        return ARRAY_FUNCTIONS["ufunc_of"](ufunc, method, arguments, options)
 
-    def __array_function__(self, function: Any, types: Any, given: Any, options: Any) -> Any:
-        return ARRAY_FUNCTIONS["function_of"](function, given, options)
+    def __array_function__(self, function: Any, types: Any, arguments: Any, options: Any) -> Any:
+        return ARRAY_FUNCTIONS["function_of"](function, arguments, options)
 
 
 def _operate(sign: str, function: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
@@ -277,7 +277,7 @@ COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
 
 
 def compared(name: str, a: Any, b: Any) -> Any:
-    """A comparison of scalars and arrays."""
+    """A comparison of scalars and arrays, element by element."""
     for each in (a, b):
         if not isinstance(each, (Operators, np.ndarray, list, tuple, bool, np.bool_, *_KNOWN)):
             return NotImplemented
@@ -360,7 +360,7 @@ class Array(Operators):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Its shape."""
+        """The lengths of its axes."""
         shape: tuple[int, ...] = self.items.shape
         return shape
 
@@ -462,16 +462,16 @@ class Array(Operators):
         return ARRAY_FUNCTIONS["reduced"]("prod", operator.mul, self, axis, keepdims)
 
     def mean(self, axis: Any = None, keepdims: bool = False) -> Any:
-        """The sum divided by how many there are."""
+        """The sum divided by the number of elements."""
         count = self.size if axis is None else np.prod([self.shape[each] for each in np.atleast_1d(axis)])
         return self.sum(axis, keepdims) / float(count)
 
     def min(self, axis: Any = None, keepdims: bool = False) -> Any:
-        """The smallest; NaN if one is."""
+        """The smallest element; NaN if one is NaN."""
         return ARRAY_FUNCTIONS["reduced"]("min", partial(elementwise, "minimum", functions.minimum), self, axis, keepdims)
 
     def max(self, axis: Any = None, keepdims: bool = False) -> Any:
-        """The largest; NaN if one is."""
+        """The largest element; NaN if one is NaN."""
         return ARRAY_FUNCTIONS["reduced"]("max", partial(elementwise, "maximum", functions.maximum), self, axis, keepdims)
 
     def all(self, axis: Any = None, keepdims: bool = False) -> Any:
@@ -492,12 +492,12 @@ class Array(Operators):
 
 
 def _symbolic(index: Any) -> bool:
-    """Whether an index is, or holds, a value that is not known."""
+    """Whether an index is or contains a value that is not known yet."""
     if isinstance(index, (tuple, list)):
         return any(map(_symbolic, index))
     return isinstance(index, Operators)
 
 
 def folded(function: Callable[[Any, Any], Any], parts: Any) -> Any:
-    """A function over parts, from the first to the last."""
+    """The parts combined by a function of two, from the first to the last."""
     return reduce(function, parts)

@@ -1,7 +1,6 @@
 """The systems that users describe: parameters, checks, energies. Their formulas are in ``stepwell.reference.systems``.
 
-``Aircraft`` is imported on first use: its rates are equations that are traced like users' own, and that takes modules which other
-systems do without.
+``Aircraft`` is imported on first use: its rates are traced like users' own equations, by modules that other systems do not need.
 """
 
 from typing import TYPE_CHECKING, Any

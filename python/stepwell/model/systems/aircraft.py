@@ -43,7 +43,7 @@ class Aircraft(OwnSystem):
     ``angles`` does that. From 2⁵⁰ rad on they have no sine, and a run diverges.
 
     In the form ``"quaternion"`` y is the quaternion of the same rotation, scalar first; it has no such place. The torques are
-    the same while |θ| < 90°. Beyond, the controllers have other angles of the same attitude, with θ from −90° to 90°. A method
+    the same while |θ| < 90°. Beyond, the controllers take other angles of this attitude, with θ from −90° to 90°. A method
     changes the quaternion's length; ``NormControl(k)`` and ``Projection("norm")`` keep it at 1.
 
     Args:
@@ -92,7 +92,7 @@ class Aircraft(OwnSystem):
     ) -> None:
         self.form = checks.known("form", form, FORMS)
         self.controllers = checks.flag("controllers", controllers)
-        given: dict[str, Any] = {
+        values: dict[str, Any] = {
             "inertia": _of_axes("inertia", inertia, positive=True),
             "damping": _of_axes("damping", damping),
             "gains": _of_axes("gains", gains),
@@ -100,24 +100,24 @@ class Aircraft(OwnSystem):
         for name, angle in (("roll", roll), ("pitch", pitch)):
             command = _command(name, angle, "degrees")
             if self.controllers:
-                given[name] = command
+                values[name] = command
             elif not isinstance(command, np.ndarray) or command.any():
                 raise ArgumentError(f"{name}: expected no commanded angle with controllers=False, got {checks.short(angle)}")
         for name, torque in (("roll_torque", roll_torque), ("pitch_torque", pitch_torque), ("yaw_torque", yaw_torque)):
             if torque is not None:
-                given[name] = _command(name, torque, "units of torque")
-        batches = {name: each.shape[1:] for name, each in given.items() if name in ("inertia", "damping", "gains")}
+                values[name] = _command(name, torque, "units of torque")
+        batches = {name: each.shape[1:] for name, each in values.items() if name in ("inertia", "damping", "gains")}
         batches |= {
             name: each.shape if isinstance(each, np.ndarray) else each.batch
-            for name, each in given.items()
+            for name, each in values.items()
             if name not in batches
         }
         checks.batch_shape(batches)
         definition = euler if self.form == "euler" else quaternion
-        super().__init__(definition, given)
+        super().__init__(definition, values)
         self.v_shape, self.y_shape = (3,), (3,) if self.form == "euler" else (4,)
         own = {name: np.shape(default) for name, default in definition.parameters.items()}
-        in_time = {name: None for name, each in given.items() if isinstance(each, (Sinusoid, Sampled))}
+        in_time = {name: None for name, each in values.items() if isinstance(each, (Sinusoid, Sampled))}
         self.equations = Equations(definition, self.v_shape, self.y_shape, own | in_time)
         self.velocity_term = "forces that do"
 
@@ -126,23 +126,23 @@ class Aircraft(OwnSystem):
 
     @property
     def kind_name(self) -> str:
-        """What systems of its kind are called."""
+        """The name of its kind of system."""
         return type(self).__name__
 
     @property
     def keeper(self) -> AnyControl | None:
-        """The control or projection that it is under."""
+        """The control or projection that acts on it, or None."""
         return super().keeper if self.kept is None else self.kept
 
     @property
     def torques_act(self) -> bool:
         """Whether dampers, controllers or torques act, so that the energy is not constant."""
-        given = self.parameters_given
-        gains = given["gains"] if self.controllers else given["gains"][2]
-        return bool(given["damping"].any() or gains.any() or any(name.endswith("torque") for name in given))
+        values = self.parameters_given
+        gains = values["gains"] if self.controllers else values["gains"][2]
+        return bool(values["damping"].any() or gains.any() or any(name.endswith("torque") for name in values))
 
     def commanded(self, name: str, t: Any) -> Array:
-        """A commanded angle at some times.
+        """A commanded angle at given times.
 
         Args:
             name: ``"roll"`` or ``"pitch"``.
@@ -166,47 +166,47 @@ class Aircraft(OwnSystem):
         return np.stack([np.broadcast_to(signal.at(each), command.batch) for each in times])
 
     def repr_arguments(self) -> list[str]:
-        """Its arguments, for its repr: those that are not the document's."""
+        """Its arguments, for its repr, without those that have the document's values."""
         usual = {"inertia": INERTIA, "damping": DAMPING, "gains": GAINS, "roll": np.zeros(()), "pitch": np.zeros(())}
-        said = [f"form={self.form!r}"]
+        arguments = [f"form={self.form!r}"]
         for name, value in self.parameters_given.items():
             if name in usual and isinstance(value, np.ndarray) and np.array_equal(value, usual[name]):
                 continue
             short = isinstance(value, np.ndarray) and value.shape == (3,) and name in ("inertia", "damping", "gains")
             shape = f"array{value.shape}" if isinstance(value, np.ndarray) and value.ndim else value
-            said.append(f"{name}={tuple(value.tolist()) if short else shape}")
-        return said if self.controllers else [*said, "controllers=False"]
+            arguments.append(f"{name}={tuple(value.tolist()) if short else shape}")
+        return arguments if self.controllers else [*arguments, "controllers=False"]
 
     def for_state_shapes(self, *states: Any) -> Aircraft:
         """Itself: its size is fixed."""
         return self
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Parameters, commands and inputs, and the strength of a control of the quaternion's length."""
-        return super().given(batch) | ({} if self.kept is None else {"strength": self.given_kept()["strength"]})
+        """The parameters, commands and inputs, and the strength of a control of the quaternion's length."""
+        return super().given(batch) | ({} if self.kept is None else {"strength": self.constraint_parameters()["strength"]})
 
-    # ---- what keeps the quaternion's length
+    # ---- controls of the quaternion's length
 
     def controlled(self, control: Any, v: Array, y: Array, dt: float) -> Aircraft:
-        """The same aircraft under a control; the target is that of the state, and 1 for the length of a quaternion."""
+        """The aircraft under a control, whose target is the value of the state, or 1 for the length of a quaternion."""
         if self.keeps(control):
-            return self._kept_by(control)
+            return self._with_constraint_control(control)
         return cast("Aircraft", super().controlled(_of_length_one(control), v, y, dt))
 
     def under(self, control: Any, batch: Shape) -> Aircraft:
-        """The same, for unknown states of that batch shape."""
+        """The aircraft under a control, for unknown states of that batch shape."""
         if self.keeps(control):
-            return self._kept_by(control)
+            return self._with_constraint_control(control)
         return cast("Aircraft", super().under(_of_length_one(control), batch))
 
     def keeps(self, control: Any) -> bool:
-        """Whether it is a control of the quaternion's length by the rates; a projection is that of an invariant."""
+        """Whether a control acts on the quaternion's length through the rates; a projection is that of an invariant."""
         return self.form == "quaternion" and isinstance(control, NormControl)
 
-    def _kept_by(self, control: Any) -> Aircraft:
-        kept = super()._kept_by(control)
-        kept._core = kept._single = None  # its rates have another term
-        return kept
+    def _with_constraint_control(self, control: Any) -> Aircraft:
+        controlled = super()._with_constraint_control(control)
+        controlled._core = controlled._single = None  # its rates have another term
+        return controlled
 
     # ---- attitudes
 
@@ -228,8 +228,8 @@ class Aircraft(OwnSystem):
             >>> sw.Aircraft("quaternion").attitude(pitch=180.0).round(3)
             array([0., 0., 1., 0.])
         """
-        given = {"roll": roll, "pitch": pitch, "yaw": yaw}
-        angles = {name: checks.numbers(name, angle, unit="degrees") for name, angle in given.items()}
+        arguments = {"roll": roll, "pitch": pitch, "yaw": yaw}
+        angles = {name: checks.numbers(name, angle, unit="degrees") for name, angle in arguments.items()}
         batch = checks.batch_shape({name: angle.shape for name, angle in angles.items()})
         checks.fits("roll, pitch, yaw: the attitudes", 16, batch, "ask for fewer")
         block = np.stack([np.broadcast_to(angle, batch) for angle in angles.values()])
@@ -254,10 +254,10 @@ class Aircraft(OwnSystem):
         block, axis = self._block(y, axis)
         with np.errstate(all="ignore"):
             if self.form == "euler":
-                found = attitude.wrapped(block)
+                angles = attitude.wrapped(block)
             else:
-                found = attitude.angles_of_rotation(attitude.rotation_of_quaternion(block))
-        return np.moveaxis(found, 0, axis)
+                angles = attitude.angles_of_rotation(attitude.rotation_of_quaternion(block))
+        return np.moveaxis(angles, 0, axis)
 
     def rotation(self, y: Any, axis: int = 0) -> Array:
         """The rotation matrix from the aircraft to space, R = R_z(ψ)·R_y(θ)·R_x(φ), of the coordinates themselves.
@@ -304,7 +304,7 @@ def _command(name: str, value: Any, unit: str) -> Any:
 
 
 def _of_length_one(control: Any) -> Any:
-    """A projection of the quaternion's length, whose target is 1 if none was given and not what the length is at the start."""
+    """The control; a projection of the quaternion's length without a target has the target 1, not the length at the start."""
     if isinstance(control, Projection) and control.way == "norm" and control.target is None:
         return Projection("norm", target=1.0)
     return control

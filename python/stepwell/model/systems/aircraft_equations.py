@@ -1,6 +1,6 @@
-"""The rates of an aircraft (Appendix E), with its attitude in Euler angles or as a quaternion; core and reference both run this.
+"""The rates of an aircraft (Appendix E), with its attitude in Euler angles or as a quaternion, for core and reference.
 
-A command, a torque or a control that was not given has its default, the number 0, and is left out: it is no operation of a step.
+A command, a torque or a control that is left out has its default, the number 0, and adds no operation to a step.
 """
 
 from __future__ import annotations
@@ -11,33 +11,33 @@ import numpy as np
 
 from ..equations import system
 
-#: The document's moments of inertia; its dampers; its gains of roll and pitch, per degree, and of the yaw rate.
+#: The document's moments of inertia, its dampers, and its gains of roll and pitch, per degree, and of the yaw rate.
 INERTIA, DAMPING, GAINS = np.array([0.6, 1.0, 1.5]), np.array([2.0, 3.0, 1.0]), np.array([0.06, 0.10, 1.0])
 
-#: The document's trap: a smaller cosine of the pitch angle is replaced by this.
+#: The document's trap: this replaces a smaller cosine of the pitch angle.
 SMALLEST_COSINE = 1e-5
 
 
 def is_given(parameter: Any) -> bool:
-    """Whether it is a value of the system and not the number that is the default."""
+    """Whether a parameter has a value of the system; the default, which means none, is a float."""
     return not isinstance(parameter, float)
 
 
 def wrapped(angle: Any) -> Any:
-    """An angle in degrees without whole turns, from −180 to 180, as the document's loops give it, which hang on huge angles."""
+    """An angle in degrees without whole turns, from −180 to 180, as by the document's loops, which hang on huge angles."""
     turns = np.floor((180.0 - np.abs(angle)) / 360.0)  # zero or less
-    return angle - np.copysign(360.0 * turns, angle)  # which takes the sign of the angle alone
+    return angle - np.copysign(360.0 * turns, angle)
 
 
 def torques(v: Any, angles: Any, bank: Any, damping: Any, gains: Any, commands: Any, added: Any) -> list[Any]:
-    """The dampers, the yaw rate by the roll angle, and what was given of torque commands and of commanded angles.
+    """The torques of the dampers, of the yaw rate by the roll angle, and of the commands that are given.
 
     Args:
         v: the angular velocity.
         angles: roll and pitch in degrees, as the controllers take them.
         bank: sin φ·cos θ.
-        damping: of the three axes.
-        gains: of roll, pitch and yaw rate.
+        damping: the dampers of the three axes.
+        gains: the gains of roll, pitch and yaw rate.
         commands: the commanded roll and pitch.
         added: the torque commands about the three axes.
     """
@@ -130,5 +130,5 @@ quaternion.invariant(energy)
 
 @quaternion.invariant
 def norm(v: Any, q: Any) -> Any:
-    """The length of the quaternion, which is linear along its gradient: so the projection to first order is exactly q/|q|."""
+    """The length of the quaternion. It is linear along its gradient, so the projection to first order is exactly q/|q|."""
     return np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])

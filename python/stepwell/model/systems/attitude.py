@@ -1,7 +1,7 @@
-"""Attitudes: from Euler angles in degrees to quaternions and rotation matrices, and back; the same bits on every machine.
+"""Attitudes: from Euler angles in degrees to quaternions and rotation matrices, and back, to the same bits on every machine.
 
 The rotation from the body to space is R = R_z(ψ)·R_y(θ)·R_x(φ), with the roll angle φ, the pitch angle θ and the yaw angle ψ. The
-columns of R are the axes of the body, seen in space. Arrays have these axes first, and those of a batch, or of time, after them.
+columns of R are the axes of the body, seen in space. Axes of a batch or of time come last in arrays.
 """
 
 from __future__ import annotations

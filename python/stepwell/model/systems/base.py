@@ -33,21 +33,21 @@ class System(Immutable, ValueEquality, ABC):
     """Two blocks, velocities ``v`` and coordinates ``y``, and a rate for each.
 
     Attributes:
-        kernel: name of its files in the core and in the reference.
+        kernel: the name of its files in the core and in the reference.
         reference: its class in the reference.
         v_shape: shape of a member's velocity block.
         y_shape: shape of a member's coordinate block.
         axes: names of the blocks' axes, for messages.
         second_order: whether ẏ is v times a number, so that ÿ = a(t, y) if no force depends on v.
-        velocity_term: the term that depends on the velocity, or None.
+        velocity_term: the name of a term that depends on the velocity, or None.
         linear: whether the rates are linear in v, y and the inputs.
         complex_step: whether the reference is correct for numbers with an infinitesimal imaginary part, which is the fastest way
             to its derivatives; those of other systems come from their tape.
-        input_names: the inputs that it can be given, each a number.
+        input_names: the names of the inputs that it accepts, each a number.
         batch: shape to which the parameters broadcast.
-        around: the parts that are around its equations, from the inside out; see ``model/around.py``.
-        constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
-        kept: that control or projection, or None; ``integrate`` sets it.
+        around: the parts around its equations, from the inside out; see ``model/around.py``.
+        constraint: the name of the constraint on its coordinates that a control or projection can keep; None without one.
+        kept: the control or projection that keeps this constraint, or None; ``integrate`` sets it.
 
     Example:
         >>> system = sw.Oscillator(omega=[1.0, 2.0, 3.0])
@@ -70,12 +70,12 @@ class System(Immutable, ValueEquality, ABC):
     constraint: ClassVar[str | None] = None
     kept: ConstraintControl | Projection | None = None
     _free: System | None = None
-    #: The parameters of some members of a batch, of a system that was taken for them: see ``of_members``.
+    #: The parameters of some members of a batch, if the system is for these members: see ``of_members``.
     _members: tuple[dict[str, Any], list[Bound]] | None = None
 
     @property
     def kind_name(self) -> str:
-        """What systems of its kind are called."""
+        """The name of its kind of system."""
         return type(self).__name__
 
     @property
@@ -96,13 +96,13 @@ class System(Immutable, ValueEquality, ABC):
     def control(self) -> EnergyControl | Projection | None:
         """The control or projection of its energy, or None; ``integrate`` sets it."""
         if not self.around:
-            return None  # the usual case, which is asked for several times a run
+            return None  # the usual case, and a run needs it several times
         control: EnergyControl | Projection | None = self.part("control")
         return control
 
     @property
     def stick_friction(self) -> Array | None:
-        """By how much friction that sticks slows each velocity in a unit of time, or None; broadcasts over the batch."""
+        """The deceleration of each velocity by friction that sticks, or None; broadcasts over the batch."""
         friction = self.part("friction")
         return None if friction is None else friction.limit
 
@@ -114,12 +114,12 @@ class System(Immutable, ValueEquality, ABC):
 
     @property
     def keeper(self) -> AnyControl | None:
-        """The control or projection that it is under, as ``integrate`` was given it, with its target in numbers."""
+        """The control or projection that acts on it, or None: the argument of ``integrate``, with its target in numbers."""
         return self.control if self.kept is None else self.kept
 
     @property
     def uncontrolled(self) -> System:
-        """The same system without its control."""
+        """This system without its control."""
         return self if self._free is None else self._free
 
     @abstractmethod
@@ -155,35 +155,35 @@ class System(Immutable, ValueEquality, ABC):
 
     @abstractmethod
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Its parameters by name, for states of that batch shape: the arguments of its reference class except the step.
+        """The parameters of its equations by name, for states of that batch shape: the arguments of its reference after the step.
 
-        Each is a word, a whole number, a list of whole numbers as bytes (four for each, the lowest first), an array (its own axes
-        first, then those of the batch), a signal, a list of signals, or None if it was not given. The core takes the same under
-        the same names.
+        Each is a string, a whole number, a list of whole numbers as bytes (four for each, the lowest first), an array (its own
+        axes first, then those of the batch), a signal, a list of signals, or None for a term that is left out. The core takes
+        the same values under the same names.
         """
 
     @property
     def groups(self) -> tuple[int, ...]:
-        """The group of each number of v, then of y, whose errors count together; see ``reference/acceptance.py``."""
+        """The group of each number of v, then of y, whose errors are judged together; see ``reference/acceptance.py``."""
         return ()
 
     def reference_at_step(self, h: float, batch: Shape) -> Any:
-        """The NumPy reference of this system, scaled to the step h, for states of that batch shape; without what is around it."""
+        """The NumPy reference of its equations, without the parts around them, scaled to the step h, for that batch shape."""
         return self.reference(h, **self.own_parameters(batch))
 
     def scaled(self, h: float, batch: Shape, force: Array | None = None) -> Any:
-        """The NumPy reference of this system and all that is around it, scaled to the step h, for states of that batch.
+        """The NumPy reference of its equations and all parts around them, scaled to the step h, for that batch shape.
 
         ``force`` is added to v̇.
         """
         return wrapped(self.reference_at_step(h, batch), h, self.parts(batch, force))
 
     def own_parameters(self, batch: Shape) -> dict[str, Any]:
-        """The parameters of its own equations by name: ``given``, or those of the members for which it was taken."""
+        """The parameters of its equations by name: those of ``given``, or those of its members if it is for some."""
         return self.given(batch) if self._members is None else of_shape(self._members[0], batch)
 
     def parts(self, batch: Shape, force: Array | None = None) -> list[Bound]:
-        """Each part around its equations with its parameters by name, and last the force from outside, if there is one."""
+        """Each part around its equations with its parameters by name; the force from outside, if there is one, is last."""
         if self._members is None:
             parts = [(part, part.parameters(self.y_shape, batch)) for part in self.around]
         else:
@@ -193,10 +193,10 @@ class System(Immutable, ValueEquality, ABC):
         return parts
 
     def surrounded(self, part: Part) -> Self:
-        """The same system with a part around its equations, in place of one of the same kind.
+        """This system with a further part around its equations, which replaces one of the same kind.
 
         Args:
-            part: what acts on the system, such as a spring to a moving anchor; see docs/developing/adding.md.
+            part: something that acts on the system, such as a spring to a moving anchor; see docs/developing/adding.md.
 
         Raises:
             ArgumentError: if the batch of the part does not broadcast with that of the system.
@@ -219,11 +219,11 @@ class System(Immutable, ValueEquality, ABC):
         return tuple(sorted([*parts, part], key=lambda each: ORDER.index(each.kind)))
 
     def of_members(self, batch: Shape, own: dict[str, Any], parts: list[Bound]) -> Self:
-        """The same system for some members of a batch, of which these are the parameters, with one batch axis."""
+        """This system for some members of a batch, with the parameters of their equations and parts, along one batch axis."""
         return changed(self, batch=batch, _members=(own, parts))
 
     def all_parameters(self, batch: Shape) -> dict[str, Any]:
-        """The parameters of this system, and of what is around it, by name."""
+        """The parameters of its equations and of the parts around them, by name."""
         parameters = dict(self.own_parameters(batch))
         for _, of_part in self.parts(batch):
             parameters |= of_part
@@ -231,19 +231,19 @@ class System(Immutable, ValueEquality, ABC):
 
     @property
     def chooses(self) -> bool:
-        """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
+        """Whether the rates are made of pieces between which the state or the time chooses."""
         return False
 
     def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
-        """The parameters of this system, and of what is around it, in the form that the core takes.
+        """The parameters of its equations and of the parts around them, in the form that the core takes.
 
-        A system of own equations tells more of them to a method that needs the ``series`` of a solution. ``single`` is whether
-        steps are computed in float32; the parameters are the same, operations among them are not.
+        For a method that needs the ``series`` of a solution, a system of own equations adds derivatives. ``single`` is whether
+        steps are computed in float32; parameters are then the same, and operations of own equations are not.
         """
         return flat(self.all_parameters(batch), batch)
 
     def named(self, name: str, index: Shape) -> str:
-        """The name of a number among the parameters: that of an argument, and the index in it."""
+        """The name of a number among the parameters: an argument, and the index in it."""
         return f"{name}[{','.join(map(str, index))}]" if index else name
 
     @property
@@ -260,7 +260,7 @@ class System(Immutable, ValueEquality, ABC):
         raise UnsupportedError(f"energy: {self!r} has no energy of its own; compute what you mean by it from v and y")
 
     def recordable(self, name: str, v: Array, y: Array, dt: float) -> Array:
-        """A quantity computed from the states of a run with that step, with the same bits as if it had been recorded."""
+        """A quantity, computed from the states of a run with that step to the bits that recording it gives."""
         if name not in self.quantities:
             return self.energy(v, y)
         return np.asarray(self.reference_at_step(dt, y.shape[len(self.y_shape) :]).record(name, v, y))
@@ -279,51 +279,51 @@ class System(Immutable, ValueEquality, ABC):
             each.check(last)
 
     def doubt(self, y: Array) -> tuple[str, Any] | None:
-        """A message if the rates are meaningless at some of these saved coordinates, and of which members; or None."""
+        """A message if the rates are meaningless at some of these saved coordinates, with the members concerned; or None."""
         return None
 
     def for_state_shapes(self, *states: Any) -> System:
-        """The same system for states of these shapes; this matters only for a system whose size is not fixed yet."""
+        """This system for states of these shapes; a system whose size is not fixed yet takes it from them."""
         return self
 
     def controlled(self, control: Any, v: Array, y: Array, dt: float) -> Self:
-        """The same system under control, the target that of the state if the control has none.
+        """This system under a control; without a target of its own, the control keeps the value of this state.
 
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
         if self.keeps(control):
-            return self._kept_by(control)
+            return self._with_constraint_control(control)
         self._controllable(control)
         with np.errstate(all="ignore"):
             _, kinetic, energy = self.reference_at_step(1.0, y.shape[len(self.y_shape) :]).energies(v, y)
-        return self._held_by(control.aimed(kinetic, energy, dt))
+        return self._with_control(control.aimed(kinetic, energy, dt))
 
     def under(self, control: Any, batch: Shape) -> Self:
-        """The same system under control, in what a step does and not in numbers, for unknown states of that batch shape.
+        """This system under a control, for unknown states of that batch shape: with the operations of a step, and any target.
 
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
         if self.keeps(control):
-            return self._kept_by(control)
+            return self._with_constraint_control(control)
         self._controllable(control)
-        return self._held_by(control.aimed(np.ones(batch), np.zeros(batch), TINY))
+        return self._with_control(control.aimed(np.ones(batch), np.zeros(batch), TINY))
 
     def keeps(self, control: Any) -> bool:
-        """Whether it is the control or projection of the system's own constraint."""
-        kept = getattr(control, "constraint", None) or getattr(control, "way", None)
-        return kept is not None and kept == self.constraint
+        """Whether a control or projection is that of the system's own constraint."""
+        constraint = getattr(control, "constraint", None) or getattr(control, "way", None)
+        return constraint is not None and constraint == self.constraint
 
-    def _kept_by(self, control: Any) -> Self:
+    def _with_constraint_control(self, control: Any) -> Self:
         if getattr(control, "target", None) is not None:
             raise ArgumentError(f"target: {control!r} keeps a constraint of {self!r}, which is its own target; leave it out")
         free = self.uncontrolled
         batch = checks.batch_shape({"system": free.batch, "control": control.batch})
         return cast("Self", changed(free, _free=free, kept=control, batch=batch))
 
-    def given_kept(self) -> dict[str, Any]:
-        """What keeps the system's constraint, as parameters: ``keeps``, "control" or "projection", and its ``strength``."""
+    def constraint_parameters(self) -> dict[str, Any]:
+        """The parameters of the constraint: ``keeps``, which is "control", "projection" or None, and ``strength``."""
         if self.kept is None:
             return {"keeps": None, "strength": None}
         strength = getattr(self.kept, "strength", None)
@@ -339,11 +339,11 @@ class System(Immutable, ValueEquality, ABC):
         if not hasattr(self.reference, "energies"):
             raise UnsupportedError(f"control: {self!r} has no energy control")
 
-    def _held_by(self, control: EnergyControl | Projection) -> Self:
+    def _with_control(self, control: EnergyControl | Projection) -> Self:
         return changed(self, _free=self.uncontrolled, around=self._around_with(control), velocity_term="energy control")
 
     def stepped_by(self, method: Method) -> Self:
-        """The same system, its control acting between steps where v and y of the method's stages belong to different times."""
+        """This system for a method: if v and y of its stages belong to different times, a control acts between steps."""
         if self.control is None:
             return self
         between = method.needs_acceleration or method.has_series
@@ -351,14 +351,14 @@ class System(Immutable, ValueEquality, ABC):
             return self
         return changed(self, around=self._around_with(changed(self.control, between=between)))
 
-    # What the transition-matrix form and the analysis ask of a linear system.
+    # ---- inputs, which the transition-matrix form and the analysis of a linear system need
 
     def given_inputs(self) -> dict[str, Input]:
-        """Its inputs by name, without those that were not given."""
+        """The inputs of its equations by name, without those that are left out."""
         return {}
 
     def all_inputs(self) -> dict[str, Input]:
-        """The inputs of its equations and of what is around them, by name."""
+        """The inputs of its equations and of the parts around them, by name."""
         inputs = self.given_inputs()
         for part in self.around:
             inputs = inputs | part.inputs
@@ -366,7 +366,7 @@ class System(Immutable, ValueEquality, ABC):
 
     @property
     def samples(self) -> tuple[float, float]:
-        """The shortest time from one sample of an input to the next, and the time of the last; infinite if none changes so."""
+        """The shortest interval between samples of its inputs, and the time of the last sample; (∞, −∞) without samples."""
         sampled = [each for each in self.all_inputs().values() if isinstance(each, Sampled) and not each.constant]
         if not sampled:
             return inf, -inf
@@ -374,22 +374,25 @@ class System(Immutable, ValueEquality, ABC):
         return min(each.interval for each in sampled), last
 
     def jumps(self, begin: float, end: float) -> Array:
-        """When its inputs or their derivatives jump, from ``begin`` to ``end``: ascending, each time once."""
+        """The times from ``begin`` to ``end`` at which its inputs or their derivatives jump: ascending, each once."""
         return np.unique(np.concatenate([np.empty(0), *(each.jumps(begin, end) for each in self.all_inputs().values())]))
 
     @property
     def reads_time(self) -> bool:
-        """Whether its equations, beside its inputs, depend on the time."""
+        """Whether its equations depend on the time otherwise than through inputs."""
         return False
 
     def switching_times(self, begin: float, end: float) -> Array:
-        """When its rates take another piece by the time alone, from ``begin`` to ``end`` and some around: (times, *batch)."""
+        """The times from ``begin`` to ``end``, and some around, at which rates take another piece whatever the state is.
+
+        Their shape is (times, *batch).
+        """
         return np.empty(0)
 
     def over_steps(self, method: Method, t0: Any, dt: float) -> Self:
-        """The same system, whose held samples of less than a step are given by their means over the steps, of each ``t0``."""
+        """This system with the means over each step from ``t0`` in place of held samples that are shorter than a step."""
         sampled = [each for each in self.all_inputs().values() if isinstance(each, Sampled)]
-        # Rates of methods that carry something in place of v belong to the middle of what is stepped over.
+        # Methods that carry something in place of v evaluate rates in the middle of the span of a step.
         first = t0 if method.carry is None else t0 - 0.5 * dt
         if all(each.over_steps(first, dt) is each for each in sampled):
             return self
@@ -415,16 +418,16 @@ class System(Immutable, ValueEquality, ABC):
         return bool(self.all_inputs())
 
     def without_inputs(self) -> System:
-        """The same system without inputs."""
+        """This system without inputs."""
         return self
 
     def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> System:
-        """The same system with these samples as its only input."""
+        """This system with these samples as its only input."""
         raise KeyError(name)
 
 
-def how_to_wrap(function: FunctionType) -> str:
-    """How a function of rates becomes a system."""
+def wrapping_hint(function: FunctionType) -> str:
+    """The phrase of a message that says how a function of rates becomes a system."""
     name, taken = function.__name__, function.__code__.co_varnames[: function.__code__.co_argcount]
     if taken[:1] == ("t",) and len(taken) > 1 and "v" not in taken[1:2] and (len(taken) == 2 or taken[2:3] != ("y",)):
         return f"for ẏ = f(t, y) wrap it with sw.system(order=1)({name}), or @sw.system(order=1)"
@@ -437,12 +440,12 @@ def a_system(value: Any) -> System:
         if type(value).__name__ == "Definition":
             return a_system(value())
         if isinstance(value, FunctionType):
-            raise DTypeError(f"system: expected a system, got the function {value.__name__}; {how_to_wrap(value)}")
+            raise DTypeError(f"system: expected a system, got the function {value.__name__}; {wrapping_hint(value)}")
         raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(value).__name__}")
     return value
 
 
-def shown(**given: Any) -> list[str]:
-    """Arguments for a repr: those that are not None, arrays by their shape."""
-    short = {k: f"array{v.shape}" if isinstance(v, np.ndarray) and v.ndim else v for k, v in given.items() if v is not None}
+def shown(**arguments: Any) -> list[str]:
+    """Arguments for a repr: without those that are None, and arrays by their shape."""
+    short = {k: f"array{v.shape}" if isinstance(v, np.ndarray) and v.ndim else v for k, v in arguments.items() if v is not None}
     return [f"{k}={v}" for k, v in short.items()]

@@ -52,7 +52,7 @@ class Chain(System):
         return [str(self.n)]
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Stiffnesses and masses."""
+        """The stiffnesses and masses."""
         return {"stiffness": aligned(self.stiffness, 1, batch), "mass": aligned(self.mass, 1, batch)}
 
     def energy(self, v: Array, y: Array) -> Array:
@@ -64,7 +64,7 @@ class Chain(System):
 
 
 def _per_row(argument: str, array: Array, rows: int, what: str) -> Array:
-    """One number for each row; where one serves for all it is held once, so that a long chain is made at once."""
+    """One number for each row; a number for all rows is broadcast, so that making a long chain takes no time."""
     if array.ndim == 0:
         return np.broadcast_to(array, (rows,))
     if array.shape[0] not in (1, rows):

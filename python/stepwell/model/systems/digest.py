@@ -1,4 +1,4 @@
-"""By what the operations of an own system are known."""
+"""The digest of an own system's operations, by which a resumed or saved run recognises the system."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .base import System
 
 
 def digest(system: System) -> str:
-    """What the operations of an own system are known by: of its rates, its invariants, and the gradient of one that is kept."""
+    """A hash of the operations of an own system: of its rates, its invariants, and the gradient of one that is projected onto."""
     known: Any = system
     if known.equations is None:
         known = known.for_state_shapes()

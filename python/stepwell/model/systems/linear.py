@@ -17,7 +17,7 @@ from ..inputs import Input, Pulse, as_input
 from ..parameters import aligned
 from .base import System
 
-#: A run of many states holds so many copies of A: as it is given, by rows, and as the core steps it.
+#: A run of many states has so many copies of A in memory: the argument, its rows, and the core's.
 COPIES_OF_A = 5
 
 
@@ -67,30 +67,30 @@ class LinearSystem(System):
         m = 0 if self.B is None else self.B.shape[1]
         self.C = None if C is None else _matrix("C", C, ("r", None), ("n", n), (1, n) if single else None)
         r = 0 if self.C is None else len(self.C)
-        for given, needed, why in (
+        for argument, needed, why in (
             (D, C, "D: expected C too, without which there are no outputs to add inputs to"),
             (D, B, "D: expected B too, without which there are no inputs"),
             (x, B, "x: expected B too, without which there are no inputs"),
         ):
-            if given is not None and needed is None:
+            if argument is not None and needed is None:
                 raise ArgumentError(why)
         self.D = None if D is None else _matrix("D", D, ("r", r), ("m", m), (1, 1) if r == m == 1 else None)
         self.input_names = ("x",) if m == 1 else tuple(f"x[{i}]" for i in range(m))
         self.x = _inputs(x, self.input_names)
         if velocities is None and B is not None and C is not None:
-            velocities = 0  # a model of inputs and outputs, whose states are of no kind
+            velocities = 0  # a model of inputs and outputs, whose states are neither velocities nor coordinates
         self.velocities = _velocities(velocities, n)
         self.coordinates = tuple(i for i in range(n) if i not in set(self.velocities))
         self.v_shape, self.y_shape = (len(self.velocities),), (len(self.coordinates),)
         matrices = {"A": self.A, "B": self.B, "C": self.C, "D": self.D}
         self.batch = checks.batch_shape(
             {name: matrix.shape[2:] for name, matrix in matrices.items() if matrix is not None}
-            | {name: given.batch for name, given in self.given_inputs().items()}
+            | {name: argument.batch for name, argument in self.given_inputs().items()}
         )
         self._find_order()
 
     def _find_order(self) -> None:
-        """Find from A and B whether ẏ is v times a number, and whether v̇ depends on v."""
+        """Set whether ẏ is v times a number, and whether v̇ depends on v, by A and B."""
         v, y = list(self.velocities), list(self.coordinates)
         speeds, n = self.A[y][:, v], len(v)
         unit = np.eye(n).reshape(n, n, *(1,) * (self.A.ndim - 2))
@@ -111,35 +111,35 @@ class LinearSystem(System):
 
     @property
     def groups(self) -> tuple[int, ...]:
-        """Each state is one of its own, for their units differ."""
+        """Each state is a group of its own, because units may differ."""
         return tuple(range(len(self.A)))
 
     def given_inputs(self) -> dict[str, Input]:
-        """Its inputs by name, without those that were not given."""
-        return {name: given for name, given in zip(self.input_names, self.x, strict=True) if given is not None}
+        """Its inputs by name, without those that are None."""
+        return {name: each for name, each in zip(self.input_names, self.x, strict=True) if each is not None}
 
     def without_inputs(self) -> LinearSystem:
-        """The same system without inputs."""
+        """The system without inputs."""
         return LinearSystem(self.A, self.B, self.C, self.D, velocities=self.velocities)
 
     def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> LinearSystem:
-        """The same system with these samples as its only input."""
+        """The system with these samples as its only input."""
         if name not in self.input_names:
             raise KeyError(name)
         x = [Pulse(values, interval, start) if name == each else None for each in self.input_names]
         return LinearSystem(self.A, self.B, self.C, self.D, x=x, velocities=self.velocities)
 
     def _parts(self) -> list[Array]:
-        """A and the columns of B of the inputs that were given, both in the order of the blocks."""
+        """A, and the columns of B whose inputs are not None, both in the order of the blocks."""
         order = [*self.velocities, *self.coordinates]
         return [self.A[order][:, order]] + ([] if self.B is None else [self.B[order][:, self._columns()]])
 
     def _columns(self) -> list[int]:
-        """The columns of the inputs that were given; what was not given is zero and left out."""
+        """The columns of B whose inputs are not None; the others are zero and left out."""
         return [i for i, each in enumerate(self.x) if each is not None]
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """The matrix [A B] in the order of the blocks, the inputs, and whether it gives an acceleration."""
+        """The matrix [A B] in the order of the blocks, the inputs, and whether it is that of an acceleration."""
         return {
             "kind": "acceleration" if self.second_order and self.velocity_term is None else "",
             "n_v": self.v_shape[0],
@@ -148,7 +148,7 @@ class LinearSystem(System):
         }
 
     def named(self, name: str, index: Shape) -> str:
-        """As in A and B, whose rows and columns the core has in the order of the blocks, but for inputs that are not given."""
+        """The name in A, B or an input; the core has rows and columns in the order of the blocks, and only the inputs in use."""
         if name != "rows":
             position, dot, rest = name.removeprefix("inputs[").partition("]")
             return (list(self.given_inputs())[int(position)] + rest) if dot else name
@@ -228,14 +228,14 @@ def _matrix(
 
 
 def _side_by_side(parts: list[Array], batch: Shape) -> Array:
-    """Matrices of equally many rows as one, with as many batch axes as there are."""
+    """Matrices of equally many rows as one matrix over the whole batch."""
     parts = [aligned(each, 2, batch) for each in parts]
     common = np.broadcast_shapes(*(each.shape[2:] for each in parts))
     return np.concatenate([np.broadcast_to(each, (*each.shape[:2], *common)) for each in parts], axis=1)
 
 
 def _inputs(x: Any, names: tuple[str, ...]) -> tuple[Input | None, ...]:
-    """One input for each name, of what users give for x."""
+    """The argument x as one input for each name."""
     if x is None:
         return (None,) * len(names)
     if len(names) == 1 and not (isinstance(x, (list, tuple)) and len(x) == 1):

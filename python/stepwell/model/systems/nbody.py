@@ -75,10 +75,10 @@ class NBody(System):
         floors = surfaces.floors(floor)
         self.around = surfaces.around(floors)
         size = self.dim
-        for name, found in surfaces.dimensions(floors).items():
-            if found not in (2, 3) or found != (size or found):
-                raise ShapeError(f"{name}: expected a vector of {size or '2 or 3'} components, as many as dim, got {found}")
-            size = found
+        for name, components in surfaces.dimensions(floors).items():
+            if components not in (2, 3) or components != (size or components):
+                raise ShapeError(f"{name}: expected a vector of {size or '2 or 3'} components, as many as dim, got {components}")
+            size = components
         self.dim = size
         self.v_shape = self.y_shape = (len(self.masses), size or 2)
         shapes = {"masses": self.masses.shape[1:], "G": self.G.shape, "softening": self.softening.shape}
@@ -92,7 +92,7 @@ class NBody(System):
         return [f"masses={masses}", f"force={self.force!r}", f"G={self.G}", *softening]
 
     def for_state_shapes(self, *states: Any) -> NBody:
-        """The same bodies in as many dimensions as the states, v and y, have."""
+        """The bodies in as many dimensions as the states, v and y, have."""
         if self.dim is not None:
             return self
         n, dims = len(self.masses), set()
@@ -120,7 +120,7 @@ class NBody(System):
         return changed(self, **numbers, batch=(), around=tuple(part.member(one) for part in self.around))
 
     def closest(self, y: Array) -> tuple[tuple[int, int], float]:
-        """The two bodies that are nearest to each other in one state, and their distance."""
+        """The two bodies that are closest to each other in one state, and their distance."""
         n, best = len(y), ((0, 0), np.inf)
         for i in range(n - 1):
             with np.errstate(all="ignore"):
@@ -140,13 +140,13 @@ class NBody(System):
         return self.control is None and not self.contacts and self.force != "printed"
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Force, dimensions, masses, G·m, softening."""
+        """The force, the dimension, masses, G·m and the softening."""
         masses = aligned(self.masses, 1, batch)
         sizes = {"force": self.force, "dim": self.y_shape[1]}
         return sizes | {"masses": masses, "strength": self.G * masses, "softening": self.softening}
 
     def named(self, name: str, index: Shape) -> str:
-        """G·m has a name of its own."""
+        """The parameter of G·m is called Gm."""
         return super().named("Gm" if name == "strength" else name, index)
 
     @property

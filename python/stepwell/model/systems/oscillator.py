@@ -54,7 +54,7 @@ class Oscillator(System):
     linear = True
     input_names = ("x", "a")
 
-    # Those that are not given stay these: to assign five takes as long as to check all.
+    # Defaults, so that arguments that are None need no assignment: five take as long as all checks.
     damping: Array | None = None
     drag: Array | None = None
     friction: Array | None = None
@@ -94,8 +94,8 @@ class Oscillator(System):
             if term is not None:
                 shapes[name] = term.shape
                 self.velocity_term = name if self.velocity_term is None else f"{self.velocity_term} and {name}"
-        for name, given in self.given_inputs().items():
-            shapes[name] = given.batch
+        for name, each in self.given_inputs().items():
+            shapes[name] = each.batch
         self.batch = checks.batch_shape(shapes)
         if self.friction is not None:
             self.linear = self.complex_step = False
@@ -108,13 +108,13 @@ class Oscillator(System):
         return [*terms, f"form={self.form!r}"]
 
     def given_inputs(self) -> dict[str, Input]:
-        """Its inputs by name, without those that were not given."""
+        """Its inputs by name, without those that are None."""
         if self.x is None and self.a is None:
             return {}
-        return {name: given for name, given in (("x", self.x), ("a", self.a)) if given is not None}
+        return {name: each for name, each in (("x", self.x), ("a", self.a)) if each is not None}
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Form, parameters, inputs."""
+        """The form, the parameters and the inputs."""
         inputs = {"x": signal(self.x), "a": signal(self.a)}
         return {"form": self.form, "omega": self.omega, "damping": self.damping, "drag": self.drag, **inputs}
 
@@ -125,11 +125,11 @@ class Oscillator(System):
         return 0.5 * (v * v + (self.omega * self.omega) * (y * y))
 
     def without_inputs(self) -> Oscillator:
-        """The same oscillator without inputs."""
+        """The oscillator without inputs."""
         return self._driven({})
 
     def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> Oscillator:
-        """The same oscillator with these samples as its only input."""
+        """The oscillator with these samples as its only input."""
         return self._driven({name: Pulse(values, interval, start)})
 
     def _driven(self, inputs: dict[str, Input]) -> Oscillator:

@@ -20,7 +20,7 @@ from ...reference.systems.equations import Equations as Reference
 from ...reference.traced import Tracer
 from ..controls import WAYS, AnyControl, ConstraintControl, Control, EnergyControl, Projection
 from ..equations.definition import Definition, fits
-from ..equations.recognised import Unknown, told
+from ..equations.recognised import Unknown, identity
 from ..equations.series import derivatives_of_functions
 from ..equations.trace import Equations
 from ..inputs import Input, Sampled, Sinusoid
@@ -29,14 +29,14 @@ from .base import TINY, System, shown
 
 #: The name of the function among those of parameters; no parameter can have it.
 RATES = "equations()"
-#: Attributes that are found out of the others and kept.
-FOUND_LATER = ("_core", "_single", "_with_functions", "_digest", "_bounds", "_met")
-#: Of how many shapes of states it is remembered what they are of.
-MOST_MET = 256
-#: Of how many functions the operations are kept.
-MOST_TRACED = 256
+#: Attributes that cache results of the others.
+DERIVED = ("_core", "_single", "_with_functions", "_digest", "_bounds", "_met")
+#: The most shapes of states that a system caches.
+MOST_SHAPES = 256
+#: The operations of functions that were traced, and the most functions.
 _TRACED: dict[Any, Any] = {}
-#: Without a state the shortest vector is looked for that the function can do with, up to this length.
+MOST_TRACED = 256
+#: Without a state, the shapes that are tried: a number, and vectors up to this length.
 LONGEST_GUESS = 32
 SHORTEST: tuple[Shape, ...] = ((), *((n,) for n in range(1, LONGEST_GUESS + 1)))
 
@@ -45,7 +45,7 @@ class OwnSystem(System):
     """A system of your own equations: calling a function that is decorated by ``stepwell.system`` returns one."""
 
     kernel = "equations"
-    #: The operations, and what they are known by.
+    #: The operations, and their digest.
     _digest: tuple[Any, str] | None = None
     reference = Reference
     #: The control that keeps an invariant as a part of the rates, or None.
@@ -77,15 +77,15 @@ class OwnSystem(System):
         #: The operations of the function, and those in float32.
         self._core: Any = None
         self._single: Any = None
-        #: The same rates as ``_core``, and what series must know of the functions in them.
+        #: The rates ``_core``, and these rates with the derivatives of their functions, for series.
         self._with_functions: tuple[Any, Any] | None = None
-        #: The same system for blocks of these shapes, and for states of these, which may have batch axes.
+        #: This system for blocks of these shapes, and for states of these shapes, which may have batch axes.
         self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
         self._met: dict[tuple[Shape | None, Shape | None], OwnSystem] = {}
 
     @property
     def keeper(self) -> AnyControl | None:
-        """A control is a part of the rates, and a projection is not."""
+        """The control, which is a part of the rates, or the projection, which is around them."""
         return self.push if self.push is not None else self.control
 
     @property
@@ -102,7 +102,7 @@ class OwnSystem(System):
         return f"{self.definition.name}({', '.join([*self._all_arguments(), *controls])})"
 
     def _contents(self) -> dict[str, Any]:
-        return {name: value for name, value in super()._contents().items() if name not in FOUND_LATER}
+        return {name: value for name, value in super()._contents().items() if name not in DERIVED}
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}
@@ -118,36 +118,42 @@ class OwnSystem(System):
     # ---- shapes
 
     def for_state_shapes(self, *states: Any) -> OwnSystem:
-        """The same system for the states v and y of these shapes; None is what was not given."""
-        given = zip(("v", "y"), states, strict=False)
-        shapes = {name: checks.shape_of(name, state) for name, state in given if state is not None}
+        """This system for states v and y of these shapes; None is an unknown state."""
+        shapes = {name: checks.shape_of(name, state) for name, state in zip("vy", states, strict=False) if state is not None}
         if self.equations is not None and self._fits(shapes):
             return self
-        met = shapes.get("v"), shapes.get("y")
-        if (known := self._met.get(met)) is not None:
+        key = shapes.get("v"), shapes.get("y")
+        if (known := self._met.get(key)) is not None:
             return known
         refused: list[TraceError] = []
         for v_shape, y_shape in self._candidates(shapes):
             try:
-                if len(self._met) >= MOST_MET:
+                if len(self._met) >= MOST_SHAPES:
                     self._met.clear()
-                self._met[met] = self._bound(v_shape, y_shape)
-                return self._met[met]
+                self._met[key] = self._bound(v_shape, y_shape)
+                return self._met[key]
             except TraceError as error:
                 refused.append(error)
+        raise self._refusal(shapes, refused)
+
+    def _refusal(self, shapes: dict[str, Shape], refused: list[TraceError]) -> Exception:
+        """The error if the function can be run with none of the candidates, which were refused by these errors."""
+        name = self.definition.name
         if not refused:
-            raise ShapeError(
-                f"{self.definition.name}: no state of the declared shape {self.definition.shape[1]} fits what was given: "
-                + ", ".join(f"{name} of shape {shape}" for name, shape in shapes.items())
-            )
+            states = ", ".join(f"{block} of shape {shape}" for block, shape in shapes.items())
+            return ShapeError(f"{name}: expected a state of the declared shape {self.definition.shape[1]}, got {states}")
         # The error of a function of arrays that is run with a number would be misleading.
-        told = next((error for error in refused if not error.of_shape), None)
-        if told is None and (hint := self._batch_first(shapes)):
-            raise ShapeError(f"{self.definition.name}: {hint}") from refused[-1]
-        raise told or refused[0]
+        for error in refused:
+            if not error.of_shape:
+                return error
+        if not (hint := self._batch_first(shapes)):
+            return refused[0]
+        hinted = ShapeError(f"{name}: {hint}")
+        hinted.__cause__ = refused[-1]
+        return hinted
 
     def _batch_first(self, shapes: dict[str, Shape]) -> str:
-        """What to say if the function does with the last axes of the states what it does not do with the first; else nothing."""
+        """A hint if the function can be run with the last axes of the states as the block; empty if not."""
         if self.definition.blocks == 2 or not shapes:
             return ""
         name, shape = max(shapes.items(), key=lambda each: len(each[1]))
@@ -187,7 +193,7 @@ class OwnSystem(System):
                 yield v_shape, y_shape
 
     def _bound(self, v_shape: Shape, y_shape: Shape) -> OwnSystem:
-        """The same system for blocks of these shapes; the function is traced twice, to check that it always does the same."""
+        """This system for blocks of these shapes, with its function traced."""
         if (known := self._bounds.get((v_shape, y_shape))) is not None:
             return known
         definition = self.definition
@@ -202,7 +208,7 @@ class OwnSystem(System):
         return bound
 
     def _trace_once(self) -> None:
-        """Trace the function, or take what was traced of the same function with parameters of the same kinds."""
+        """Trace the function, or take the operations of an equal function with parameters of the same kinds."""
         key = self._key()
         core = None if key is None else _TRACED.get(key)
         if core is None:
@@ -216,39 +222,40 @@ class OwnSystem(System):
         complete(self, velocity_term="forces that do" if core.reads_v else None)
 
     def _key(self) -> Any:
-        """What its operations depend on; None if that cannot be told."""
+        """A key of everything that the operations depend on; None if something may change unseen."""
         definition = self.definition
         try:
             parameters = tuple((name, self._kind_of(name, value)) for name, value in self.parameters_given.items())
-            invariants = tuple((each.name, each.parameters, told(each.function)) for each in definition.invariants.values())
-            function = told(definition.function)
+            invariants = tuple((each.name, each.parameters, identity(each.function)) for each in definition.invariants.values())
+            function = identity(definition.function)
             key = definition.order, definition.blocks, definition.quick_sines, self.v_shape, self.y_shape
             return *key, function, parameters, invariants, definition.name
         except Unknown:
             return None
 
     def _kind_of(self, name: str, value: Any) -> Any:
-        """What the operations depend on of a parameter: not its numbers."""
+        """A key of everything that the operations depend on in a parameter: not its numbers."""
         if isinstance(value, np.ndarray):
             return value.shape[: self.own_axes(name)]
         if isinstance(value, (Sinusoid, Sampled)):
             signal = value.signal()
             return type(signal).__name__, *getattr(signal, "parts", dict)()
-        return told(value)
+        return identity(value)
 
     def _trace(self) -> None:
-        """Run the function with symbols, twice to check that it always does the same; a control is a part of the rates."""
+        """Trace the rates, and a control as a part of them."""
         self._core = self._rates()
         complete(self, velocity_term="forces that do" if self._core.reads_v else None)
 
     def _rates(self, marks: Marks | None = None, *, single: bool = False) -> Any:
         """The rates as operations; with marks also the derivatives of the functions among them.
 
-        Those of float32 are without the invariants that are recorded, which are computed in float64.
+        The function is run twice, to check that it always does the same. The rates of float32 lack the invariants that can be
+        recorded, which are computed in float64.
         """
         equations, definition = self.equations, self.definition
         assert equations is not None
-        plain = changed(self, around=())  # what is around the equations is the core's
+        plain = changed(self, around=())  # the core adds the parts around the equations
         tape = _core.Tape(single=single)
         traced = []
         for _ in range(1 if single else 2):
@@ -265,22 +272,22 @@ class OwnSystem(System):
             )
         dv, dy = traced[0]
         quantities = [(name, *tracer.flat(s.record(name, v, y))) for name in self.quantities if not single]
-        kept = None
+        projected = None
         if equations.kept is not None and not equations.pushed:
             value = equations.invariants[equations.kept].value(v, y, s.given)
             along_v, along_y, square = s.gradient(v, y)
-            kept = (*tracer.flat(value), tracer.flat(along_v), tracer.flat(along_y), *tracer.flat(square))
+            projected = (*tracer.flat(value), tracer.flat(along_v), tracer.flat(along_y), *tracer.flat(square))
         own_dv, own_dy = dv if equations.v_shape != (0,) else [], None if equations.second_order else dy
         functions = [] if marks is None else derivatives_of_functions(tape, marks)
-        return tape.equations(own_dv, own_dy, quantities, kept, functions)
+        return tape.equations(own_dv, own_dy, quantities, projected, functions)
 
     def _known(self) -> OwnSystem:
-        """The same system with known shapes of its blocks."""
+        """This system with known shapes of its blocks."""
         return self if self.equations is not None else self.for_state_shapes()
 
     @property
     def groups(self) -> tuple[int, ...]:
-        """By the definition's ``scale``: each component, each row along the last axis, or each block."""
+        """One group for each component, row along the last axis, or block, by the definition's ``scale``."""
         if self.definition.scale == "block":
             return ()
         groups: list[int] = []
@@ -294,19 +301,19 @@ class OwnSystem(System):
 
     def given(self, batch: Shape) -> dict[str, Any]:
         """The function, and parameters by name."""
-        made: dict[str, Any] = {RATES: self._known().equations}
+        parameters: dict[str, Any] = {RATES: self._known().equations}
         for name, value in self.parameters_given.items():
             if isinstance(value, (Sinusoid, Sampled)):
-                made[name] = value.signal()
+                parameters[name] = value.signal()
             elif isinstance(value, np.ndarray):
                 own = self.own_axes(name)
-                made[name] = aligned(value, own, batch) if own else value
+                parameters[name] = aligned(value, own, batch) if own else value
             else:
-                made[name] = value
-        return made if self.push is None else made | self.push.own_parameters()
+                parameters[name] = value
+        return parameters if self.push is None else parameters | self.push.own_parameters()
 
     def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
-        """The operations of the function, and parameters by name, as the core takes them; for ``series`` with derivatives."""
+        """The operations of the function and the parameters by name, as the core takes them; for ``series`` with derivatives."""
         bound = self._retraced()
         rates = bound._in_single() if single else bound._series_rates() if series else bound._core
         own = {name: value for name, value in bound.all_parameters(batch).items() if name != RATES and not callable(value)}
@@ -320,9 +327,9 @@ class OwnSystem(System):
 
     @property
     def chooses(self) -> bool:
-        """Whether the rates are made of pieces, one of which is chosen by the state or the time.
+        """Whether the rates are made of pieces between which the state or the time chooses.
 
-        The choice of a control, to do nothing where the gradient is zero, counts for nothing: there is no gradient to go along.
+        The choice of a control to do nothing where the gradient is zero does not count: there is no gradient to go along.
         """
         if self.push is not None:
             return self.uncontrolled.chooses
@@ -330,11 +337,11 @@ class OwnSystem(System):
 
     @property
     def reads_time(self) -> bool:
-        """Whether the function does."""
+        """Whether the function depends on the time."""
         return bool(self._retraced()._core.reads_time)
 
     def switching_times(self, begin: float, end: float) -> Array:
-        """The comparisons of the function with the time, solved for it, with the parameters of each member."""
+        """The times at which comparisons of the function change, for the parameters of each member."""
         bound = self._retraced()
         assert bound.equations is not None
         if (known := bound.equations.constant_switching_times) is not None:
@@ -350,8 +357,8 @@ class OwnSystem(System):
 
     @property
     def digest(self) -> str:
-        """What its operations are known by; a long list of them takes long to write out, so it is kept."""
-        from .digest import digest  # only runs that go on need it
+        """A hash of its operations. It is cached, because a long list of operations takes long to write out."""
+        from .digest import digest  # only resumed runs need it
 
         bound = self._retraced()
         if bound._digest is None or bound._digest[0] is not bound._core:
@@ -359,7 +366,7 @@ class OwnSystem(System):
         return bound._digest[1]
 
     def _retraced(self) -> OwnSystem:
-        """With its operations, which an unpickled copy lacks."""
+        """This system with its operations, which an unpickled copy lacks."""
         known = self._known()
         if known._core is None:
             known._trace()
@@ -369,12 +376,12 @@ class OwnSystem(System):
 
     @property
     def quantities(self) -> dict[str, Shape]:
-        """The invariants, each one number; what is made of a parameter that changes with the time is none."""
-        given = self.parameters_given
+        """The invariants, each one number; one of a parameter that changes with the time is not constant, and is left out."""
+        values = self.parameters_given
         constant = (
             name
             for name, each in self.definition.invariants.items()
-            if all(isinstance(given[parameter], np.ndarray) for parameter in each.parameters)
+            if all(isinstance(values[parameter], np.ndarray) for parameter in each.parameters)
         )
         return dict.fromkeys(constant, ())
 
@@ -388,14 +395,14 @@ class OwnSystem(System):
         return np.asarray(self.reference_at_step(1.0, np.shape(y)[len(self.y_shape) :]).record("energy", v, y))
 
     def controlled(self, control: Any, v: Array, y: Array, dt: float) -> OwnSystem:
-        """The same system with an invariant that is kept, at its value at the start if the control has no target."""
+        """This system under a control of an invariant; without a target of its own, the control keeps the value of this state."""
         name = self._invariant_of(control)
         with np.errstate(all="ignore"):
             start = np.asarray(self.reference_at_step(1.0, np.shape(y)[len(self.y_shape) :]).record(name, v, y))
         return self._keeping(name, control.aimed(start, start, dt))
 
     def under(self, control: Any, batch: Shape) -> OwnSystem:
-        """The same, for unknown states of that batch shape."""
+        """This system under a control of an invariant, for unknown states of that batch shape."""
         return self._keeping(self._invariant_of(control), control.aimed(np.ones(batch), np.zeros(batch), TINY))
 
     def _invariant_of(self, control: Any) -> str:
@@ -422,7 +429,7 @@ class OwnSystem(System):
         assert isinstance(known, OwnSystem)
         assert known.equations is not None
         pushed = isinstance(control, Control)
-        kept = changed(
+        controlled = changed(
             known,
             _single=None,
             _bounds={},
@@ -431,14 +438,14 @@ class OwnSystem(System):
             batch=checks.batch_shape({"system": known.batch, "control": control.batch}),
             equations=known.equations.keeping(name, limited=pushed and control.form == "limited", pushed=pushed),
         )
-        complete(kept, **({"push": control, "second_order": False} if pushed else {"around": known._around_with(control)}))
-        kept._trace()
-        complete(kept, velocity_term=kept.velocity_term or "a control of an invariant")
-        return kept
+        complete(controlled, **({"push": control, "second_order": False} if pushed else {"around": known._around_with(control)}))
+        controlled._trace()
+        complete(controlled, velocity_term=controlled.velocity_term or "a control of an invariant")
+        return controlled
 
     @property
     def has_time(self) -> bool:
-        """Its function takes the time, whether or not it uses it."""
+        """Always, because the function takes the time, whether or not it uses it."""
         return True
 
     def given_inputs(self) -> dict[str, Input]:

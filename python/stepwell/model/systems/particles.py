@@ -83,7 +83,7 @@ class Particles(System):
         return [*shown(masses=self.masses, gravity=self.gravity, drag=self.drag)]
 
     def for_state_shapes(self, *states: Any) -> Particles:
-        """The same for as many points in as many dimensions as the states, v and y, have."""
+        """The system with as many points in as many dimensions as the states, v and y, have."""
         points, dim = self.points, self.dim
         for name, state in zip(("v", "y"), states, strict=False):
             shape = () if state is None else checks.shape_of(name, state)
@@ -100,7 +100,7 @@ class Particles(System):
         return changed(self, points=points, dim=dim, v_shape=size, y_shape=size)
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Dimensions, masses, gravity and drag."""
+        """The dimension, masses, gravity and drag."""
         points, dim = self.y_shape
         masses = np.broadcast_to(self.masses, (points,)) if self.masses.ndim == 0 else aligned(self.masses, 1, batch)
         if self.gravity.ndim:
@@ -112,7 +112,7 @@ class Particles(System):
         return {"dim": dim, "masses": aligned(masses, 1, batch), "gravity": gravity, "drag": self.drag}
 
     def energy(self, v: Array, y: Array) -> Array:
-        """Σ m·(½v² − g·y); a spring of a floor is not counted."""
-        given = self.own_parameters(y.shape[2:])
-        fall = (given["gravity"] * y).sum(axis=1)
-        return np.asarray((given["masses"] * (0.5 * (v * v).sum(axis=1) - fall)).sum(axis=0))
+        """Σ m·(½v² − g·y), without the springs of floors."""
+        parameters = self.own_parameters(y.shape[2:])
+        fall = (parameters["gravity"] * y).sum(axis=1)
+        return np.asarray((parameters["masses"] * (0.5 * (v * v).sum(axis=1) - fall)).sum(axis=0))

@@ -54,11 +54,11 @@ class Pendulum(System):
         return shown(omega=self.omega, damping=self.damping, a=self.a)
 
     def given_inputs(self) -> dict[str, Input]:
-        """The input that it was given, by name."""
+        """Its input by name, if it has one."""
         return {} if self.a is None else {"a": self.a}
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Parameters and input."""
+        """The parameters and the input."""
         return {"omega": self.omega, "damping": self.damping, "a": signal(self.a)}
 
     def doubt(self, y: Array) -> tuple[str, Any] | None:

@@ -20,8 +20,8 @@ class Pendulum3D(RodSystem):
     """The rod pendulum in x, y, z (§12): a point mass on a rod without mass, whose other end is fixed at the origin.
 
     Blocks have shape (3,); the last coordinate is the height, so at rest the mass hangs at (0, 0, −length). The pull of the rod
-    is C̈ = 0 solved for it, with C = ½(y·y − length²), so the rod keeps its length but for the errors of the method.
-    ``LengthControl`` returns it, ``Projection("length")`` resets it after every step. ``Rods`` is the same with any number of
+    is the solution of C̈ = 0, with C = ½(y·y − length²), so the rod keeps its length but for the errors of the method.
+    ``LengthControl`` returns it to its length, ``Projection("length")`` resets it after every step. ``Rods`` has any number of
     rods.
 
     Args:
@@ -56,7 +56,7 @@ class Pendulum3D(RodSystem):
         return shown(length=self.length, gravity=self.gravity)
 
     def for_state_shapes(self, *states: Any) -> Pendulum3D:
-        """The same pendulum.
+        """The pendulum itself.
 
         Raises:
             ArgumentError: if the mass is at the origin.
@@ -69,8 +69,8 @@ class Pendulum3D(RodSystem):
         return self
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Length, gravity, and what keeps the length."""
-        return {"length": self.length, "gravity": self.gravity} | self.given_kept()
+        """The length, gravity, and the control of the length."""
+        return {"length": self.length, "gravity": self.gravity} | self.constraint_parameters()
 
     def energy(self, v: Array, y: Array) -> Array:
         """Energy per mass, ½v·v + g·height, which is zero at rest at the height of the fixed end."""

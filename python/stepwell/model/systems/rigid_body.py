@@ -14,7 +14,7 @@ from ..inputs import Input, as_input, signal
 from ..parameters import aligned
 from .base import System, shown
 
-#: A moment may exceed the sum of the others by this share of it: in a flat body they are equal, but for rounding.
+#: A moment may exceed the sum of the others by this share of the sum, since in a flat body both are equal but for rounding.
 FLAT_SLACK = 1e-12
 
 AXES = 3
@@ -100,11 +100,11 @@ class RigidBody(System):
         damping = self.damping
         if damping is not None and damping.ndim == 1:
             damping = damping[0] if (damping == damping[0]).all() else damping.tolist()
-        told = shown(inertia=inertia, **self.given_inputs(), damping=damping, weight=self.weight, centre=centre)
-        return [each.removeprefix("inertia=") for each in told]
+        arguments = shown(inertia=inertia, **self.given_inputs(), damping=damping, weight=self.weight, centre=centre)
+        return [each.removeprefix("inertia=") for each in arguments]
 
     def given_inputs(self) -> dict[str, Input]:
-        """Its torques that were given, by name."""
+        """Its torques by name, without those that are None."""
         return {
             f"{name}[{i}]": each
             for name, three in (("torque", self.torque), ("space_torque", self.space_torque))
@@ -113,14 +113,14 @@ class RigidBody(System):
         }
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Moments, damping, torques, weight, and what keeps the norm."""
+        """The moments, damping, torques and weight, and the control of the norm."""
         vectors = {"inertia": self.inertia, "damping": self.damping, "centre": self.centre}
         inertia, damping, centre = (None if each is None else aligned(each, 1, batch) for each in vectors.values())
         torque, space_torque = (
             None if three is None else [signal(each) for each in three] for three in (self.torque, self.space_torque)
         )
-        given = {"inertia": inertia, "damping": damping, "torque": torque, "space_torque": space_torque}
-        return given | {"weight": self.weight, "centre": centre} | self.given_kept()
+        parameters = {"inertia": inertia, "damping": damping, "torque": torque, "space_torque": space_torque}
+        return parameters | {"weight": self.weight, "centre": centre} | self.constraint_parameters()
 
     @property
     def quantities(self) -> dict[str, Shape]:
@@ -129,7 +129,7 @@ class RigidBody(System):
 
     @property
     def torques_act(self) -> bool:
-        """Whether there are torques or damping, so that the energy need not be constant; a weight has its share in the energy."""
+        """Whether torques or damping act, so that the energy may change; the energy of a weight is included in it."""
         return bool(self.given_inputs()) or (self.damping is not None and bool((self.damping != 0.0).any()))
 
     def doubt(self, y: Array) -> tuple[str, Any] | None:
@@ -160,7 +160,7 @@ def _vector(argument: str, numbers: Array) -> Array:
 
 
 def _possible(inertia: Array) -> None:
-    """Raise if no body has these moments: J₁ = Σ m·(y² + z²), and so on, so that none is above the sum of the others."""
+    """Raise if no body can have these moments: as J₁ = Σ m·(y² + z²), and so on, none is above the sum of the others."""
     with np.errstate(over="ignore"):
         others = np.stack([inertia[1] + inertia[2], inertia[2] + inertia[0], inertia[0] + inertia[1]])
     wrong = inertia > others * (1.0 + FLAT_SLACK)
@@ -179,5 +179,5 @@ def _torques(argument: str, value: Any) -> tuple[Input | None, ...] | None:
     if not several or len(value) != AXES:
         got = f"{len(value)}" if several else f"one {type(value).__name__}"
         raise ShapeError(f"{argument}: expected a sequence of three torques, one for each axis, got {got}")
-    given = tuple(as_input(f"{argument}[{i}]", each) for i, each in enumerate(value))
-    return None if all(each is None for each in given) else given
+    torques = tuple(as_input(f"{argument}[{i}]", each) for i, each in enumerate(value))
+    return None if all(each is None for each in torques) else torques

@@ -1,4 +1,4 @@
-"""Points joined by rods: pendulums of any number of rods, and what else is made of them."""
+"""Points joined by rods: pendulums of any number of rods, and other structures."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from .base import System, shown
 #: The most rods: if all of them meet in one point, a step has some m³/3 operations for each evaluation of the rates.
 MAX_RODS = 100
 
-#: The most pairs of a point and a surface: each is looked at in every step that comes near one.
+#: The most pairs of a point and a surface: a step near a surface computes all of them.
 MAX_CONTACTS = 100
 
-#: A run that saves a rod this much off its length, as a share, gives a warning.
+#: The relative error of the length of a rod in a saved state above which a run warns.
 DOUBTFUL_LENGTH_ERROR = 0.1
 
-#: Where rods that form loops have a pivot below this share of its diagonal entry at the start, some of them say the same twice.
+#: If a pivot of rods that form loops is below this share of its diagonal entry at the start, one of them is redundant.
 SINGULAR_PIVOT = 1e-10
 
 #: An end of a rod: the number of a point, or the coordinates of a fixed anchor.
@@ -35,14 +35,14 @@ End = int | tuple[float, ...]
 
 
 class RodSystem(System):
-    """What a pendulum in space and other systems of rods have in common."""
+    """The base class of the pendulum in space and other systems of rods."""
 
     complex_step = True
     constraint = "length"
     velocity_term = "forces that do"
 
     def named(self, name: str, index: Shape) -> str:
-        """The number of a control is called c."""
+        """The strength of a control is called c."""
         return super().named("c" if name == "strength" else name, index)
 
     @property
@@ -66,41 +66,45 @@ class RodSystem(System):
         return text, wrong.reshape(-1, *batch).any(axis=0)
 
 
-def surfaces_for_rods(floor: Any, given: set[int]) -> tuple[tuple[surfaces.Surface, ...], set[int]]:
-    """The argument ``floor`` of points on rods, and the numbers of dimensions in which these and what is given are.
+def surfaces_for_rods(floor: Any, dims: set[int]) -> tuple[tuple[surfaces.Surface, ...], set[int]]:
+    """The argument ``floor`` of points on rods, and the dimension of rods and surfaces: a set of one number, or empty.
+
+    Args:
+        floor: the argument.
+        dims: the dimension of the rods, likewise.
 
     Raises:
-        ShapeError: if a surface is in another number of dimensions.
+        ShapeError: if a surface has another dimension.
         UnsupportedError: for a way other than "safe".
     """
-    floors, given = surfaces.floors(floor), set(given)
+    floors, dims = surfaces.floors(floor), set(dims)
     for i, each in enumerate(floors):
         if each.way != "safe":
             raise UnsupportedError(
-                f'floor {i}: expected way="safe", got {each.way!r}; impulses of surfaces and pulls of rods have to be found '
-                f"together, which no other way does"
+                f'floor {i}: expected way="safe", got {each.way!r}; impulses of surfaces and pulls of rods depend on each other, '
+                f"and no other way solves for both"
             )
         if each.dim is not None:
-            expected = given or {2, 3}
+            expected = dims or {2, 3}
             if each.dim not in expected:
                 raise ShapeError(
                     f"floor {i}: expected vectors of {' or '.join(map(str, sorted(expected)))} components, got {each.dim}"
                 )
-            given.add(each.dim)
-    return floors, given
+            dims.add(each.dim)
+    return floors, dims
 
 
 class Rods(RodSystem):
     """Point masses joined by rods without mass, under gravity, in a plane or in space (§12). Blocks have shape (points, dim).
 
-    The last coordinate is the height. The pulls of all rods are found together, exactly, in every evaluation of the rates; so a
-    rod keeps its length but for the errors of the method. ``LengthControl`` returns it, ``Projection("length")`` resets it after
-    every step. A start with other lengths is not refused: without either the rods then stay as they are, and the run warns.
+    The last coordinate is the height. Every evaluation of the rates solves for the pulls of all rods, so a rod keeps its length
+    but for the errors of the method. ``LengthControl`` returns it to its length, ``Projection("length")`` resets it after every
+    step. A start with other lengths is not refused: without either the rods keep these, and the run warns.
 
     Args:
         masses: one for each point, shape (points,) or (points, *batch), above zero.
         rods: pairs of ends. An end is the number of a point, from 0 on, or the coordinates of a fixed anchor. A chain is solved
-            fastest if its rods are given from one end to the other.
+            fastest if its rods are in order from one end to the other.
         lengths: of the rods, above zero: one for all, or shape (rods,) or (rods, *batch).
         gravity: acceleration downwards, in units of length per unit of time squared; broadcasts over the batch.
         floor: a ``Floor`` or ``Sphere`` that the points meet, or a list of them; with ``way="safe"`` only.
@@ -110,8 +114,8 @@ class Rods(RodSystem):
     motion.
 
     Raises:
-        ArgumentError: what is wrong with which argument; and before a run, if the ends of a rod are in one place, or if rods
-            say the same as others.
+        ArgumentError: what is wrong with which argument; and before a run, if the ends of a rod are in one place, or if a rod
+            is redundant.
 
     Example:
         >>> pendulum = sw.Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0)
@@ -130,12 +134,12 @@ class Rods(RodSystem):
             raise ShapeError(f"masses: expected one for each point along the first axis, got shape {self.masses.shape}")
         self.rods = _ends(rods, len(self.masses))
         anchored = {len(end) for rod in self.rods for end in rod if isinstance(end, tuple)}
-        given = anchored | (set() if dim is None else {checks.count("dim", dim, 2, 3)})
-        if len(given) > 1:
-            raise ShapeError(f"rods, dim: expected one number of dimensions, got {' and '.join(map(str, sorted(given)))}")
-        floors, given = surfaces_for_rods(floor, given)
+        dims = anchored | (set() if dim is None else {checks.count("dim", dim, 2, 3)})
+        if len(dims) > 1:
+            raise ShapeError(f"rods, dim: expected one number of dimensions, got {' and '.join(map(str, sorted(dims)))}")
+        floors, dims = surfaces_for_rods(floor, dims)
         self.around = surfaces.around(floors)
-        self.dim = next(iter(given), None)
+        self.dim = next(iter(dims), None)
         if len(floors) * len(self.masses) > MAX_CONTACTS:
             raise ArgumentError(
                 f"floor: expected at most {MAX_CONTACTS} pairs of a point and a surface, got {len(self.masses)} points and "
@@ -159,7 +163,7 @@ class Rods(RodSystem):
 
     @property
     def has_loops(self) -> bool:
-        """Whether some way along rods, or from anchor to anchor, leads back to where it began."""
+        """Whether rods form a loop, where all anchors count as one point."""
         groups: dict[End, End] = {}
 
         def group(end: End) -> End:
@@ -182,11 +186,11 @@ class Rods(RodSystem):
         return [str(masses), str(rods), *shown(gravity=self.gravity)]
 
     def for_state_shapes(self, *states: Any) -> Rods:
-        """The same rods in as many dimensions as the states, v and y, have.
+        """The rods in as many dimensions as the states, v and y, have.
 
         Raises:
             ShapeError: if these are not states of such rods.
-            ArgumentError: if rods of this start have no direction, or say the same as others.
+            ArgumentError: if at these coordinates a rod has no direction or is redundant.
         """
         n, bound = len(self.masses), self
         shapes = {name: checks.shape_of(name, state) for name, state in zip("vy", states, strict=False) if state is not None}
@@ -221,7 +225,7 @@ class Rods(RodSystem):
                 if (reference.dot(span, span) == 0.0).any():
                     raise ArgumentError(f"y: expected the ends of each rod apart, got those of the rod {rod} in one place")
             if not self.has_loops:
-                return  # each rod has an end that those after it, taken from the outermost inwards, do not move
+                return  # taken from the outermost inwards, each rod has an end that the later ones do not move
             rows = s.matrix(d)
             pivots = factored(rows)[1]
             for rod, pivot, row in zip(self.rods, pivots, rows, strict=True):
@@ -232,14 +236,18 @@ class Rods(RodSystem):
                     )
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Dimensions, ends, masses, lengths, anchors, gravity, and what keeps the lengths."""
+        """The dimension, ends, masses, lengths, anchors and gravity, and the control of the lengths."""
         n, anchors = len(self.masses), self.anchors
         number = {end: n + i for i, end in enumerate(anchors)}
         ends = [[end if isinstance(end, int) else number[end] for end in rod] for rod in self.rods]
         masses, lengths = (aligned(each, 1, batch) for each in (self.masses, self.lengths))
         fixed = aligned(np.array(anchors), 2, batch) if anchors else None
         sizes = {"dim": self.y_shape[1], "rods": ends}
-        return sizes | {"masses": masses, "lengths": lengths, "anchors": fixed, "gravity": self.gravity} | self.given_kept()
+        return (
+            sizes
+            | {"masses": masses, "lengths": lengths, "anchors": fixed, "gravity": self.gravity}
+            | self.constraint_parameters()
+        )
 
     def energy(self, v: Array, y: Array) -> Array:
         """Σ ½m·v² + m·g·height, which is zero at rest at height 0."""
@@ -250,12 +258,12 @@ class Rods(RodSystem):
         return np.asarray(energy)
 
 
-def _ends(given: Any, points: int) -> tuple[tuple[End, End], ...]:
-    """The rods, an anchor as the first end."""
-    pairs = checks.several("rods", given, "pairs of ends")
+def _ends(rods: Any, points: int) -> tuple[tuple[End, End], ...]:
+    """The rods as pairs of ends; an anchor is the first end."""
+    pairs = checks.several("rods", rods, "pairs of ends")
     if not 1 <= len(pairs) <= MAX_RODS:
         raise ArgumentError(f"rods: expected 1 to {MAX_RODS}, got {len(pairs)}")
-    rods: list[tuple[End, End]] = []
+    ends: list[tuple[End, End]] = []
     for k, pair in enumerate(pairs):
         both = checks.several(f"rods[{k}]", pair, "two ends")
         if len(both) != 2:
@@ -266,13 +274,13 @@ def _ends(given: Any, points: int) -> tuple[tuple[End, End], ...]:
         if a == b:
             raise ArgumentError(f"rods[{k}]: expected two different points, got {a} twice")
         rod = (b, a) if isinstance(b, tuple) else (a, b)
-        for earlier, known in enumerate(rods):
+        for earlier, known in enumerate(ends):
             if set(known) == set(rod):
                 raise ArgumentError(f"rods[{k}]: expected each rod once, got {rod} as rods[{earlier}] already")
-        rods.append(rod)
-    if free := set(range(points)) - {end for rod in rods for end in rod if isinstance(end, int)}:
+        ends.append(rod)
+    if free := set(range(points)) - {end for rod in ends for end in rod if isinstance(end, int)}:
         raise ArgumentError(f"rods: expected every point at the end of one, got none for point {min(free)}")
-    return tuple(rods)
+    return tuple(ends)
 
 
 def _end(argument: str, end: Any, points: int) -> End:

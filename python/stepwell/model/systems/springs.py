@@ -39,16 +39,16 @@ class Springs(System):
         layout: places of the particles with the springs at rest, shape (n, dim) or (n, dim, *batch).
         damping: c, force per speed at which a spring becomes longer, zero or more, likewise; none if None.
         masses: one number, or an array with the particles along its first axis and the batch along the others, above zero.
-        fixed: the particles that do not feel any force, by their numbers or as a mask of all; or None.
+        fixed: the particles on which no force acts, by their numbers or as a mask of all particles; or None.
         gravity: acceleration of all particles: a number, down the last axis, or a vector of shape (dim,) or (dim, *batch), such
             as (0, -9.81); none if None.
         drag: force per speed of a particle against its motion, zero or more, given like ``masses``; none if None.
         floor: a ``Floor`` or ``Sphere`` that particles meet, or a list of them; fixed particles pass through it.
         dim: 1, 2 or 3; if None, that of ``layout``, ``gravity`` or ``floor``, or else taken from the shape of the state.
 
-    How many particles there are follows from ``layout``, else from ``masses``, else from the largest number in ``pairs``. With
-    damping or drag forces depend on the velocity, and Verlet, leapfrog and PEFRL refuse the system. ``safe_step`` tells which
-    step is safe. Lengths, masses and times are in any units that fit together.
+    The number of particles follows from ``layout``, else from ``masses``, else from the largest number in ``pairs``. With
+    damping or drag, forces depend on the velocity, and Verlet, leapfrog and PEFRL refuse the system. ``safe_step`` returns a
+    step that is safe. Lengths, masses and times may have any consistent units.
 
     Raises:
         ArgumentError: what is wrong with which argument.
@@ -97,12 +97,10 @@ class Springs(System):
         else:
             raise ArgumentError("rest: expected the lengths of the springs at rest, or layout= with the places, got None")
         springs = len(self.pairs)
-        self.stiffness = _per_row("stiffness", checks.not_negative("stiffness", stiffness), springs, "springs")
+        self.stiffness = _not_negative_per_row("stiffness", stiffness, springs, "springs")
         self.rest = _per_row("rest", lengths, springs, "springs")
-        given = None if damping is None else checks.not_negative("damping", damping)
-        self.damping = None if given is None else _per_row("damping", given, springs, "springs")
-        given = None if drag is None else checks.not_negative("drag", drag)
-        self.drag = None if given is None else _per_row("drag", given, self.n, "particles")
+        self.damping = _not_negative_per_row("damping", damping, springs, "springs")
+        self.drag = _not_negative_per_row("drag", drag, self.n, "particles")
         self.velocity_term = "damping" if self.damping is not None else "drag" if self.drag is not None else None
         self.v_shape = self.y_shape = (self.n, self.dim or 2)
         arrays = {name: getattr(self, name) for name in ("stiffness", "rest", "damping", "masses", "gravity", "drag")}
@@ -110,25 +108,25 @@ class Springs(System):
         self.batch = checks.batch_shape(shapes | surfaces.batches(floors))
 
     def _count(self, placed: Array | None) -> int:
-        """How many particles there are, if all that says so agrees."""
+        """The number of particles; raise if masses, pairs or the layout disagree."""
         last = int(self.pairs.max())
         n = len(placed) if placed is not None else len(self.masses) if len(self.masses) > 1 else last + 1
         if len(self.masses) not in (1, n):
             raise ShapeError(f"masses: expected {n} particles (or 1) along the first axis, got shape {self.masses.shape}")
         if last >= n:
             spring = int(np.argmax((self.pairs >= n).any(axis=1)))
-            raise ArgumentError(f"pairs: expected particles below {n}, of which there are so many, got {last} in spring {spring}")
+            raise ArgumentError(f"pairs: expected numbers below {n}, the number of particles, got {last} in spring {spring}")
         return n
 
     def repr_arguments(self) -> list[str]:
-        """What its repr says of its arguments."""
+        """Its arguments, for its repr."""
         optional = {"damping": self.damping, "gravity": self.gravity, "drag": self.drag}
         shorter = {name: each[0] if each is not None and each.shape == (1,) else each for name, each in optional.items()}
         fixed = [f"fixed={len(self.fixed)} particles"] * bool(len(self.fixed))
         return [f"{len(self.pairs)} springs, {self.n} particles", *fixed, *shown(**shorter)]
 
     def for_state_shapes(self, *states: Any) -> Springs:
-        """The same net in as many dimensions as the states, v and y, have."""
+        """The net in as many dimensions as the states, v and y, have."""
         if self.dim is not None:
             return self
         dims = set()
@@ -149,13 +147,13 @@ class Springs(System):
 
     @property
     def acceleration(self) -> Array | None:
-        """That of gravity as a vector, or None without."""
+        """The acceleration of gravity as a vector, or None without gravity."""
         if self.gravity is None or self.gravity.ndim:
             return self.gravity
         return np.append(np.zeros(self.y_shape[1] - 1), -self.gravity)
 
     def given(self, batch: Shape) -> dict[str, Any]:
-        """Particles, dimensions, ends of springs, and all numbers."""
+        """The numbers of particles and dimensions, the ends of springs, and all quantities."""
         numbers = {name: getattr(self, name) for name in ("masses", "stiffness", "rest", "damping", "gravity", "drag")}
         lists = {"pairs": self.pairs.tobytes(), "fixed": self.fixed.tobytes() if len(self.fixed) else None}
         numbers["gravity"] = self.acceleration
@@ -163,8 +161,8 @@ class Springs(System):
         return {"n": self.n, "dim": self.y_shape[1], **lists, **rows}
 
     def named(self, name: str, index: Shape) -> str:
-        """What serves for all has no index."""
-        numbers = getattr(self, name, None)  # None: of what is around it
+        """A number that is common to all rows has no index."""
+        numbers = getattr(self, name, None)  # None for a parameter of a part around the system
         alone = name != "gravity" and numbers is not None and numbers.shape[:1] == (1,)
         return super().named(name, () if alone else index)
 
@@ -180,21 +178,21 @@ class Springs(System):
             return np.asarray(self.reference_at_step(1.0, batch).energies(v, y)[2])
 
     def safe_step(self, method: str | Method) -> Any:
-        """A step below which a method is stable, known before anything is run, for any number of springs.
+        """A step below which a method is stable, known before any run, for any number of springs.
 
         No mode of an undamped net swings faster than ω, ω² = max (Wᵢ/mᵢ + Wⱼ/mⱼ) over the springs from i to j, where W is the sum
         of the stiffnesses at a particle, and a fixed one has 1/m = 0. That holds in every position, for any rest lengths. With
-        damping or drag the rate of damping has a bound of the same kind, and every pair of both up to their bounds must be
+        damping or drag the rate of damping has a similar bound, and every pair of frequency and rate within both bounds must be
         stable. For one spring, and for lattices whose particles can swing against all of their neighbours, there is no longer
-        safe step; elsewhere ``stability_limit(springs, method, v=v, y=y)`` is the exact limit of small nets at one state.
+        safe step; for other small nets ``stability_limit(springs, method, v=v, y=y)`` is the exact limit at one state.
 
-        Surfaces are not counted. A particle that rests on one is like a fixed one, which makes no mode faster; but one with
-        ``way="spring"`` is a further spring. What grows by itself, such as a compressed spring that gives way sideways, is no
-        matter of the step. Damping is part of the bound for False Euler and the Runge-Kutta methods; for Damped Euler, False
-        Heun and Semi-False Heun with damping it is an estimate, exact where all modes are damped in proportion.
+        The bound leaves surfaces out. A particle that rests on one is like a fixed one, which makes no mode faster; but a surface
+        with ``way="spring"`` is a further spring. A motion that grows by itself, as where a compressed spring gives way sideways,
+        does so at any step. For Damped Euler, False Heun and Semi-False Heun with damping the step is an estimate, which is exact
+        if all modes are damped in proportion; for False Euler and the Runge-Kutta methods it is a bound with damping, too.
 
         Args:
-            method: its name, or what ``stepwell.method`` returns.
+            method: a method, or its name.
 
         Returns:
             The step in units of time, of the shape of the batch; 0 if no step of the method is stable without damping.
@@ -216,7 +214,7 @@ class Springs(System):
 
 
 def _whole(argument: str, value: Any, what: str) -> Any:
-    """An array of whole numbers of zero or more."""
+    """An argument as an array of whole numbers of zero or more; ``what`` is its description in messages."""
     array = checks.as_array(argument, value)
     if array.size and array.dtype.kind not in "iu":
         raise DTypeError(f"{argument}: expected {what}, got {checks.short(value)}")
@@ -244,29 +242,31 @@ def _pairs(pairs: Any) -> Any:
     return np.ascontiguousarray(array, dtype="<u4")
 
 
-def _particles(argument: str, given: Any, n: int) -> Any:
-    """Different particles, in ascending order."""
-    if given is None:
+def _particles(argument: str, particles: Any, n: int) -> Any:
+    """The numbers of particles in ascending order, each once."""
+    if particles is None:
         return np.empty(0, dtype="<u4")
     what = "numbers of particles"
-    if _is_mask(given):
-        mask = np.asarray(given)
+    if _is_mask(particles):
+        mask = np.asarray(particles)
         if mask.shape != (n,):
             raise ShapeError(f"{argument}: expected a mask of {n} particles, or {what}, got a mask of shape {mask.shape}")
         return np.flatnonzero(mask).astype("<u4")
-    array = np.atleast_1d(_whole(argument, given, what))
+    array = np.atleast_1d(_whole(argument, particles, what))
     if array.ndim != 1:
         raise ShapeError(f"{argument}: expected {what} along one axis, got shape {array.shape}")
     if array.size and array.max() >= n:
-        raise ArgumentError(f"{argument}: expected particles below {n}, of which there are so many, got {array.max()}")
+        raise ArgumentError(f"{argument}: expected numbers below {n}, the number of particles, got {array.max()}")
     return np.unique(array).astype("<u4")
 
 
-def _is_mask(given: Any) -> bool:
-    """Whether particles are told by what is true of each."""
-    if isinstance(given, np.ndarray):
-        return bool(given.dtype == np.bool_)
-    return isinstance(given, (list, tuple)) and bool(given) and all(isinstance(each, (bool, np.bool_)) for each in given)
+def _is_mask(particles: Any) -> bool:
+    """Whether particles are chosen by a mask."""
+    if isinstance(particles, np.ndarray):
+        return bool(particles.dtype == np.bool_)
+    return (
+        isinstance(particles, (list, tuple)) and bool(particles) and all(isinstance(each, (bool, np.bool_)) for each in particles)
+    )
 
 
 def _layout(layout: Any) -> Array:
@@ -284,23 +284,28 @@ def _gravity(gravity: Any) -> Array:
 
 
 def _dimensions(dim: Any, placed: Array | None, gravity: Array | None, floors: dict[str, int]) -> int | None:
-    """The number of dimensions, if anything says it and all that does agrees."""
-    said = {} if dim is None else {"dim": checks.count("dim", dim, 1, 3)}
-    said |= {} if placed is None else {"layout": placed.shape[1]}
-    said |= {} if gravity is None or gravity.ndim == 0 else {"gravity": gravity.shape[0]}
-    said |= floors
-    if len(set(said.values())) > 1:
-        told = ", ".join(f"{name} of {number}" for name, number in said.items())
-        raise ShapeError(f"{' and '.join(said)}: expected as many dimensions in all, got {told}")
-    return next(iter(said.values()), None)
+    """The number of dimensions, None if no argument has one; raise if arguments disagree."""
+    dimensions = {} if dim is None else {"dim": checks.count("dim", dim, 1, 3)}
+    dimensions |= {} if placed is None else {"layout": placed.shape[1]}
+    dimensions |= {} if gravity is None or gravity.ndim == 0 else {"gravity": gravity.shape[0]}
+    dimensions |= floors
+    if len(set(dimensions.values())) > 1:
+        sizes = ", ".join(f"{name} of {number}" for name, number in dimensions.items())
+        raise ShapeError(f"{' and '.join(dimensions)}: expected one number of dimensions, got {sizes}")
+    return next(iter(dimensions.values()), None)
 
 
 def _lengths(pairs: Any, layout: Array) -> Array:
-    """The distance of both ends of each spring."""
+    """The distance between the ends of each spring."""
     lengths: Array = np.sqrt(square(layout[pairs[:, 1]] - layout[pairs[:, 0]]))
     if not np.isfinite(lengths).all():
         raise ArgumentError("layout: expected places whose distances are finite, got some that are too large")
     return lengths
+
+
+def _not_negative_per_row(argument: str, value: Any, rows: int, what: str) -> Any:
+    """Numbers of zero or more for each row, or None."""
+    return None if value is None else _per_row(argument, checks.not_negative(argument, value), rows, what)
 
 
 def _per_row(argument: str, array: Array, rows: int | None, what: str) -> Array:

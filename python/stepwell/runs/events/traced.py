@@ -15,7 +15,7 @@ from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError, TraceError, UnsupportedError
 from ...model.equations.namespace import rebound
-from ...model.equations.trace import kind_of, run_by, scalars
+from ...model.equations.trace import kind_of, run_function, scalars
 from ...model.equations.values import Scalar, objects
 from ...model.systems import System
 from ...reference.marks import recording
@@ -103,7 +103,7 @@ class Quantity:
         """The same on a tape."""
         blocks = [_symbols(self.v_shape, state), _symbols(self.y_shape, state)][0 if self.has_v else 1 :]
         name = f"events: {self.event.name}"
-        made = objects(run_by(rebound(self.event.function), name, self._quick_sines, Scalar(t), *blocks, **parameters))
+        made = objects(run_function(rebound(self.event.function), name, self._quick_sines, Scalar(t), *blocks, **parameters))
         if made.ndim or not isinstance(made[()], (Scalar, int, float)):
             got = f"an array of shape {made.shape}" if made.ndim else kind_of(made[()])
             raise TraceError(f"{name}: expected one number, whose changes of sign are the event, got {got}")
@@ -158,7 +158,7 @@ class NewState:
         t = next(state)
         parameters = {name: _symbols(given[name].shape[:-1], numbers) for name in self._parameters}
         blocks = [_symbols(shape, state) for shape in self._shapes]
-        result = run_by(rebound(self._function), self._name, quick_sines, Scalar(t), *blocks, **parameters)
+        result = run_function(rebound(self._function), self._name, quick_sines, Scalar(t), *blocks, **parameters)
         self._operations = Replay(*tape.operations([each for block in self._blocks(result) for each in symbols(tape, block)]))
 
     def _blocks(self, result: Any) -> list[Any]:

@@ -11,7 +11,7 @@ from ...base.literals import AttitudeForm
 from ...model.systems import Aircraft, Sinusoid
 from ..base import Scene
 
-#: How long a turn to both sides lasts, and how many of them there are.
+#: The time of a turn to both sides, and the number of these turns.
 PERIOD, TURNS = 10.0, 2
 
 

@@ -17,10 +17,10 @@ PERIOD = 17.0652165601579625588917206249
 def arenstorf() -> Scene:
     """A spacecraft goes round the earth three times and comes back to the moon, where it began, over one period.
 
-    In the frame that turns with earth and moon. It begins 0.0063 from the moon's centre, which takes small steps, and goes on
-    through wide loops, which do not need them: the problem by which methods that choose their step are shown. It is
-    unstable; from the start as a float holds it, ``exact`` does not close to the last digits. It is computed to more digits than
-    a float holds. The usual step makes 20 000 for the period.
+    In the frame that turns with earth and moon, it begins 0.0063 from the moon's centre, which takes small steps, and goes on
+    through wide loops, which do not: the classical test of step-size control. The orbit is unstable; from a start that is rounded
+    to floats, it does not close to the last digits. ``exact`` is computed to more digits than a float has. The usual step is a
+    20 000th of the period.
     """
     v, y = np.array(VELOCITY), np.array(PLACE)
     return Scene(

@@ -15,7 +15,7 @@ from ...model.systems import Particles
 from ..base import Scene
 from ..ranges import moderate
 
-#: Impacts that are followed: up to the speed that is this share of the first, or this many.
+#: Impacts are computed down to this share of the first speed, and up to this number.
 LEAST_SPEED, MOST_IMPACTS = 1e-17, 100_000
 
 #: The velocity along the floor, as a share of that of the first impact.

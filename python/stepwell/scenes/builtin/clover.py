@@ -10,7 +10,7 @@ from ...base.arrays import Array
 from ...model.systems import NBody
 from ..base import Scene
 
-#: Where the three bodies stand on the unit circle at t = 0, in radians.
+#: The angles of the three bodies on the unit circle at t = 0, in radians.
 ANGLES = np.radians([210.0, -30.0, 90.0])
 
 

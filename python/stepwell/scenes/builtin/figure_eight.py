@@ -8,7 +8,7 @@ from ...model.systems import NBody
 from ..base import Scene
 from ..taylor import Orbit
 
-#: Velocity of the first two bodies at t = 0, that of the third is −2 of it; and the period.
+#: The velocity of the first two bodies at t = 0, which that of the third is −2 times; and the period.
 VELOCITY = (0.347116888118926938, 0.532724945388030229)
 PERIOD = 6.32591398292621167759
 

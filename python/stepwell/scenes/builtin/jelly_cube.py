@@ -31,7 +31,7 @@ def jelly_cube(n: Any = 4, twist: Any = 4.0) -> Scene:
     at = np.arange(n**3).reshape(n, n, n)
     pairs = []
     for step in itertools.product((-1, 0, 1), repeat=3):
-        if step > (0, 0, 0):  # of both directions one
+        if step > (0, 0, 0):  # one of both directions
             near = [slice(max(0, -d), n - max(0, d)) for d in step]
             far = [slice(max(0, d), n - max(0, -d)) for d in step]
             pairs.append(np.stack([at[tuple(near)].ravel(), at[tuple(far)].ravel()], axis=1))

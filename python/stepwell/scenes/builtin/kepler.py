@@ -13,7 +13,7 @@ from ...errors import ArgumentError
 from ...model.systems import NBody
 from ..base import Scene
 
-#: Newton's method from the far end needs this many steps at most, for any eccentricity that a float can distinguish from 1.
+#: The most steps of Newton's method from the far end, for any eccentricity that is not 1 as a float.
 MAX_ITERATIONS = 100
 
 

@@ -13,7 +13,7 @@ from ...errors import ArgumentError
 from ...model.systems import NBody
 from ..base import Scene
 
-#: Share of the mass that is sampled: the outermost thousandth would be far away.
+#: The share of the mass that is sampled: the outermost thousandth would be far away.
 INNER = 0.999
 
 
@@ -82,7 +82,7 @@ def _directions(random: np.random.Generator, n: int) -> Array:
 
 
 def _scale(masses: Array, y: Array, softening: float) -> float:
-    """The factor of all places with which the potential energy is −1/2; it falls with the factor, so halving finds it."""
+    """The factor of all places at which the potential energy is −1/2, by bisection."""
     i, j = np.triu_indices(len(masses), 1)
     square = ((y[i] - y[j]) ** 2).sum(axis=-1)
     product = masses[i] * masses[j]
