@@ -345,7 +345,7 @@ class Lorenz(System):
     def repr_arguments(self) -> list[str]:
         return []
 
-    def given(self, batch: tuple[int, ...]) -> dict[str, Any]:
+    def equation_parameters(self, batch: tuple[int, ...]) -> dict[str, Any]:
         return {"sigma": np.array(10.0), "rho": np.array(28.0), "beta": np.array(8.0 / 3.0)}
 
 

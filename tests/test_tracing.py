@@ -137,7 +137,7 @@ def test_every_attempt(name: str) -> None:
 def test_the_matrix_form() -> None:
     system, _, _ = made("linear, five states, two inputs")
     rng = np.random.default_rng(2)
-    nodes, inputs = [0.0, 0.5, 1.0], system.given(system.batch)["inputs"]
+    nodes, inputs = [0.0, 0.5, 1.0], system.equation_parameters(system.batch)["inputs"]
     tape = Tape()
     symbols = Tracer(system, tape).matrix(nodes, 5, inputs)
     p, q, s = rng.normal(size=(5, 5, MEMBERS)), rng.normal(size=(3, 2, 5, MEMBERS)), rng.normal(size=(5, MEMBERS))

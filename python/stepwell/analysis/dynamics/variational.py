@@ -79,19 +79,19 @@ class Variational(System):
         """The system, and how many disturbances."""
         return [repr(self.of), str(self.disturbances)]
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The parameters of the system."""
         return self.of.own_parameters(batch)
 
     def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
         """The operations of all rates, and the parameters of the system."""
-        given = {name: value for name, value in self.given(batch).items() if name != RATES and not callable(value)}
+        given = {name: value for name, value in self.equation_parameters(batch).items() if name != RATES and not callable(value)}
         return [(RATES, self._core), *flat(given, batch)]
 
     def reference_at_step(self, h: float, batch: Shape) -> Any:
         """The rates by NumPy."""
         tracer = Tracer(self.of, _core.Tape())
-        for value in self.given(batch).values():
+        for value in self.equation_parameters(batch).values():
             tracer.symbols(value, batch)  # which collects their numbers
         evaluation = Evaluation(self._tape, self._rates, dict(enumerate(tracer.numbers)), tracer.tables)
         return _Rates(h, evaluation, maps.size(self.of)[0])

@@ -181,9 +181,11 @@ class Aircraft(OwnSystem):
         """Itself: its size is fixed."""
         return self
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The parameters, commands and inputs, and the strength of a control of the quaternion's length."""
-        return super().given(batch) | ({} if self.kept is None else {"strength": self.constraint_parameters()["strength"]})
+        return super().equation_parameters(batch) | (
+            {} if self.kept is None else {"strength": self.constraint_parameters()["strength"]}
+        )
 
     # ---- controls of the quaternion's length
 

@@ -154,7 +154,7 @@ class System(Immutable, ValueEquality, ABC):
         )
 
     @abstractmethod
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The parameters of its equations by name, for states of that batch shape: the arguments of its reference after the step.
 
         Each is a string, a whole number, a list of whole numbers as bytes (four for each, the lowest first), an array (its own
@@ -179,8 +179,8 @@ class System(Immutable, ValueEquality, ABC):
         return wrapped(self.reference_at_step(h, batch), h, self.parts(batch, force))
 
     def own_parameters(self, batch: Shape) -> dict[str, Any]:
-        """The parameters of its equations by name: those of ``given``, or those of its members if it is for some."""
-        return self.given(batch) if self._members is None else of_shape(self._members[0], batch)
+        """The parameters of its equations by name: those of ``equation_parameters``, or those of its members if it is for some."""
+        return self.equation_parameters(batch) if self._members is None else of_shape(self._members[0], batch)
 
     def parts(self, batch: Shape, force: Array | None = None) -> list[Bound]:
         """Each part around its equations with its parameters by name; the force from outside, if there is one, is last."""

@@ -51,7 +51,7 @@ class Chain(System):
         """Its arguments, for its repr."""
         return [str(self.n)]
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The stiffnesses and masses."""
         return {"stiffness": aligned(self.stiffness, 1, batch), "mass": aligned(self.mass, 1, batch)}
 

@@ -138,7 +138,7 @@ class LinearSystem(System):
         """The columns of B whose inputs are not None; the others are zero and left out."""
         return [i for i, each in enumerate(self.x) if each is not None]
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The matrix [A B] in the order of the blocks, the inputs, and whether it is that of an acceleration."""
         return {
             "kind": "acceleration" if self.second_order and self.velocity_term is None else "",

@@ -139,7 +139,7 @@ class NBody(System):
         """Whether the energy is constant in the true motion."""
         return self.control is None and not self.contacts and self.force != "printed"
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The force, the dimension, masses, G·m and the softening."""
         masses = aligned(self.masses, 1, batch)
         sizes = {"force": self.force, "dim": self.y_shape[1]}

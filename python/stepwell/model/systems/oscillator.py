@@ -113,7 +113,7 @@ class Oscillator(System):
             return {}
         return {name: each for name, each in (("x", self.x), ("a", self.a)) if each is not None}
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The form, the parameters and the inputs."""
         inputs = {"x": signal(self.x), "a": signal(self.a)}
         return {"form": self.form, "omega": self.omega, "damping": self.damping, "drag": self.drag, **inputs}

@@ -299,7 +299,7 @@ class OwnSystem(System):
 
     # ---- for the core and the reference
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The function, and parameters by name."""
         parameters: dict[str, Any] = {RATES: self._known().equations}
         for name, value in self.parameters_given.items():

@@ -99,7 +99,7 @@ class Particles(System):
         size = (points or 1, dim or 2)
         return changed(self, points=points, dim=dim, v_shape=size, y_shape=size)
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The dimension, masses, gravity and drag."""
         points, dim = self.y_shape
         masses = np.broadcast_to(self.masses, (points,)) if self.masses.ndim == 0 else aligned(self.masses, 1, batch)

@@ -57,7 +57,7 @@ class Pendulum(System):
         """Its input by name, if it has one."""
         return {} if self.a is None else {"a": self.a}
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The parameters and the input."""
         return {"omega": self.omega, "damping": self.damping, "a": signal(self.a)}
 

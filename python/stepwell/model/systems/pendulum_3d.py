@@ -68,7 +68,7 @@ class Pendulum3D(RodSystem):
                     raise ArgumentError("y: expected the mass away from the origin, where its rod ends, got (0, 0, 0)")
         return self
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The length, gravity, and the control of the length."""
         return {"length": self.length, "gravity": self.gravity} | self.constraint_parameters()
 

@@ -55,7 +55,7 @@ class RestrictedThreeBody(System):
         """Its arguments, for its repr."""
         return shown(mu=self.mu)
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """μ."""
         return {"mu": self.mu}
 

@@ -112,7 +112,7 @@ class RigidBody(System):
             if each is not None
         }
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The moments, damping, torques and weight, and the control of the norm."""
         vectors = {"inertia": self.inertia, "damping": self.damping, "centre": self.centre}
         inertia, damping, centre = (None if each is None else aligned(each, 1, batch) for each in vectors.values())

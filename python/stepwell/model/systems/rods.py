@@ -235,7 +235,7 @@ class Rods(RodSystem):
                         f"say already; leave it out"
                     )
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The dimension, ends, masses, lengths, anchors and gravity, and the control of the lengths."""
         n, anchors = len(self.masses), self.anchors
         number = {end: n + i for i, end in enumerate(anchors)}

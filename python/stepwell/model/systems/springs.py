@@ -152,7 +152,7 @@ class Springs(System):
             return self.gravity
         return np.append(np.zeros(self.y_shape[1] - 1), -self.gravity)
 
-    def given(self, batch: Shape) -> dict[str, Any]:
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The numbers of particles and dimensions, the ends of springs, and all quantities."""
         numbers = {name: getattr(self, name) for name in ("masses", "stiffness", "rest", "damping", "gravity", "drag")}
         lists = {"pairs": self.pairs.tobytes(), "fixed": self.fixed.tobytes() if len(self.fixed) else None}

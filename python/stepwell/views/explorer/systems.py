@@ -62,13 +62,13 @@ def energy(system: Any) -> dict[str, Any] | None:
         case "pendulum":
             return {"kind": "pendulum", "omega": float(system.omega)}
         case "chain":
-            k, m = (numbers(each) for each in system.given(()).values())
+            k, m = (numbers(each) for each in system.equation_parameters(()).values())
             return {"kind": "chain", "stiffness": k, "mass": m}
         case "nbody" if not system.contacts:
             own = {"law": system.force, "softening": float(system.softening), "dim": system.y_shape[1]}
             return {"kind": "bodies", "masses": numbers(system.masses), "Gm": numbers(system.G * system.masses), **own}
         case "particles":
-            parameters = system.given(())
+            parameters = system.equation_parameters(())
             return {"kind": "falling", "masses": numbers(parameters["masses"]), "gravity": numbers(parameters["gravity"])}
         case "restricted_three_body":
             return {"kind": "restricted", "mu": float(system.mu)}
