@@ -55,7 +55,7 @@ class Part(Immutable, ValueEquality, ABC):
 
     @abstractmethod
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
-        """Its parameters by name, as the core takes them, for coordinates and a batch of these shapes; see ``System.equation_parameters``."""
+        """Its parameters by name, for coordinates and a batch of these shapes; see ``System.equation_parameters``."""
 
     def own_axes(self, name: str) -> int:
         """How many axes of its own a parameter has, before those of the batch."""

@@ -179,7 +179,7 @@ class System(Immutable, ValueEquality, ABC):
         return wrapped(self.reference_at_step(h, batch), h, self.parts(batch, force))
 
     def own_parameters(self, batch: Shape) -> dict[str, Any]:
-        """The parameters of its equations by name: those of ``equation_parameters``, or those of its members if it is for some."""
+        """The parameters of its equations by name; those of its members, if it is for some members of a batch."""
         return self.equation_parameters(batch) if self._members is None else of_shape(self._members[0], batch)
 
     def parts(self, batch: Shape, force: Array | None = None) -> list[Bound]:
