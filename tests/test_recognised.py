@@ -238,12 +238,12 @@ def test_functions_of_the_time_and_invariants_count() -> None:
 )
 def test_what_may_change_unseen_is_like_nothing_else(function: Any) -> None:
     with pytest.raises(recognised.Unknown):
-        recognised.told(function)
+        recognised.identity(function)
 
 
 def test_numbers_are_told_apart_by_their_bits() -> None:
     def of(value: Any) -> Any:
-        return recognised.told(lambda: value)
+        return recognised.identity(lambda: value)
 
     different = [0.0, -0.0, 1.0, 1, True, "1", b"1", None, (1.0,), [1.0], np.array([1.0]), np.float32(1.0), np.array([1])]
     found = [of(each) for each in different]

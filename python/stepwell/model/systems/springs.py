@@ -115,7 +115,7 @@ class Springs(System):
             raise ShapeError(f"masses: expected {n} particles (or 1) along the first axis, got shape {self.masses.shape}")
         if last >= n:
             spring = int(np.argmax((self.pairs >= n).any(axis=1)))
-            raise ArgumentError(f"pairs: expected numbers below {n}, the number of particles, got {last} in spring {spring}")
+            raise ArgumentError(f"pairs: expected particles below {n}, since there are {n}, got {last} in spring {spring}")
         return n
 
     def repr_arguments(self) -> list[str]:
@@ -256,7 +256,7 @@ def _particles(argument: str, particles: Any, n: int) -> Any:
     if array.ndim != 1:
         raise ShapeError(f"{argument}: expected {what} along one axis, got shape {array.shape}")
     if array.size and array.max() >= n:
-        raise ArgumentError(f"{argument}: expected numbers below {n}, the number of particles, got {array.max()}")
+        raise ArgumentError(f"{argument}: expected particles below {n}, since there are {n}, got {array.max()}")
     return np.unique(array).astype("<u4")
 
 
