@@ -16,6 +16,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, wraps
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from ..base import checks
@@ -97,7 +98,24 @@ _LOADED: set[str] = set()
 
 
 def _from_file(path: str, variable: str | None) -> Scene:
-    """The scene that a file defines."""
+    """The scene that a file defines: the one of that variable, or the only one."""
+    module = _loaded(path)
+    scenes = {key: value for key, value in vars(module).items() if isinstance(value, Scene)}
+    if variable is not None:
+        chosen = scenes[checks.known("scene", variable, scenes)]
+        return replace(chosen, name=variable, title="") if chosen.name == "unnamed" else chosen
+    if len(scenes) != 1:
+        if not scenes:
+            raise ArgumentError(f"scene: {path} makes no Scene; write scene = sw.Scene(system, v=…, y=…, until=…)")
+        raise ArgumentError(
+            f"scene: expected one Scene in {path}, got {', '.join(scenes)}; name one: {path}:{next(iter(scenes))}"
+        )
+    ((key, only),) = scenes.items()
+    return replace(only, name=module.__name__ if key == "scene" else key, title="") if only.name == "unnamed" else only
+
+
+def _loaded(path: str) -> ModuleType:
+    """A file, run as a module of its name."""
     name = re.sub(r"\W", "_", Path(path).stem)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
@@ -114,18 +132,7 @@ def _from_file(path: str, variable: str | None) -> Scene:
         raise
     except Exception as error:
         raise ArgumentError(f"scene: the file {path} cannot be run: {type(error).__name__}: {error}") from error
-    scenes = {key: value for key, value in vars(module).items() if isinstance(value, Scene)}
-    if variable is not None:
-        chosen = scenes[checks.known("scene", variable, scenes)]
-        return replace(chosen, name=variable, title="") if chosen.name == "unnamed" else chosen
-    if len(scenes) != 1:
-        if not scenes:
-            raise ArgumentError(f"scene: {path} makes no Scene; write scene = sw.Scene(system, v=…, y=…, until=…)")
-        raise ArgumentError(
-            f"scene: expected one Scene in {path}, got {', '.join(scenes)}; name one: {path}:{next(iter(scenes))}"
-        )
-    ((key, only),) = scenes.items()
-    return replace(only, name=name if key == "scene" else key, title="") if only.name == "unnamed" else only
+    return module
 
 
 @cache

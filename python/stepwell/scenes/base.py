@@ -92,6 +92,15 @@ class Scene(ValueEquality):
 
     def __post_init__(self) -> None:
         """Check the arguments and fill in the defaults."""
+        checked = self._checked_start() | self._checked_times()
+        if self.exact is not None and not callable(self.exact):
+            raise DTypeError(f"exact: expected a function of times, or None, got {type(self.exact).__name__}")
+        a_control(self.control)
+        for name, value in (checked | {"title": self.title or self.name}).items():
+            object.__setattr__(self, name, value)
+
+    def _checked_start(self) -> dict[str, Any]:
+        """The system for its state, and the blocks, by name."""
         if self.y is None:
             raise ArgumentError("y: expected the coordinates at t = 0, got None")
         y = checks.numbers("y", self.y)
@@ -105,6 +114,10 @@ class Scene(ValueEquality):
             if block.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape} of a scene's one member, got {block.shape}")
             checked[name] = frozen(name, block)
+        return checked
+
+    def _checked_times(self) -> dict[str, Any]:
+        """The horizon and all other times, by name."""
         until = math.inf if self.until is None else self.until
         forever = isinstance(until, float) and until == math.inf
         if not forever and (until := checks.number("until", until, unit="units of time")) < 0.0:
@@ -112,18 +125,14 @@ class Scene(ValueEquality):
         horizon = until if self.horizon is None else self.horizon
         if self.horizon is None and until == math.inf:
             raise ArgumentError("horizon: expected the time over which errors are measured, in units of time, got None")
-        checked["horizon"] = horizon = checks.number("horizon", horizon, positive=True, unit="units of time")
-        dt = 1e-3 * horizon if self.dt is None else self.dt
-        checked |= {"dt": checks.number("dt", dt, positive=True, unit="units of time"), "until": until}
-        if self.exact is not None and not callable(self.exact):
-            raise DTypeError(f"exact: expected a function of times, or None, got {type(self.exact).__name__}")
-        a_control(self.control)
+        horizon = checks.number("horizon", horizon, positive=True, unit="units of time")
+        dt = checks.number("dt", 1e-3 * horizon if self.dt is None else self.dt, positive=True, unit="units of time")
+        checked: dict[str, Any] = {"until": until, "horizon": horizon, "dt": dt}
         if self.jumps is not None:
             checked["jumps"] = tuple(np.atleast_1d(checks.numbers("jumps", self.jumps, unit="units of time")).ravel().tolist())
         if self.max_step is not None:
             checked["max_step"] = checks.number("max_step", self.max_step, positive=True, unit="units of time")
-        for name, value in (checked | {"title": self.title or self.name}).items():
-            object.__setattr__(self, name, value)
+        return checked
 
     def run(self, method: str | Method, dt: float | None = None, *, steps: int | None = None, **options: Any) -> Run:
         """Step the scene from its start.

@@ -54,24 +54,11 @@ class OwnSystem(System):
     def __init__(self, definition: Definition, parameters: dict[str, Any]) -> None:
         self.definition = definition
         self.parameters_given: dict[str, Any] = {}
-        batches = {}
+        batches: dict[str, Shape] = {}
         for name, value in parameters.items():
-            own = definition.own_axes[name]
             argument = f"{definition.name}: {name}"
-            if isinstance(value, (Sinusoid, Sampled)) or callable(value):
-                if not isinstance(value, (Sinusoid, Sampled)):
-                    checks.argument_order(argument, value, ("t",))
-                if own:
-                    raise ShapeError(f"{argument}: expected an array of {own} axes of its own, as its default, got {value!r}")
-                self.parameters_given[name] = value
-                batches[name] = getattr(value, "batch", ())
-                continue
-            numbers = checks.numbers(argument, value)
-            if numbers.ndim < own:
-                raise ShapeError(f"{argument}: expected {own} axes of its own, as its default has, got shape {numbers.shape}")
-            self.parameters_given[name] = numbers
-            batches[name] = numbers.shape[own:]
-        self.batch = checks.batch_shape({f"{definition.name}: {name}": shape for name, shape in batches.items()})
+            self.parameters_given[name], batches[argument] = _checked(argument, value, definition.own_axes[name])
+        self.batch = checks.batch_shape(batches)
         self.second_order = definition.order == 2 and definition.blocks == 1
         self.equations: Equations | None = None
         #: The operations of the function, and those in float32.
@@ -451,3 +438,18 @@ class OwnSystem(System):
     def given_inputs(self) -> dict[str, Input]:
         """The inputs among the parameters, by name."""
         return {name: value for name, value in self.parameters_given.items() if isinstance(value, (Sinusoid, Sampled))}
+
+
+def _checked(argument: str, value: Any, own: int) -> tuple[Any, Shape]:
+    """A parameter whose default has ``own`` axes: an input, a function of the time or numbers, and its batch shape."""
+    is_input = isinstance(value, (Sinusoid, Sampled))
+    if not is_input and not callable(value):
+        numbers = checks.numbers(argument, value)
+        if numbers.ndim < own:
+            raise ShapeError(f"{argument}: expected {own} axes of its own, as its default has, got shape {numbers.shape}")
+        return numbers, numbers.shape[own:]
+    if not is_input:
+        checks.argument_order(argument, value, ("t",))
+    if own:
+        raise ShapeError(f"{argument}: expected an array of {own} axes of its own, as its default, got {value!r}")
+    return value, getattr(value, "batch", ())
