@@ -171,7 +171,7 @@ def test_interp_means_the_same_as_a_linear_sampled() -> None:
         (lambda t: np.interp(t, [0.0, 1.0], [1.0, 2.0, 3.0]), r"one length along one axis, got shapes \(2,\) and \(3,\)"),
         (lambda t: np.interp(t, [1.0, 0.0], [1.0, 2.0]), "places xp that ascend"),
         (lambda t: np.interp(t, [0.0, 1.0], [1.0, 2.0], period=1.0), "write np.mod"),
-        (lambda t: np.interp(t, np.array([0.0, 1.0]) * t, [1.0, 2.0]), "numbers that are known as the places xp"),
+        (lambda t: np.interp(t, np.array([0.0, 1.0]) * t, [1.0, 2.0]), "known numbers as the places xp"),
     ],
 )
 def test_what_interp_refuses(call: Any, message: str) -> None:

@@ -255,7 +255,7 @@ def test_an_invariant_may_take_the_time_before_the_state() -> None:
 def test_a_parameter_that_changes_makes_no_invariant() -> None:
     """It can be run all the same."""
     both(own.pendulum(omega=own.turning), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
-    with pytest.raises(ArgumentError, match=r"pendulum: energy: omega changes with the time"):
+    with pytest.raises(ArgumentError, match=r"pendulum: energy: .* got omega, which changes with the time"):
         sw.integrate(own.pendulum(omega=lambda t: 1.0 + 0.1 * np.sin(t)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, record="energy")
 
 

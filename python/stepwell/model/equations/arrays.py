@@ -114,11 +114,9 @@ def _as_operand(x: Any) -> Any:
 def ufunc_of(ufunc: Any, method: str, arguments: Any, options: Any) -> Any:
     """The result of an element-by-element function of NumPy."""
     if options:
-        raise TraceError(
-            f"np.{ufunc.__name__}: {', '.join(options)}= is not known to own equations, and nothing can be written to"
-        )
+        raise TraceError(f"np.{ufunc.__name__}: own equations do not have {', '.join(options)}=, and no array can be written to")
     if method != "__call__":
-        raise TraceError(f"np.{ufunc.__name__}.{method} is not known to own equations; write np.sum, np.prod or a loop")
+        raise TraceError(f"own equations do not have np.{ufunc.__name__}.{method}; write np.sum, np.prod or a loop")
     return elementwise_named(ufunc.__name__, *arguments)
 
 
@@ -193,7 +191,7 @@ def _reduction(name: str) -> Callable[..., Any]:
 def where(condition: Any, a: Any = None, b: Any = None) -> Any:
     """One of two values, element by element, chosen by a comparison."""
     if a is None or b is None:
-        raise TraceError("np.where: expected a condition and two values, of which one is taken")
+        raise TraceError("np.where: expected a condition and two values")
     items = [objects(each) for each in (condition, a, b)]
     if any(each.ndim for each in items):
         return wrapped(np.frompyfunc(where, 3, 1)(*items))
@@ -272,7 +270,7 @@ def norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> A
         raise of_shape("np.linalg.norm: expected an array, got one number; write abs")
     x = array(x)
     if ord not in (None, 2) or (axis is None and x.ndim > 1 and ord is not None):
-        raise TraceError("np.linalg.norm: only the length, the root of the sum of squares, is known to own equations")
+        raise TraceError("np.linalg.norm: own equations have only the length, the root of the sum of squares")
     return np.sqrt((x * x).sum(axis=axis, keepdims=keepdims))
 
 
@@ -301,13 +299,11 @@ MOST_POINTS = 256
 def interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Any:
     """As ``np.interp``: straight lines between the points of a table whose ``xp`` are known numbers."""
     if period is not None:
-        raise TraceError("np.interp: period= is not known to own equations; write np.mod(x, period)")
+        raise TraceError("np.interp: own equations do not have period=; write np.mod(x, period)")
     places = objects(xp)
     values = objects(fp)
     if any(value_of(each) is None or not isinstance(value_of(each), float) for each in places.flat):
-        raise TraceError(
-            "np.interp: expected numbers that are known as the places xp, got some that depend on the state or parameters"
-        )
+        raise TraceError("np.interp: expected known numbers as the places xp, got some that depend on the state or parameters")
     at = np.array([value_of(each) for each in places.flat])
     if places.ndim != 1 or values.shape != places.shape or not len(at):
         raise of_shape(

@@ -74,8 +74,8 @@ class Traced:
         shapes = equations.own_shapes
         if changing := [each for each in invariant.parameters if shapes[each] is None]:
             raise ArgumentError(
-                f"{equations.name}: {invariant.name}: {', '.join(changing)} changes with the time, so nothing made of it is "
-                f"constant"
+                f"{equations.name}: {invariant.name}: expected parameters that are constant, got {', '.join(changing)}, which "
+                f"changes with the time"
             )
         self._tape = _core.Tape(single=single)
         numbers = map(self._tape.param, count())

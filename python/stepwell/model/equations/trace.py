@@ -223,7 +223,7 @@ def _located(error: Exception, function: Any, name: str) -> TraceError:
     text = str(known) if isinstance(known, TraceError) else _in_words(error)
     if (package := _abroad(error, function)) and isinstance(known, TraceError):
         text += (
-            f". It was asked by {package}, whose functions are for numbers alone and cannot be traced; a table of the time is a "
+            f". It was used by {package}, whose functions take numbers only and cannot be traced; a table of the time is a "
             f"parameter: sw.Sampled(values, interval, interpolation='linear' or 'cubic')"
         )
     located = TraceError(f"{name}{line}: {text}")

@@ -215,7 +215,7 @@ class Operators:
 
     def __bool__(self) -> NoReturn:
         raise TraceError(
-            "a value that depends on the state, a parameter or the time has no truth, for a step is computed without branches: "
+            "a value that depends on the state, a parameter or the time has no truth value, because a step has no branches: "
             "in place of `if`, `and`, `or`, `not`, `while`, min() and max() write np.where(condition, a, b), &, |, ~, "
             "np.minimum and np.maximum"
         )
@@ -408,7 +408,9 @@ class Array(Operators):
         return wrapped(self.items[index])
 
     def __setitem__(self, index: Any, value: Any) -> NoReturn:
-        raise TraceError("nothing can be written into the state or what is made of it: write np.array([…]), np.stack or np.where")
+        raise TraceError(
+            "the state, and arrays computed from it, cannot be written to: write np.array([…]), np.stack or np.where"
+        )
 
     def __and__(self, other: Any) -> Any:
         return self._truths(operator.and_, other)

@@ -231,8 +231,8 @@ class Rods(RodSystem):
             for rod, pivot, row in zip(self.rods, pivots, rows, strict=True):
                 if (pivot <= SINGULAR_PIVOT * row[-1]).any():
                     raise ArgumentError(
-                        f"rods: expected each to restrict the motion, but at the start the rod {rod} says what those before it "
-                        f"say already; leave it out"
+                        f"rods: expected each to restrict the motion, but at the start the rod {rod} adds nothing to those "
+                        f"before it; leave it out"
                     )
 
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
