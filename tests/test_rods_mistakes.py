@@ -72,7 +72,7 @@ def test_wrong_rods_are_refused(make: Callable[[], Any], error: type[Exception],
         (
             sw.Rods(np.ones(4), [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2), (1, 3)], 1.0),
             np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
-            r"rods: expected each to restrict the motion, but at the start the rod \(1, 3\) says",
+            r"rods: expected each to restrict the motion, but at the start the rod \(1, 3\) adds nothing",
         ),
         (sw.Rods([1.0], [((-1.0, 0.0), 0), ((1.0, 0.0), 0)], 1.0), np.zeros((1, 2)), "restrict the motion"),
     ],
