@@ -270,7 +270,6 @@ class Scene(ValueEquality):
         )
 
     def _check(self, run: Run) -> None:
-        """Raise if a run is of another system."""
         if not isinstance(run, Run):
             raise DTypeError(f"run: expected what scene.run returns, got {type(run).__name__}")
         if not self.owns(run):

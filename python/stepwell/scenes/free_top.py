@@ -125,7 +125,6 @@ class FreeTop(ValueEquality):
 
 
 def _inverse(q: Array) -> Array:
-    """The inverse of a turn."""
     return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
 
 

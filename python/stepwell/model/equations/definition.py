@@ -127,7 +127,6 @@ class Definition:
 
 
 def _definition(module: str, name: str) -> Any:
-    """The definition of that name in a module."""
     import importlib
 
     definition: Any = importlib.import_module(module)

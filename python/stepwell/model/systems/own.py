@@ -393,7 +393,6 @@ class OwnSystem(System):
         return self._keeping(self._invariant_of(control), control.aimed(np.ones(batch), np.zeros(batch), TINY))
 
     def _invariant_of(self, control: Any) -> str:
-        """The name of the invariant that a control keeps."""
         if isinstance(control, EnergyControl):
             raise UnsupportedError(
                 f"control: EnergyControl pushes velocities by the kinetic energy, which {self!r} does not tell; use "

@@ -261,7 +261,6 @@ def _particles(argument: str, particles: Any, n: int) -> Any:
 
 
 def _is_mask(particles: Any) -> bool:
-    """Whether particles are chosen by a mask."""
     if isinstance(particles, np.ndarray):
         return bool(particles.dtype == np.bool_)
     return (
