@@ -197,16 +197,14 @@ class OwnSystem(System):
     def _trace_once(self) -> None:
         """Trace the function, or take the operations of an equal function with parameters of the same kinds."""
         key = self._key()
-        core = None if key is None else _TRACED.get(key)
-        if core is None:
-            self._trace()
-            if key is not None:
-                if len(_TRACED) >= MOST_TRACED:
-                    _TRACED.clear()
-                _TRACED[key] = self._core
+        if key is not None and (operations := _TRACED.get(key)) is not None:
+            self._take(operations)
             return
-        self._core = core
-        complete(self, velocity_term="forces that do" if core.reads_v else None)
+        self._trace()
+        if key is not None:
+            if len(_TRACED) >= MOST_TRACED:
+                _TRACED.clear()
+            _TRACED[key] = self._core
 
     def _key(self) -> Any:
         """A key of everything that the operations depend on; None if something may change unseen."""
@@ -231,8 +229,11 @@ class OwnSystem(System):
 
     def _trace(self) -> None:
         """Trace the rates, and a control as a part of them."""
-        self._core = self._rates()
-        complete(self, velocity_term="forces that do" if self._core.reads_v else None)
+        self._take(self._rates())
+
+    def _take(self, operations: Any) -> None:
+        self._core = operations
+        complete(self, velocity_term="forces that do" if operations.reads_v else None)
 
     def _rates(self, marks: Marks | None = None, *, single: bool = False) -> Any:
         """The rates as operations; with marks also the derivatives of the functions among them.
