@@ -191,5 +191,5 @@ def test_a_spline_of_another_package_is_told_from_ones_own_mistakes() -> None:
     def own(t: Any, v: Any, y: Any) -> Any:
         return spline(t) - y
 
-    with pytest.raises(TraceError, match=r"asked by scipy, .* sw\.Sampled\(values, interval, interpolation="):
+    with pytest.raises(TraceError, match=r"used by scipy, .* sw\.Sampled\(values, interval, interpolation="):
         sw.integrate(own, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
