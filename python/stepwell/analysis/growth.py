@@ -17,7 +17,7 @@ from ..model.methods import Method
 from ..model.systems import NBody, System
 from ..runs.findings import Finding, warn_of
 
-#: A state that is so many times as long as at the start is looked at; from rest, so many units long.
+#: A state is looked at once it is this many times as long as at the start; from rest, once it is this many units long.
 GROWN = 1e6
 
 #: Lengths between this and its reciprocal have squares with all of their digits.
@@ -26,14 +26,14 @@ SQUARABLE = 1e-140
 #: The step explains growth if its eigenvalues make at least this share of its logarithm, and those of the rates at most that.
 BY_STEPS, BY_MOTION = 0.5, 0.25
 
-#: Matrices of more numbers, for all members that grew, are not computed: what the others are is not asked.
+#: The most numbers in the matrices of the members that grew; members beyond that are not examined.
 MOST_NUMBERS = 1_000_000
 
-#: Of systems of up to so many numbers a state the limit is told, too.
+#: The warning also says the stability limit if a state has no more numbers than this.
 SMALL_SYSTEM = 8
 
-#: A world checks its state after so many steps, then after twice as many more, and so on up to the last number: what grows by a
-#: thousandth a step has grown a million times by then. Calls of ``step`` may be shorter or longer than that.
+#: A world first checks its state after ``FIRST_CHECK`` steps. Each interval is twice the one before, up to ``LAST_CHECK`` steps:
+#: by then a state that grows by a thousandth a step has grown a millionfold. Calls of ``step`` may be shorter or longer.
 FIRST_CHECK, LAST_CHECK, ENDLESS = 8, 16_384, 1 << 62
 
 
@@ -43,12 +43,12 @@ def lengths(system: System, v: Array, y: Array) -> Array:
     v, y = (np.asarray(block, dtype=np.float64) for block in (v, y))
     with np.errstate(all="ignore"):
         if v.ndim == len(system.v_shape) and y.ndim == len(system.y_shape):
-            length = np.asarray(np.sqrt(_square(v) + _square(y)))  # of one member, ten times as fast
+            length = np.asarray(np.sqrt(_square(v) + _square(y)))  # for one member, ten times as fast
         else:
             length = np.asarray(np.sqrt((v * v).sum(axis=axes[0]) + (y * y).sum(axis=axes[1])))
         if (length > SQUARABLE).all() and (length < 1.0 / SQUARABLE).all():
             return length
-        # Squares beyond what a float has.
+        # The squares overflow or underflow.
         unit = np.maximum(*(np.abs(block).max(axis=own, initial=0.0) for block, own in zip((v, y), axes, strict=True)))
         unit = np.where((unit > 0.0) & (unit < np.inf), unit, 1.0)
         squares = (((block / unit) ** 2).sum(axis=own) for block, own in zip((v, y), axes, strict=True))
@@ -62,8 +62,8 @@ class Growth(NamedTuple):
     Attributes:
         members: their places in the flattened batch.
         first: the place of the first of them in the batch.
-        size: by what it grew, as words.
-        why: what made it grow, and what to do.
+        size: how much the first of them grew, in words.
+        why: why it grew, and what to do.
     """
 
     members: Whole
@@ -73,11 +73,11 @@ class Growth(NamedTuple):
 
     @property
     def number(self) -> int:
-        """How many they are."""
+        """How many members grew."""
         return len(self.members)
 
     def finding(self, shape: Shape) -> Finding:
-        """It of members of a batch of this shape."""
+        """The finding for a batch of this shape."""
         size, members = math.prod(shape), np.zeros(shape, dtype=bool)
         members.reshape(-1)[self.members] = True
         text = f"{share(self.number, shape, size)} {self.size}{first_of(self.number, self.first, size)}: {self.why}"
@@ -90,13 +90,13 @@ def growth(
     """The members that grew by their steps alone, or None.
 
     Args:
-        system: what was stepped, with its control.
-        method: by which.
+        system: the system that was stepped, with its control.
+        method: the method.
         dt: the step.
-        steps: how many were made.
-        t: the time of the start, of all members or of each.
-        start: v and y there, spread over the batch.
-        end: and at the end.
+        steps: the number of steps.
+        t: the time at the start, one for all members or one for each.
+        start: v and y at the start, spread over the batch.
+        end: v and y at the end.
     """
     with np.errstate(all="ignore"):
         before, after = lengths(system, *start), lengths(system, *end)
@@ -117,10 +117,10 @@ def growth(
         radius, rate = factors.of(suspects)
     except UnsupportedError:
         return None
-    # The quotient may be no float, but its logarithm is.
+    # The quotient may overflow; its logarithm does not.
     grown = np.log(after.reshape(-1)[suspects]) - np.log(before.reshape(-1)[suspects])
-    made = steps * np.log(np.maximum(radius, 1.0))
-    by_steps = np.flatnonzero((made >= BY_STEPS * grown) & (rate * steps <= BY_MOTION * grown))
+    expected = steps * np.log(np.maximum(radius, 1.0))
+    by_steps = np.flatnonzero((expected >= BY_STEPS * grown) & (rate * steps <= BY_MOTION * grown))
     if not by_steps.size:
         return None
     k = by_steps[0]
@@ -133,14 +133,14 @@ def growth(
 
 
 def _power_of_ten(logarithm: float) -> str:
-    """A number, as 3e+52, of its natural logarithm; it may be beyond the floats."""
+    """The number with this natural logarithm, written as 3e+52; it may be beyond the range of floats."""
     exponent, rest = divmod(logarithm / math.log(10.0), 1.0)
     digit = round(10.0**rest)
     return f"{digit}e+{int(exponent):02d}" if digit < 10 else f"1e+{int(exponent) + 1:02d}"
 
 
 class _Factors:
-    """What a step, and the motion itself, make of disturbances of the start: of some members of a batch."""
+    """The factors by which a step, and the motion itself, multiply disturbances of the start, for some members of a batch."""
 
     def __init__(self, system: System, method: Method, dt: float, t: Any, start: tuple[Array, Array], batch: Shape) -> None:
         from .stability.some_members import Batch
@@ -151,23 +151,22 @@ class _Factors:
         self._t = np.broadcast_to(t, batch).reshape(-1) if np.ndim(t) else t
 
     def _own(self, members: Whole) -> tuple[System, Any, Array | None, Array | None]:
-        """The system of some members, their time, and where they begin, if that matters."""
+        """The system of some members, their time, and their start if the eigenvalues depend on it."""
         own, v, y = self._batch.of(members)
         return own, self._t if np.ndim(self._t) == 0 else self._t[members], v, y
 
     def of(self, members: Whole) -> tuple[Array, Array]:
-        """The largest magnitude of an eigenvalue of each member's step, and the largest growth of its rates in a step."""
+        """For each member the spectral radius of a step, and the largest growth exponent of its rates over a step."""
         from .stability import eigen, maps
 
         (own, t, v, y), dt = self._own(members), np.asarray(self._dt)
         rates = maps.rates(own, t, v, y)
-        how = self._method
-        step = maps.transition(own, how, dt) if v is None or y is None else maps.jacobian(own, how, dt, t, v, y)
+        step = maps.transition(own, self._method, dt) if v is None or y is None else maps.jacobian(own, self._method, dt, t, v, y)
         radius, rate = np.abs(eigen.eigenvalues(step)).max(axis=0), (self._dt * eigen.eigenvalues(rates).real).max(axis=0)
         return np.broadcast_to(radius, members.shape), np.broadcast_to(rate, members.shape)
 
     def limit(self, member: int) -> str:
-        """What to do, with the limit of a member where it is known in a moment."""
+        """What to do about a member, with its stability limit where that is quickly computed."""
         from .stability import maps
         from .stability.limit import limit_of
 
@@ -183,7 +182,7 @@ class _Factors:
 
 
 def _square(block: Array) -> float:
-    """The sum of the squares of all numbers; of one in a tenth of the time."""
+    """The sum of the squares of all numbers."""
     if block.size == 1:
         number = float(block.item())
         return number * number
@@ -192,14 +191,14 @@ def _square(block: Array) -> float:
 
 
 def finding_of(run: Any, start: tuple[Array, Array]) -> Finding | None:
-    """The members of a run with fixed steps that grew by its steps alone, from this start."""
+    """The finding for the members of a run with fixed steps that grew by its steps alone, from this start; None if none did."""
     if _is_tame(run, start) or (grown := _of_run(run, start, run.steps)) is None:
         return None
     return grown.finding(run.status.shape)
 
 
 def of_last_piece(run: Any, start: tuple[Array, Array], steps: int) -> Growth | None:
-    """The members that grew by so many fixed steps alone, of which the last are those of the run."""
+    """The members that grew by this many fixed steps alone; the last of these steps are those of the run."""
     return None if _is_tame(run, start) else _of_run(run, start, steps)
 
 
@@ -210,16 +209,16 @@ def _of_run(run: Any, start: tuple[Array, Array], steps: int) -> Growth | None:
 
 
 def _is_tame(run: Any, start: tuple[Array, Array]) -> bool:
-    """Whether no member has grown, which of nearly all runs is seen without a length of each.
+    """Whether it is certain, without the length of each member, that none has grown: so it is for nearly all runs.
 
-    All numbers at the end together are then not so much longer than the shortest member at the start.
+    Then all numbers at the end, taken as one vector, are at most ``GROWN`` times as long as the shortest member at the start.
     """
     least = _shortest(run, start)
     return least > SQUARABLE and math.sqrt(_square(run.v[-1]) + _square(run.y[-1])) <= GROWN * least
 
 
 def _shortest(run: Any, start: tuple[Array, Array]) -> float:
-    """A length that each member has at least at the start; from rest the unit."""
+    """A lower bound of the lengths of all members at the start; a member at rest counts as one unit long."""
     if run.status.size == 1:
         squares = _square(start[0]) + _square(start[1])
         return math.sqrt(squares) if squares > 0.0 or any(block.any() for block in start) else 1.0
@@ -237,7 +236,7 @@ def _shortest(run: Any, start: tuple[Array, Array]) -> float:
 def watched(
     make: Callable[..., None], loop: Any, system: System, method: Method, dt: float, v: Array, y: Array
 ) -> Callable[..., None]:
-    """``make``, the ``step`` of a world, which checks the state from time to time and warns once of growth by steps alone."""
+    """``make``, the ``step`` of a world, with checks of the state now and then that warn once of growth by steps alone."""
     if v.size + y.size > MOST_NUMBERS:
         return make
     start = np.array(v, dtype=np.float64), np.array(y, dtype=np.float64)
@@ -245,7 +244,7 @@ def watched(
     left = every = FIRST_CHECK
 
     def check() -> int:
-        """How many steps there are until the next check; endless if there is none."""
+        """Check the state, and return the number of steps until the next check, ``ENDLESS`` if there is none."""
         nonlocal every
         grown = growth(system, method, dt, loop.step_number - first, t0, start, (v, y))
         if grown is not None:

@@ -1,4 +1,4 @@
-"""Whether the fastest rate of a system, and not its accuracy, holds the step down."""
+"""Whether stability, and not accuracy, limits the adaptive steps of a run (stiffness)."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from ..base.arrays import Array, Shape
 from ..runs.result import Run
 from ..runs.stops import rates_of, start_of
 
-#: Whether stability holds the step down is looked at after so many attempts, of at most so many rates and numbers in all: that is
-#: little work against the run.
+#: Stiffness is tested after at least this many attempts, for at most this many numbers of a state, and of its matrices in all:
+#: that is little work beside the run.
 ATTEMPTS, MOST_RATES, MOST_NUMBERS = 1000, 32, 100_000
-#: A mode is stiff if it decays rather than turns, has had the time to decay by so many of its time constants, and the step is
-#: at least this share of the longest at which the method is stable for it.
+#: A mode is stiff if it decays rather than oscillates, the run has lasted this many of its time constants, and the step is at
+#: least this fraction of the largest at which the method is stable for it.
 DECAYED, SHARE_OF_LIMIT = 100.0, 0.2
-#: The part of a number by which it is changed to find a derivative: half of its digits.
+#: The fraction of a number by which it is changed to approximate a derivative: half of its digits.
 PART = 2.0**-26
 
 
 def held_by_stability(run: Run, index: Shape, attempts: int) -> str:
-    """Whether the fastest rate where a member stopped lets no longer step be stable; empty if that is not so."""
+    """The end of the message for a member that stopped where stability limited its steps; empty if it did not."""
     assert run.paces is not None
     assert run.controller_state is not None
     numbers = run.controller_state.v.size + run.controller_state.y.size
@@ -37,7 +37,7 @@ def held_by_stability(run: Run, index: Shape, attempts: int) -> str:
     rate, elapsed = abs(fastest), abs(float(run.paces.t[index]) - start_of(run, index))
     if not (-fastest.real >= 0.5 * rate and rate * elapsed > DECAYED):
         return ""
-    from ..analysis.stability import stability_limit  # only runs of stiff equations need them
+    from ..analysis.stability import stability_limit  # needed for stiff equations only
     from ..model.systems import LinearSystem
 
     mode = [[fastest.real, -fastest.imag], [fastest.imag, fastest.real]] if fastest.imag else [[fastest.real]]
@@ -51,7 +51,7 @@ def held_by_stability(run: Run, index: Shape, attempts: int) -> str:
 
 
 def _derivative(run: Run, index: Shape, n: int) -> Array:
-    """How the rates of a member change with its state, by differences."""
+    """The Jacobian of the rates of a member at its state, by differences."""
     assert run.controller_state is not None
     assert run.paces is not None
     paces, blocks = run.paces, (run.controller_state.v, run.controller_state.y)
@@ -64,7 +64,7 @@ def _derivative(run: Run, index: Shape, n: int) -> Array:
 
     state = np.concatenate(flat)
     lengths = np.concatenate([np.full(block.shape, np.sqrt((block * block).sum(axis=0))) for block in flat])
-    least = np.finfo(np.float64).tiny / PART  # the part of a smaller number would be lost
+    least = np.finfo(np.float64).tiny / PART  # below it, that fraction of the number would underflow
     scale = np.where(np.abs(state) >= least, np.abs(state), np.where(lengths >= least, lengths, 1.0))
     matrix, here = np.empty((n, n)), at(state)
     for i in range(n):

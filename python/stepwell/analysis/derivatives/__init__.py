@@ -1,8 +1,8 @@
 """Derivatives of what a tape computes, as further operations on the same tape.
 
-``modes`` differentiates forwards and backwards, ``rules`` has a derivative for each operation and each function, ``listing``
-reads a tape back, ``evaluate`` runs one over NumPy arrays, ``traced`` does all of it for a system's rates and for a step of a
-method. Their uses are in ``stepwell.dynamics``.
+In ``stepwell.reference.tape``, ``modes`` differentiates forwards and backwards, ``rules`` has a derivative for each operation and
+each function, ``listing`` reads a tape back, and ``evaluate`` runs one over NumPy arrays. ``traced`` does all of it for the rates
+of a system and for a step of a method. ``stepwell.analysis.dynamics`` uses it.
 """
 
 from ...reference.tape.evaluate import Evaluation

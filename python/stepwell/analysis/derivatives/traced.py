@@ -20,18 +20,20 @@ from ...reference.tape.evaluate import Evaluation
 from ...reference.tape.modes import directional, jacobian
 from ...reference.traced import Tracer
 
-#: Operations whose values change in time; and those of which no value is the same in one region and another beyond it.
+#: Operations whose values change in time; and operations without branches, which are analytic: a result of these that is constant
+#: in some region is constant everywhere.
 CHANGING = ("time", "sample")
 SMOOTH = {"constant", "parameter", "state", "time", "step", "add", "subtract", "multiply", "divide", "negate", "square root"}
 
-#: At so many places derivatives are compared.
+#: The number of random places at which derivatives are compared.
 PLACES = 3
 
-#: The most systems whose derivatives are kept: a search for a limit needs the same ones many times.
-MAX_KEPT = 8
+#: The most derivatives that are cached: a search for a limit needs the same ones many times.
+MAX_CACHED = 8
 
-#: The most lines of a tape times numbers of a state up to which each element of a matrix has lines of its own, and those known to
-#: be zero have none. Longer tapes are differentiated in one direction, which NumPy evaluates for all directions at once.
+#: Up to this product of the length of a tape and the length of a state, each element of the matrix has operations of its own, and
+#: an element known to be zero has none. Longer tapes are differentiated in one direction, and NumPy evaluates that for all
+#: directions at once.
 MAX_WHOLE = 20_000
 
 
@@ -39,11 +41,11 @@ class Traced:
     """Values that depend on a system's state, on a tape of their own.
 
     Attributes:
-        system: whose state it is.
+        system: the system.
         tape: the tape of all values.
         marks: the functions on it.
         state: the symbols of a member's numbers, v first.
-        roots: the values.
+        roots: the symbols of the values.
         length: how many numbers a state has.
     """
 
@@ -62,33 +64,35 @@ class Traced:
         self.tables = tracer.tables
 
     def evaluation(self, roots: Sequence[Symbol]) -> Evaluation:
-        """Values on the tape, to be computed."""
+        """The evaluation of these symbols."""
         return Evaluation(self.tape, roots, self.numbers, self.tables)
 
     def rows(self, v: Array, y: Array) -> list[Array]:
         """The numbers of a state, one after the other, each of the shape of the batch."""
-        blocks = ((v, self.system.v_shape), (y, self.system.y_shape))
-        return [row for block, shape in blocks for row in block.reshape(prod(shape), *block.shape[len(shape) :])]
+        return _rows(self.system, v, y)
 
     def jacobian(self) -> Evaluation:
-        """The values' derivatives with respect to the state, row after row, and behind them the values."""
+        """The values' derivatives with respect to the state, row by row, and then the values."""
         rows = jacobian(self.tape, self.roots, self.state, self.marks)
         return self.evaluation([each for row in rows for each in row] + self.roots)
 
     def tangent(self) -> Evaluation:
-        """The values, and their derivatives along a change of the state whose numbers come behind the state's own.
+        """The values, and their derivatives along a change of the state.
 
-        The sum that a control accumulates has a place behind those, so the changes begin at number ``room``.
+        The numbers of the change follow those of the state, from number ``room`` on.
         """
+        return self.evaluation(self.roots + self.derivatives())
+
+    def derivatives(self) -> list[Symbol]:
+        """The derivatives of the values along a change of the state, whose numbers begin at number ``room``."""
         changes = [self.tape.state(self.room + i) for i in range(self.length)]
-        pairs = zip(self.state, changes, strict=True)
-        return self.evaluation(self.roots + directional(self.tape, self.roots, pairs, self.marks))
+        return directional(self.tape, self.roots, zip(self.state, changes, strict=True), self.marks)
 
     def along(self, directions: int) -> list[Symbol]:
-        """The values, and their derivatives along several changes of the state: of a value in each direction, then of the next.
+        """The values, then the derivatives of the first along each of several changes of the state, of the second, and so on.
 
-        The numbers of the changes come behind the state's own in the same order. The sum that a control accumulates has the first
-        place behind the state, too, but no value depends on it.
+        The numbers of the changes follow those of the state, in the same order. The sum that a control accumulates has the first
+        place after the state as well, but no value depends on it.
         """
         first = self.length
         changes = [[self.tape.state(first + i * directions + j) for i in range(self.length)] for j in range(directions)]
@@ -97,13 +101,12 @@ class Traced:
 
     @property
     def room(self) -> int:
-        """The number of the state at which the changes begin."""
+        """The number at which the changes begin: after the state and the sum that a control accumulates."""
         return self.length + 1
 
 
 def _roots(tracer: Tracer, what: str, method: Method | None) -> list[Symbol]:
-    """The symbols of the rates at step 1, of a step's next slots, or of what finishes a slot."""
-    found: list[Symbol]
+    """The symbols of the rates at h = 1, of the slots after a step, or of the state that finishes a slot."""
     if method is None:
         if tracer.system.stick_friction is not None:
             raise UnsupportedError(
@@ -112,24 +115,22 @@ def _roots(tracer: Tracer, what: str, method: Method | None) -> list[Symbol]:
             )
         s, (v, y, _) = tracer.scaled(1.0), tracer.state()
         t = tracer.tape.time()
-        found = tracer.flat(*_wide(tracer.system, s.dv(t, v, y), s.dy(t, v, y)))
-    elif what == "step":
-        found = tracer.step(method)
-    else:
-        found = tracer.slot(method, what, 0)
-    return found
+        dv, dy = np.broadcast_to(s.dv(t, v, y), tracer.system.v_shape), np.broadcast_to(s.dy(t, v, y), tracer.system.y_shape)
+        return tracer.flat(dv, dy)
+    return tracer.step(method) if what == "step" else tracer.slot(method, what, 0)
 
 
-def _wide(system: System, dv: Any, dy: Any) -> tuple[Any, Any]:
-    """Rates over whole blocks."""
-    return tuple(np.broadcast_to(each, shape) for each, shape in ((dv, system.v_shape), (dy, system.y_shape)))  # type: ignore[return-value]
+def _rows(system: System, v: Array, y: Array) -> list[Array]:
+    """The numbers of a state, one after the other, each of the shape of the batch."""
+    blocks = ((v, system.v_shape), (y, system.y_shape))
+    return [row for block, shape in blocks for row in block.reshape(prod(shape), *block.shape[len(shape) :])]
 
 
 class Reading(NamedTuple):
-    """What rates and their derivatives are computed from.
+    """What rates and their derivatives depend on.
 
     Attributes:
-        time: whether the rates depend on time, by themselves or by samples.
+        time: whether the rates depend on time, explicitly or by samples.
         linear: whether they are linear in the state, with coefficients that do not change in time.
     """
 
@@ -138,17 +139,16 @@ class Reading(NamedTuple):
 
 
 def reading(system: System) -> Reading:
-    """What a system's rates and their derivatives are computed from, as their tape says.
+    """What a system's rates and their derivatives depend on, read from their tape.
 
-    Derivatives that are sums, products and roots of the state are the same everywhere if they are so at places drawn at random:
-    as where the parameter is zero by which a square of the state is multiplied.
+    Derivatives that are sums, products and roots of the state are constant if they are equal at places drawn at random: that is
+    so where a square of the state has the factor 0, for example.
     """
     traced = Traced(system, "rates")
     if len(traced.tape) * traced.length <= MAX_WHOLE:
         derivatives = [each for row in jacobian(traced.tape, traced.roots, traced.state, traced.marks) for each in row]
     else:
-        changes = [traced.tape.state(traced.room + i) for i in range(traced.length)]
-        derivatives = directional(traced.tape, traced.roots, zip(traced.state, changes, strict=True), traced.marks)
+        derivatives = traced.derivatives()
     of_rates, of_derivatives = (traced.tape.operations(roots)[0] for roots in (traced.roots, derivatives))
     timed = any(name in CHANGING for name, _, _ in of_rates)
     if not any(name in CHANGING or (name == "state" and number < traced.room) for name, _, number in of_derivatives):
@@ -161,8 +161,8 @@ def reading(system: System) -> Reading:
     return Reading(timed, all(np.array_equal(a, b) for other in values[1:] for a, b in zip(values[0], other, strict=True)))
 
 
-class _Kept(NamedTuple):
-    """A derivative, and of what; ``whole`` if it has a line for each element of the matrix, else it is in one direction."""
+class _Cached(NamedTuple):
+    """A derivative and what was traced; ``whole`` if each element of the matrix has operations, else it is along a direction."""
 
     system: System
     what: str
@@ -171,34 +171,34 @@ class _Kept(NamedTuple):
     whole: bool
 
 
-#: The last derivatives that were asked for.
-_last: deque[_Kept] = deque(maxlen=MAX_KEPT)
+#: The derivatives that were traced last.
+_last: deque[_Cached] = deque(maxlen=MAX_CACHED)
 
 
-def _kept(system: System, what: str, method: Method | None) -> _Kept:
-    """The derivative, traced anew unless that of this very system object was needed shortly before.
+def _cached(system: System, what: str, method: Method | None) -> _Cached:
+    """The derivative, traced unless that of the same system object is still cached.
 
-    An equal system is not enough: a user's function may depend on other numbers than when it was traced.
+    An equal system is not enough: a user's function may read other numbers than when it was traced.
     """
     for each in tuple(_last):
         if each.system is system and each.what == what and each.method is method:
             return each
     traced = Traced(system, what, method)
     whole = len(traced.tape) * traced.length <= MAX_WHOLE
-    kept = _Kept(system, what, method, traced.jacobian() if whole else traced.tangent(), whole)
-    _last.append(kept)
-    return kept
+    entry = _Cached(system, what, method, traced.jacobian() if whole else traced.tangent(), whole)
+    _last.append(entry)
+    return entry
 
 
 def matrix(
     system: System, what: str, method: Method | None, members: Shape, v: Array, y: Array, t: Any = 0.0, h: Any = 1.0
 ) -> tuple[Array, Array]:
-    """The derivative of what a system does at a state, and what it does there.
+    """The derivative of the rates, of a step or of its finish at a state, and the values themselves.
 
     Args:
         system: the system.
         what: "rates", the "step" of a method from slot to slot, or its "finish" from slots to states.
-        method: of a step.
+        method: the method; None for rates.
         members: the shape to which states, parameters, times and steps broadcast.
         v: the velocities, or what the method carries in place of them, shape (*block, *batch).
         y: the coordinates.
@@ -208,19 +208,18 @@ def matrix(
     Returns:
         Arrays of shapes (n, n, *members) and (n, *members).
     """
-    kept = _kept(system, what, method)
+    entry = _cached(system, what, method)
     n = prod(system.v_shape) + prod(system.y_shape)
-    blocks = ((v, system.v_shape), (y, system.y_shape))
-    rows = [row for block, shape in blocks for row in block.reshape(prod(shape), *block.shape[len(shape) :])]
+    rows = _rows(system, v, y)
     nothing = np.zeros(())  # the sum of a control has no influence
-    if kept.whole:
+    if entry.whole:
         values = np.empty((n * n + n, *members))
-        for k, value in enumerate(kept.evaluation([*rows, nothing], t, h)):
+        for k, value in enumerate(entry.evaluation([*rows, nothing], t, h)):
             values[k] = value
         return values[: n * n].reshape(n, n, *members), values[n * n :]
-    changes = np.eye(n).reshape(n, n, *(1,) * len(members))  # of each number, in every direction at once
+    changes = np.eye(n).reshape(n, n, *(1,) * len(members))  # the unit vectors, all directions at once
     derivative, values = np.empty((n, n, *members)), np.empty((n, *members))
-    for k, value in enumerate(kept.evaluation([*rows, nothing, *changes], t, h)):
+    for k, value in enumerate(entry.evaluation([*rows, nothing, *changes], t, h)):
         (values if k < n else derivative)[k % n] = value
     return derivative, values
 

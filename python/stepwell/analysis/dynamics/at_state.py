@@ -18,7 +18,7 @@ from ..stability import eigen, maps
 from ..stability.analysis import velocities
 from ..stability.eigen import Complex
 
-#: For states of more numbers than this the complex step is used if the system allows it: a tape of derivatives would be long.
+#: For states with more numbers than this the complex step is used if the system allows it: a tape of derivatives would be long.
 MAX_TRACED_NUMBERS = 64
 
 
@@ -26,14 +26,14 @@ class Jacobian(ValueEquality):
     """The derivative of the rates (v̇, ẏ) with respect to the state (v, y), for n numbers of a state and a batch of members.
 
     Attributes:
-        system: whose rates.
+        system: the system.
         v: the velocities of the state, shape (*block, *batch).
         y: its coordinates, likewise.
         t: its time.
         matrix: shape (n, n, *members): rows are the numbers of v̇, then those of ẏ; columns those of v, then those of y. In 1 per
             unit of time, times the unit of the row's number over that of the column's.
         rates: v̇ and ẏ themselves, shape (n, *members).
-        names: what the n numbers are called.
+        names: the names of the n numbers.
     """
 
     def __init__(self, system: System, v: Array, y: Array, t: float, matrix: Array, rates: Array) -> None:
@@ -83,13 +83,13 @@ def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobi
     """The derivative of a system's rates at a state, exact up to rounding.
 
     The rates are traced and their tape is differentiated, operation by operation; nothing is approximated by differences. This
-    holds for your own equations as for built-in systems. A built-in system of more than 64 numbers takes the complex step, which
-    is equally exact.
+    holds for your own equations as well as for built-in systems. For a built-in system of more than 64 numbers the complex step
+    is used, which is equally exact.
 
     Args:
-        system: whose rates; parameters may be arrays.
+        system: the system; parameters may be arrays.
         y: the coordinates, shape (*block, *batch), or one number for all.
-        v: the velocities, likewise; a system that has none needs none.
+        v: the velocities, likewise; None for a system without velocities.
         t: the time; it has no influence if the rates depend on time only through added inputs.
 
     Returns:
@@ -97,7 +97,7 @@ def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobi
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the rates depend on the state by an operation that has no derivative.
+        UnsupportedError: if the rates depend on the state through an operation that has no derivative.
 
     Example:
         >>> sw.jacobian(sw.Pendulum(omega=2.0), v=0.0, y=0.0).matrix
@@ -126,7 +126,7 @@ def linearised(system: System, v: Array, y: Array, t: Any = 0.0) -> tuple[Array,
 
 
 def by_growth(matrix: Array) -> Complex:
-    """Eigenvalues, the largest real part first; of equal ones, the fastest first, and of a pair the positive angle first."""
+    """Eigenvalues, the largest real part first; among equal ones the fastest first, and in a pair the positive angle first."""
     values = eigen.eigenvalues(matrix)
     size = np.abs(values).max(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -36,17 +36,17 @@ from ..stability import maps
 from ..stability.analysis import velocities
 from .variational import Variational
 
-#: Steps between two orthonormalisations by default: few enough that vectors do not become parallel up to rounding.
+#: Steps between two orthonormalisations by default: few enough that rounding does not make the vectors parallel.
 EVERY = 10
 
-#: The most operations of a step, about, before it is differentiated: as many as of a step by a series.
+#: About the most operations of a step before it is differentiated: as many as for a step by a series.
 MAX_OPERATIONS = 100_000
 
-#: Operations of a thread between two orthonormalisations, from which on it is worthwhile; and those that are made without looking
-#: for an interruption.
+#: The least operations between two orthonormalisations for which a thread is worthwhile; and the most between two looks for an
+#: interruption.
 OPERATIONS_OF_A_THREAD, OPERATIONS_AT_ONCE = 2_000_000, 1 << 26
 
-#: The most operations of a tape on which all vectors of a member are together.
+#: The most operations of a tape that steps all vectors of a member.
 MAX_TOGETHER = 20_000
 
 
@@ -54,13 +54,13 @@ class Lyapunov(ValueEquality):
     """Lyapunov exponents of a batch of motions.
 
     Attributes:
-        system: what was stepped.
-        method: how.
+        system: the system.
+        method: the method that stepped it.
         dt: the step; None with a tolerance.
         t: times up to which ``history`` averages, shape (orthonormalisations,).
         exponents: mean growth per unit of time, the largest first, shape (k, *batch).
-        history: the same averages up to each of these times, in the order of the orthonormalised vectors, shape
-            (orthonormalisations, k, *batch). Their changes towards the end show how far they have converged.
+        history: mean growth per unit of time up to each of these times, in the order of the orthonormalised vectors, shape
+            (orthonormalisations, k, *batch). The changes towards the end show how far the exponents have converged.
         v: the velocities at the end, shape (*block, *batch), or what the method carries in their place.
         y: the coordinates at the end.
     """
@@ -78,14 +78,15 @@ class Lyapunov(ValueEquality):
 
     @property
     def sum(self) -> Array:
-        """The sum of the exponents, shape (*batch): of all of them, the mean rate at which volumes in state space grow."""
+        """The sum of the exponents, shape (*batch); if these are all, the mean rate at which volumes in state space grow."""
         return np.asarray(_total(self.exponents))
 
     @property
     def dimension(self) -> Array:
-        """The Kaplan-Yorke dimension, shape (*batch); NaN unless all exponents were asked for.
+        """The Kaplan-Yorke dimension, shape (*batch); NaN unless all exponents were computed.
 
-        The number of largest exponents whose sum is above zero, plus the fraction of the next that makes the sum zero.
+        It is the largest number of leading exponents whose sum is not negative, plus the fraction of the next one that makes the
+        sum zero.
         """
         k, n = len(self.exponents), sum(maps.size(self.system))
         members = self.exponents.shape[1:]
@@ -123,33 +124,34 @@ def lyapunov(
     at: Any = None,
     threads: int | None = None,
 ) -> Lyapunov:
-    """Lyapunov exponents of a motion, or of a batch: the mean rates at which small disturbances of it grow.
+    """Lyapunov exponents of a motion, or of a batch: the mean rates at which small disturbances grow.
 
-    Disturbances are stepped by the exact derivative of each step of the method, so the exponents are those of the sequence of
-    the method, and those of the motion up to the method's error: by a Runge-Kutta method they are those of the variational
-    equations. At intervals they are orthonormalised, and their growth is noted (Benettin et al. 1980). The states are those of
-    ``integrate``, to the bit. The step and its derivative are one step for the core, which takes as long as one of equations with
-    as many operations.
+    Disturbances are stepped by the exact derivative of each step of the method. So the exponents are exactly those of the
+    numerical trajectory, and those of the motion up to the method's error; a Runge-Kutta method thereby integrates the
+    variational equations. At intervals the disturbances are orthonormalised and their growth is recorded (Benettin et al. 1980).
+    The states are those of ``integrate``, to the bit. The core steps the state and its disturbances together, as fast as
+    equations with the same number of operations.
 
-    With ``tolerance`` and ``at`` in place of ``dt`` and ``steps`` the variational equations are integrated beside the motion, in
-    adaptive steps, each member's own. The states are those of ``integrate`` to this tolerance, and not to the bit.
+    With ``tolerance`` and ``at`` in place of ``dt`` and ``steps`` the variational equations are integrated together with the
+    motion, in adaptive steps, each member with its own. The states agree with those of ``integrate`` to this tolerance, not to
+    the bit.
 
     Args:
-        system: what to step; parameters may be arrays.
+        system: the system; parameters may be arrays.
         method: its name, or what ``stepwell.method`` returns.
         y: coordinates at the start, shape (*block, *batch), or one number for all.
         dt: the step, in units of time, above zero; with a tolerance the step to try first, or None.
-        steps: over how many steps growth is averaged, one or more.
-        v: velocities at the start, as y; a system that has none needs none.
-        exponents: how many, the largest ones; or "all".
-        transient: number of steps before those, in which the motion approaches its attractor and disturbances their directions;
-            with a tolerance, the number of intervals between times of ``at``, of which the first begins at t0.
-        every: steps from one orthonormalisation to the next; 10 if None. In between, vectors must not become parallel up to
-            rounding: (largest − smallest)·every·dt must stay below some 30.
+        steps: the number of steps over which growth is averaged, one or more.
+        v: velocities at the start, like y; None for a system without velocities.
+        exponents: how many of the largest exponents; or "all".
+        transient: the number of steps before these, in which the motion approaches its attractor and disturbances their
+            directions; with a tolerance, the number of intervals between the times t0 and those of ``at``.
+        every: steps from one orthonormalisation to the next; 10 if None. In between, rounding must not make the vectors parallel:
+            (largest − smallest)·every·dt must stay below some 30.
         t0: time of the first step.
-        tolerance: as in ``integrate``, a number or a pair (relative, absolute), for methods with an ``error_order`` and series.
-        at: with a tolerance, the times of the orthonormalisations, ascending, after t0, near enough that vectors do not become
-            parallel in between.
+        tolerance: as in ``integrate``, a number or a pair (relative, absolute), for series and methods with an ``error_order``.
+        at: with a tolerance, the times of the orthonormalisations, ascending, after t0, and so close that the vectors do not
+            become parallel in between.
         threads: how many threads share the members; None for as many as are worthwhile.
 
     Returns:
@@ -157,28 +159,28 @@ def lyapunov(
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system, a step has no derivative, or one that is too long.
+        UnsupportedError: if the method cannot step the system, a step has no derivative, or its derivative is too long.
 
     Warns:
         DivergenceWarning: if members left the finite range, or stopped before the last time; their exponents are NaN.
 
     Example:
-        >>> found = sw.lyapunov(sw.Pendulum(1.0, 0.1), "rk4", v=0.0, y=1.0, dt=0.1, steps=1000, exponents="all")
-        >>> round(float(found.sum), 4)  # −2·D·ω₀
+        >>> result = sw.lyapunov(sw.Pendulum(1.0, 0.1), "rk4", v=0.0, y=1.0, dt=0.1, steps=1000, exponents="all")
+        >>> round(float(result.sum), 4)  # −2·D·ω₀
         -0.2
     """
-    given: dict[str, Any] = {"exponents": exponents, "transient": transient, "t0": t0, "keep_history": True}
-    given["threads"] = None if threads is None else checks.count("threads", threads, 1, 4096)
+    settings: dict[str, Any] = {"exponents": exponents, "transient": transient, "t0": t0, "keep_history": True}
+    settings["threads"] = None if threads is None else checks.count("threads", threads, 1, 4096)
     if tolerance is not None or at is not None:
         if wrong := [name for name, value in (("steps", steps), ("every", every)) if value is not None]:
             raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
-        found = adaptive_averages(system, method, v, y, tolerance, at, dt=dt, **given)
+        result = adaptive_averages(system, method, v, y, tolerance, at, dt=dt, **settings)
     else:
         if missing := [name for name, value in (("dt", dt), ("steps", steps)) if value is None]:
             raise ArgumentError(f"{' and '.join(missing)}: expected with fixed steps; for adaptive steps give tolerance= and at=")
-        found = averages(system, method, v, y, dt, steps, every=every, **given)
-    _warn(found.exponents)
-    return found
+        result = averages(system, method, v, y, dt, steps, every=every, **settings)
+    _warn(result.exponents)
+    return result
 
 
 def averages(
@@ -197,12 +199,12 @@ def averages(
     threads: int | None,
     look: Callable[[], object] = lambda: None,
 ) -> Lyapunov:
-    """``lyapunov`` by fixed steps, without a warning.
+    """``lyapunov`` with fixed steps, without a warning.
 
-    The history has the last averages alone unless it is kept. ``look`` is called at each orthonormalisation.
+    Without ``keep_history`` the history has only the last averages. ``look`` is called at each orthonormalisation.
     """
-    how = find_method(method)
-    system, v, y = _start(system, how, v, y)
+    method = find_method(method)
+    system, v, y = _start(system, method, v, y)
     dt = checks.number("dt", dt, positive=True, unit="units of time")
     t0 = checks.number("t0", t0, unit="units of time")
     steps = checks.count("steps", steps, 1)
@@ -214,12 +216,12 @@ def averages(
         raise ArgumentError(f"dt, steps: expected a time that stays finite, got {steps} steps of {dt:g}")
     system.check_time(max(abs(t0), abs(t0 + (transient + steps) * dt)))
     members = together(system, v, y)
-    _not_too_long(system, how, members, dt)
+    _not_too_long(system, method, members, dt)
     noted = -(-steps // every) if keep_history else 1
     checks.fits("the exponents over time", noted * k + 6 * n * (k + 1), members, "take fewer steps, or a larger every=")
     v, y = maps.spread(v, system.v_shape, members), maps.spread(y, system.y_shape, members)
-    tapes, count = _Tapes(system, how, k), prod(members)
-    motions = _motions(tapes, engine.Plan(system, how, members, dt, t0), v, y, tapes.shares(count, every, threads))
+    tapes, count = _Tapes(system, method, k), prod(members)
+    motions = _motions(tapes, engine.Plan(system, method, members, dt, t0), v, y, tapes.shares(count, every, threads))
     history = np.empty((noted, k, count))
 
     def average(motion: _Motion, some: slice, look: Callable[[], object]) -> None:
@@ -240,7 +242,7 @@ def averages(
     v, y = states[:n_v].reshape((*system.v_shape, *members)), states[n_v:].reshape((*system.y_shape, *members))
     ends = np.minimum(every * np.arange(1, noted + 1), steps) if keep_history else np.array([steps])
     history = history.reshape((noted, k, *members))
-    return Lyapunov(system, how, dt, t0 + (transient + ends) * dt, _in_order(history[-1]), history, v, y)
+    return Lyapunov(system, method, dt, t0 + (transient + ends) * dt, _in_order(history[-1]), history, v, y)
 
 
 def adaptive_averages(
@@ -260,9 +262,9 @@ def adaptive_averages(
     max_steps: int | None = None,
     look: Callable[[], object] = lambda: None,
 ) -> Lyapunov:
-    """The same with a tolerance. Members that stop before the last time have no exponents."""
-    how = find_method(method)
-    system, v, y = _start(system, how, v, y)
+    """``lyapunov`` with a tolerance, without a warning. Members that stop before the last time have exponents NaN."""
+    method = find_method(method)
+    system, v, y = _start(system, method, v, y)
     if tolerance is None or at is None:
         raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
     t0 = checks.number("t0", t0, unit="units of time")
@@ -281,24 +283,24 @@ def adaptive_averages(
     noted = len(times) - transient if keep_history else 1
     checks.fits("the exponents over time", noted * k + 12 * n * (k + 1), members, "take fewer times")
     count = prod(members)
-    asked = [_of_members(each, members) for each in of_steps]
+    per_member = [_of_members(each, members) for each in of_steps]
     both = ((v, system.v_shape), (y, system.y_shape))
     states = np.concatenate([maps.spread(block, shape, members).reshape(prod(shape), count) for block, shape in both])
     vectors = np.array(np.broadcast_to(_orthonormal(_generic(n, k))[0][:, :, np.newaxis], (n, k, count)))
-    whole = Members(engine.Plan(Variational(system, k), how, members, 1.0))
+    whole = Members(engine.Plan(Variational(system, k), method, members, 1.0))
     going, left = np.arange(count), whole.plan(np.arange(count)).system
     longest, grown, history = np.zeros(count), np.zeros((k, count)), np.full((noted, k, count), np.nan)
     began = t0 if transient == 0 else float(times[transient - 1])
     for i, (begin, end) in enumerate(zip([t0, *times.tolist()], times.tolist(), strict=False)):
-        # Lengths of disturbances mean nothing, but an error is relative to that of a whole block, with them.
+        # Only the directions of disturbances matter, but the error is relative to the length of the block that includes them.
         with np.errstate(over="ignore"):
             longest[going] = np.maximum(longest[going], np.sqrt((states[n_v:, going] ** 2).sum(axis=0)))
         unit = np.where(longest[going] > 0.0, longest[going], 1.0)
         beside = np.concatenate([states[n_v:, going], (unit * vectors[..., going]).reshape(n * k, -1)])
-        first, *parts = (each(going) for each in asked)
-        given: dict[str, Any] = {"tolerance": tuple(parts) if isinstance(tolerance, tuple) else parts[0]}
-        given |= {"dt": first if i == 0 else None, "max_steps": max_steps, "threads": threads}
-        run = quietly(left, how, v=states[:n_v, going], y=beside, t0=begin, at=[end], **given)
+        first, *parts = (each(going) for each in per_member)
+        settings: dict[str, Any] = {"tolerance": tuple(parts) if isinstance(tolerance, tuple) else parts[0]}
+        settings |= {"dt": first if i == 0 else None, "max_steps": max_steps, "threads": threads}
+        run = quietly(left, method, v=states[:n_v, going], y=beside, t0=begin, at=[end], **settings)
         states[:, going] = np.concatenate([run.v[-1], run.y[-1, :n_y]])
         vectors[..., going], lengths = _orthonormal(run.y[-1, n_y:].reshape(n, k, -1) / unit)
         grown[:, going] += _log(lengths)
@@ -314,11 +316,11 @@ def adaptive_averages(
         look()
     v, y = states[:n_v].reshape((*system.v_shape, *members)), states[n_v:].reshape((*system.y_shape, *members))
     history = history.reshape((noted, k, *members))
-    return Lyapunov(system, how, None, times[-noted:], _in_order(history[-1]), history, v, y)
+    return Lyapunov(system, method, None, times[-noted:], _in_order(history[-1]), history, v, y)
 
 
 def _start(system: System, method: Method, v: Any, y: Any) -> tuple[System, Array, Array]:
-    """The system for a state, and its blocks."""
+    """The system with the shapes of the state, and the blocks of the state, checked."""
     system = a_system(system).for_state_shapes(v, y)
     fits_together(system, method)
     v = checks.block("v", velocities(system, v), system.v_shape, system.axes)
@@ -326,7 +328,7 @@ def _start(system: System, method: Method, v: Any, y: Any) -> tuple[System, Arra
 
 
 def _of_members(value: Any, members: tuple[int, ...]) -> Callable[[Any], Any]:
-    """Of some members, by their numbers in a row: a part of an array over the batch, or what is for all of them."""
+    """The function that takes indices of members in the flattened batch and returns the value of each, or one for all."""
     if not isinstance(value, np.ndarray):
         return lambda _some: value
     wide = np.broadcast_to(value, members).reshape(-1)
@@ -334,21 +336,22 @@ def _of_members(value: Any, members: tuple[int, ...]) -> Callable[[Any], Any]:
 
 
 def _in_order(exponents: Array) -> Array:
-    """The largest first, shape (k, *members)."""
+    """The exponents, the largest first, shape (k, *members)."""
     return np.take_along_axis(exponents, np.argsort(-exponents, axis=0, kind="stable"), axis=0)
 
 
 class _Tapes:
-    """A step and its derivative along vectors, and what makes the vectors orthonormal.
+    """The tapes of a step with its derivative along vectors, and of their orthonormalisation.
 
-    All vectors of a member are on one tape, so that the state is stepped once for all of them, and another tape makes them
-    orthonormal. Where that is too long, each vector is stepped beside a copy of the state, and NumPy makes them orthonormal.
+    One tape steps the state and all vectors of a member, so that the state is stepped once for all of them, and another tape
+    makes them orthonormal. Where these are too long, each vector is stepped with a copy of the state, and NumPy makes the vectors
+    orthonormal.
 
     Attributes:
         n: how many numbers a state has.
-        k: how many vectors there are.
-        together: whether they are on one tape.
-        operations: about how many a step has, of a member with all its vectors.
+        k: the number of vectors.
+        together: whether one tape steps all vectors.
+        operations: about how many operations a step of a member with all its vectors has.
     """
 
     def __init__(self, system: System, method: Method, k: int) -> None:
@@ -363,7 +366,7 @@ class _Tapes:
             self.orthonormalise = tape.equations([], following)
 
     def shares(self, members: int, every: int, threads: int | None) -> int:
-        """Among how many threads the members are shared; None for as many as are worthwhile."""
+        """The number of threads that share the members: this one, or as many as are worthwhile for None."""
         if threads is None:
             threads = min(available(), int(members * every * self.operations // OPERATIONS_OF_A_THREAD))
         return max(1, min(threads, members))
@@ -388,8 +391,8 @@ class _Motion:
                 for each, shape in ((slot, system.v_shape), (y, system.y_shape))
             ]
         )
-        # One axis before the members: vector after vector. A unit vector might lie in a direction that never grows: at a turning
-        # point, a change of the velocity is one along the motion.
+        # The vectors lie along one axis before the members. They are no unit vectors, since one of these might lie in a direction
+        # that never grows: at a turning point, a change of the velocity is a change along the motion.
         vectors = _orthonormal(_generic(n, k))[0][:, :, np.newaxis]
         if tapes.together:
             numbers = np.empty((n + n * k + k, count))
@@ -406,7 +409,7 @@ class _Motion:
         self._at_once = max(1, OPERATIONS_AT_ONCE // (count * tapes.operations))
 
     def go(self, steps: int, look: Callable[[], object]) -> None:
-        """Make a number of steps; then make the vectors orthonormal, and note their growth. Look now and then."""
+        """Make a number of steps, calling ``look`` now and then; then make the vectors orthonormal and record their growth."""
         for first in range(0, steps, self._at_once):
             self._step.step(min(self._at_once, steps - first))
             look()
@@ -422,7 +425,7 @@ class _Motion:
 
 
 def _motions(tapes: _Tapes, plan: engine.Plan, v: Array, y: Array, shares: int) -> list[tuple[_Motion, slice]]:
-    """The motions of all members in so many shares, and which members these are, in a row."""
+    """The motions of all members in this many shares, each with its slice of the flattened batch."""
     count = plan.members
     if shares == 1:
         return [(_Motion(tapes, plan, v, y), slice(0, count))]
@@ -433,9 +436,9 @@ def _motions(tapes: _Tapes, plan: engine.Plan, v: Array, y: Array, shares: int) 
 
 
 def _world(plan: engine.Plan, step: _core.Equations, numbers: Array) -> _core.World:
-    """What makes this step of these numbers, in place."""
-    given = plan.system.parameters(plan.batch, series=plan.method.has_series)
-    model = _core.ModelSpec(plan.system.kernel, plan.method.name, [*given, ("step()", step)])
+    """The world that makes this step with these numbers, in place."""
+    parameters = plan.system.parameters(plan.batch, series=plan.method.has_series)
+    model = _core.ModelSpec(plan.system.kernel, plan.method.name, [*parameters, ("step()", step)])
     return _core.World(model, plan, np.empty(0), numbers.reshape(-1))
 
 
@@ -444,7 +447,7 @@ class _Stopped(Exception):  # noqa: N818 (not an error)
 
 
 def _in_threads(works: Sequence[Callable[[Callable[[], object]], None]]) -> None:
-    """Do each by a thread of its own; after Ctrl-C, or an error, the others end when they look."""
+    """Run each in a thread of its own; after Ctrl-C or an error the others end at their next ``look``."""
     stop = threading.Event()
 
     def look() -> None:
@@ -464,7 +467,7 @@ def _in_threads(works: Sequence[Callable[[Callable[[], object]], None]]) -> None
 
 
 def _orthonormalisation(n: int, k: int) -> tuple[_core.Tape, list[_core.Symbol]]:
-    """The tape of k vectors of n numbers that become orthonormal, and of the logarithms of their growth that are added up."""
+    """The tape that makes k vectors of n numbers orthonormal and adds the logarithms of their growth to sums, and its results."""
     tape = _core.Tape()
     state = np.array([tape.state(i) for i in range(n * k + k)], dtype=object)
     vectors, lengths = _orthonormal(state[: n * k].reshape(n, k))
@@ -478,13 +481,13 @@ def _not_too_long(system: System, method: Method, members: tuple[int, ...], dt: 
     operations = _core.operations(engine.model(engine.Plan(system, method, members, dt)))
     if operations > MAX_OPERATIONS:
         raise UnsupportedError(
-            f"lyapunov: expected a step of {MAX_OPERATIONS:,} operations at most, whose derivative is written operation by "
-            f"operation, got one of about {operations:,}, of {system!r} by {method.name}; take fewer bodies, masses or springs"
+            f"lyapunov: expected a step of at most {MAX_OPERATIONS:,} operations, since it is differentiated operation by "
+            f"operation, got about {operations:,} for {system!r} by {method.name}; take fewer bodies, masses or springs"
         )
 
 
 def _how_many(exponents: Any, n: int) -> int:
-    """The number of exponents that are asked for."""
+    """The number of exponents, from a number or "all"."""
     if isinstance(exponents, str):
         checks.known("exponents", exponents, ("all",))
         return n
@@ -492,7 +495,7 @@ def _how_many(exponents: Any, n: int) -> int:
 
 
 def _generic(n: int, k: int) -> Array:
-    """Vectors of n numbers to which no motion is likely to be orthogonal, the same on every machine."""
+    """Vectors, k of n numbers, that are unlikely to be orthogonal to any motion, with the same bits on every machine."""
     i, j = 1.0 + np.arange(n)[:, np.newaxis], np.arange(k)
     return cos(1.7 * i + 2.3 * i * j)
 
@@ -512,10 +515,11 @@ def _largest(values: Any) -> Any:
 
 
 def _orthonormal(vectors: Any) -> tuple[Any, Any]:
-    """Vectors made orthonormal one after the other, and the length of each orthogonal to those before it.
+    """The vectors made orthonormal one after the other, and the length of each one's part orthogonal to those before it.
 
-    Gram-Schmidt, each twice, which is as accurate as Householder's method; every sum in a fixed order. Shapes (n, k, *members)
-    and (k, *members), of numbers or of symbols. Numbers are scaled before their lengths are computed, so that nothing overflows.
+    By Gram-Schmidt, twice for each vector, which is as accurate as Householder's method; every sum has a fixed order. The shapes
+    are (n, k, *members) and (k, *members), of numbers or symbols. Vectors are scaled before their lengths are computed, so that
+    nothing overflows.
     """
     done, lengths = np.empty_like(vectors), np.empty(vectors.shape[1:], vectors.dtype)
     with np.errstate(all="ignore"):
@@ -533,14 +537,14 @@ def _orthonormal(vectors: Any) -> tuple[Any, Any]:
 
 
 def _log(x: Any) -> Any:
-    """The logarithm of positive normal numbers, or of a symbol; that of 0 is −∞, and that of others NaN."""
+    """The logarithm of numbers or of a symbol: −∞ for 0 or less, and NaN for subnormal numbers, infinity and NaN."""
     ordinary = (x >= np.finfo(np.float64).tiny) & (x <= np.finfo(np.float64).max)
     with np.errstate(all="ignore"):
         return where(ordinary, log(where(ordinary, x, 1.0)), where(x <= 0.0, -np.inf, np.nan))
 
 
 def _warn(exponents: Array) -> None:
-    """Say how many members have none."""
+    """Warn if some members have no exponents."""
     lost = np.isnan(exponents).any(axis=0)
     if lost.any():
         some = int(lost.sum())

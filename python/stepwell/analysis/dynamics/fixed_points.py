@@ -23,41 +23,43 @@ from ..stability.analysis import Analysis, analyse, state
 from ..stability.eigen import EPS, Complex
 from .at_state import by_growth, linearised
 
-#: The most Newton steps from one start, and the most halvings of one of them.
+#: The most Newton steps from one start, and the most halvings of a step.
 MAX_ITERATIONS, MAX_HALVINGS = 100, 30
 
 #: A start has converged when a whole Newton step changes the state by less than this fraction of its size.
 ARRIVED = 1e-12
 
-#: A start whose Newton step is between this and ``ARRIVED`` has converged too if no fraction of the step makes the rates smaller:
-#: only rounding is left.
+#: A start whose Newton step is between ``ARRIVED`` and this fraction has converged too if no fraction of the step makes the rates
+#: smaller: only rounding is left.
 NEARLY_ARRIVED = 1e-7
 
-#: Rates are zero, but for the rounding of their terms, below this fraction of these.
+#: A rate counts as zero below this fraction of its terms: it is their rounding.
 RATES_ARE_ZERO = 64.0 * EPS
 
-#: Two equilibria nearer than this fraction of their size are one: far more than rounding, far less than users distinguish.
+#: Two equilibria closer than this fraction of their size are one: far more than rounding, far less than users distinguish.
 SAME = 1e-8
 
 #: A singular value of the Jacobian below this fraction of the largest counts as zero: the equilibrium is part of a line or
 #: surface of equilibria, or a double root.
 SINGULAR = 1e-10
 
-#: The place of a root is known to so many times the Newton step that is left: at a p-fold root that step is the p-th part of the
-#: distance. The rates there are uncertain by their rounding: by how much they are not straight over such shares of the place.
-#: No place is taken for less certain than a share of the size: roundings ε leave ε^(1/p) of a p-fold root, 7·10⁻⁴ for five.
+#: The place of a root is uncertain by ``MULTIPLE`` times the remaining Newton step, which at a p-fold root is the p-th part of
+#: the distance. Rounding makes the rates there uncertain as well: by their deviation from a straight line over the fractions
+#: ``BESIDE`` of the place. The uncertainty is at most the fraction ``LEAST_CERTAIN`` of the size: rounding of ε moves a p-fold
+#: root by ε^(1/p), 7·10⁻⁴ for p = 5.
 MULTIPLE, BESIDE, LEAST_CERTAIN = 16.0, 2.0**-33 * np.array([-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0]), 2.0**-10
-#: A singular value below this fraction of the largest is rounding: along it nothing is known, as on a line of equilibria.
+#: A singular value below this fraction of the largest is rounding: the place along its direction is unknown, as on a line of
+#: equilibria.
 ROUNDING = 16.0 * EPS
 
-#: A real part counts as zero below this fraction of the fastest rate, plus the rounding error; and if an eigenvalue changes by
-#: half of it within ``SAME`` of the place, or on so many steps of Newton's method. A multiple root is found to the root of a
-#: rounding only, or a part of the distance is left by each step, and the eigenvalue is as large as that distance, of either sign.
-#: Two more steps at a p-fold root make the eigenvalue (1 − 2/p)^(p − 1) ≤ 0.14 times as large.
+#: A real part counts as zero below the fraction ``ZERO_RATE`` of the fastest rate, plus the rounding error; and if the eigenvalue
+#: changes by half of it within ``SAME`` of the place, or over ``LEFT`` further Newton steps. Newton's method reaches a multiple
+#: root only to a root of the rounding, or stops at a part of the distance, and there the eigenvalue is as large as that distance,
+#: with either sign. At a p-fold root two further steps multiply the eigenvalue by (1 − 2/p)^(p − 1) ≤ 0.14.
 ZERO_RATE, LEFT = 1e-9, 2.0
 
 
-#: The kind where eigenvalues do not tell the motion nearby.
+#: The kind where the eigenvalues do not decide the motion nearby.
 UNDECIDED = "undecided to first order"
 
 
@@ -67,13 +69,13 @@ class Equilibrium(ValueEquality):
     Attributes:
         v: its velocities, shape (*block).
         y: its coordinates, likewise.
-        residual: the largest rate there, which rounding leaves.
+        residual: the largest rate there, which is rounding.
         eigenvalues: λ of the Jacobian there, shape (n,), the largest real part first: small disturbances grow as e^(λt).
         kind: the motion nearby, by the eigenvalues: "sink" (all disturbances decay), "source" (all grow), "saddle" (some grow,
             some do not), "centre" (all rotate, and to first order neither grow nor decay), or "undecided to first order" (an
             eigenvalue is zero, as far as the place is known, or some rotate while others decay: higher orders decide).
         isolated: whether some neighbourhood has no other equilibrium; False where the Jacobian is singular, so that first order
-            does not tell.
+            does not decide.
         analysis: the result of ``analyse`` for a step of the method there; None if no method was given.
         starts: numbers of the starts from which it was reached.
     """
@@ -140,7 +142,7 @@ class Equilibria(ValueEquality):
         return "\n  ".join([repr(self), *map(repr, self.found)])
 
     def _repr_html_(self) -> str:
-        """The same as a table, for notebooks."""
+        """The equilibria as a table, for notebooks."""
         rows = [
             (brief(each.v), brief(each.y), each.kind, "" if each.analysis is None else each.analysis.kind) for each in self.found
         ]
@@ -152,8 +154,8 @@ def equilibria(
 ) -> Equilibria:
     """Find the equilibria that Newton's method reaches from given states, each once, with their stability.
 
-    The Jacobian is exact, and a step that would make the rates larger is halved until it does not. Where it is singular, the
-    shortest step is taken. Rates that vanish only at infinity (bodies that separate for ever) are no equilibrium.
+    The Jacobian is exact, and a step that would make the rates larger is halved until it does not. Where the Jacobian is
+    singular, the shortest step is taken. Rates that vanish only at infinity (bodies that separate for ever) are no equilibrium.
 
     Args:
         system: of one member.
@@ -163,12 +165,12 @@ def equilibria(
         dt: its step, in units of time.
 
     Returns:
-        ``Equilibria``: a sequence. Equilibria that are reached from no start are not found; how many there are is unknown.
+        ``Equilibria``: a sequence. It lacks equilibria that no start reaches, and their number is unknown.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the rates depend on the state by an operation that has no derivative, or the method cannot do the
-            system.
+        UnsupportedError: if the rates depend on the state through an operation that has no derivative, or the method cannot step
+            the system.
 
     Example:
         >>> [each.kind for each in sw.equilibria(sw.Pendulum(), near=(0.0, [0.3, 3.0]))]
@@ -181,23 +183,21 @@ def equilibria(
     t = checks.number("t", t, unit="units of time")
     if (method is None) != (dt is None):
         raise ArgumentError("method, dt: expected both or neither, got " + ("dt" if method is None else "method") + " alone")
-    how = None if method is None else find_method(method)
+    method = None if method is None else find_method(method)
     step = None if dt is None else checks.number("dt", dt, positive=True, unit="units of time")
-    if how is not None:
-        fits_together(system, how)
+    if method is not None:
+        fits_together(system, method)
     starts = _starts(system, v, y)
     n = sum(maps.size(system))
     checks.fits("the Jacobians", 8 * n * n, starts.shape[1:], "give fewer starts")
     states, arrived = _newton(system, starts, t)
-    found = _one_by_one(system, states, starts, np.flatnonzero(arrived), t)
-    each = tuple(_equilibrium(system, at, uncertain, t, how, step, own) for at, uncertain, own in found)
+    distinct = _distinct(system, states, starts, np.flatnonzero(arrived), t)
+    each = tuple(_equilibrium(system, at, uncertain, t, method, step, own) for at, uncertain, own in distinct)
     return Equilibria(system, each, tuple(np.flatnonzero(~arrived).tolist()))
 
 
-def _one_by_one(
-    system: System, states: Array, starts: Array, arrived: Any, t: float
-) -> list[tuple[Array, Array, tuple[int, ...]]]:
-    """Each equilibrium once: where it is, how uncertain that is, and the starts that reached it."""
+def _distinct(system: System, states: Array, starts: Array, arrived: Any, t: float) -> list[tuple[Array, Array, tuple[int, ...]]]:
+    """Each equilibrium once: its place, the uncertainty of the place, and the starts that reached it."""
     sizes, begun = _size(system, states), _size(system, starts)
     alike: list[list[int]] = []
     for k in arrived.tolist():
@@ -211,20 +211,20 @@ def _one_by_one(
             alike.append([k])
     firsts = [own[0] for own in alike]
     uncertain, residuals = _uncertain(system, states[:, firsts], np.maximum(sizes, begun)[:, firsts], t)
-    found: list[tuple[int, list[int]]] = []
+    distinct: list[tuple[int, list[int]]] = []
     for i, own in enumerate(alike):
-        for place, (j, others) in enumerate(found):
+        for place, (j, others) in enumerate(distinct):
             apart = np.abs(states[:, firsts[i]] - states[:, firsts[j]])
             if (apart <= uncertain[:, i] + uncertain[:, j]).all():
-                found[place] = i if residuals[i] < residuals[j] else j, sorted(others + own)
+                distinct[place] = i if residuals[i] < residuals[j] else j, sorted(others + own)
                 break
         else:
-            found.append((i, own))
-    return [(states[:, firsts[i]], uncertain[:, i], tuple(own)) for i, own in found]
+            distinct.append((i, own))
+    return [(states[:, firsts[i]], uncertain[:, i], tuple(own)) for i, own in distinct]
 
 
 def _uncertain(system: System, states: Array, sizes: Array, t: float) -> tuple[Array, Array]:
-    """How uncertain the places of equilibria are, each number by itself, and the largest rate at each."""
+    """The uncertainty of each number of the places of equilibria, and the largest rate at each place."""
     if not states.size:
         return np.zeros(states.shape), np.zeros(states.shape[1])
     matrix, rates = linearised(system, *_blocks(system, states), t)
@@ -274,7 +274,7 @@ def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
     alive = np.ones(states.shape[1], dtype=np.bool_)
     least = _size(system, states)
     least = np.where(least > 0.0, least, 1.0)
-    # The largest that each rate has been by its derivatives: their terms, of which it is a sum, are at least that large.
+    # For each rate, the largest sum so far of the magnitudes of its derivatives times the state: its terms are about that large.
     terms = np.zeros_like(states)
     for _ in range(MAX_ITERATIONS):
         which = np.flatnonzero(alive)
@@ -313,10 +313,10 @@ def _solved(matrix: Array, rates: Array, zero: float = SINGULAR) -> Array:
     stacked, right = np.moveaxis(matrix / of_rows[:, np.newaxis] / of_columns, 2, 0), (rates / of_rows).T[:, :, np.newaxis]
     singular = np.linalg.svd(stacked, compute_uv=False)
     regular = singular[:, -1] > zero * singular[:, 0]
-    found = np.empty(right.shape)
-    found[regular] = np.linalg.solve(stacked[regular], right[regular])
-    found[~regular] = np.linalg.pinv(stacked[~regular], rcond=zero) @ right[~regular]
-    return np.asarray(found[:, :, 0].T / of_columns)
+    solution = np.empty(right.shape)
+    solution[regular] = np.linalg.solve(stacked[regular], right[regular])
+    solution[~regular] = np.linalg.pinv(stacked[~regular], rcond=zero) @ right[~regular]
+    return np.asarray(solution[:, :, 0].T / of_columns)
 
 
 def _units(matrix: Array) -> tuple[Array, Array]:
@@ -331,7 +331,7 @@ def _units(matrix: Array) -> tuple[Array, Array]:
 
 
 def _damped(system: System, at: Array, change: Array, rates: Array, t: float) -> tuple[Array, Any]:
-    """The states after the longest of the step, its half, its quarter, … that makes the rates smaller; and whether any does."""
+    """The states after the largest of the step, its half, its quarter, … that makes the rates smaller; and whether any does."""
     before = np.abs(rates).max(axis=0)
     best, better, share = at.copy(), np.zeros(at.shape[1], dtype=np.bool_), 1.0
     for _ in range(MAX_HALVINGS):
@@ -367,7 +367,7 @@ def _equilibrium(
 def _known(
     system: System, at: Array, uncertain: Array, matrix: Array, rates: Array, weakest: Array, t: float
 ) -> tuple[Complex, Array]:
-    """Eigenvalues, and up to which size each is zero as far as the place of an equilibrium is known.
+    """Eigenvalues, and the magnitude below which each may be zero, since the place of the equilibrium is uncertain.
 
     ``weakest`` is the direction that changes the rates least.
     """
@@ -379,12 +379,12 @@ def _known(
     beside = np.where(np.isfinite(beside), beside, matrix[:, :, np.newaxis])
     own, others = eigen.eigenvalues(matrix), eigen.eigenvalues(beside)
     moved = np.abs(own[:, np.newaxis, np.newaxis] - others[np.newaxis]).min(axis=1).max(axis=1)
-    # Where all are zero, as of a mass that nothing holds, what is left of them is rounding of the elements, in many digits.
+    # Where all are zero, as for a free mass, the computed values are rounding of the elements, in many digits.
     least = np.maximum(2.0 * moved, np.maximum(ZERO_RATE * np.abs(own).max(), EPS * EPS * np.abs(matrix).max()))
     if len(matrix) > exact.MAX_ROWS:
         rounding = eigen.eigen(matrix).tolerance(0.0).max()
         return own, np.maximum(least, np.minimum(rounding, eigen.REFINE_ABOVE * np.abs(own).max()))
-    exactly = parts.rates(matrix).values  # where they meet, in as many digits as it takes
+    exactly = parts.rates(matrix).values  # in as many digits as needed where they nearly coincide
     return exactly, least[np.abs(exactly[:, np.newaxis] - own).argmin(axis=1)]
 
 

@@ -19,7 +19,7 @@ from ...reference.traced import Tracer
 from ..derivatives.traced import Traced
 from ..stability import maps
 
-#: The most operations of the rates with those of all disturbances.
+#: The most operations of the rates and of the rates of all disturbances together.
 MAX_OPERATIONS = 100_000
 
 
@@ -44,10 +44,10 @@ class _Rates:
 
 
 class Variational(System):
-    """A system and disturbances of it: its velocities are v, its coordinates are y and behind them the disturbances.
+    """A system with disturbances: its velocities are v, its coordinates are y followed by the disturbances.
 
-    Those are numbers of (v, y), the first of all disturbances, then the second, and so on. Their rates are the derivative of the
-    system's rates in their direction, so it is for methods that treat both blocks alike.
+    A disturbance is a vector like (v, y). The first numbers of all disturbances come first, then the second, and so on. The rate
+    of a disturbance is the derivative of the system's rates along it. The method must treat both blocks alike.
     """
 
     kernel = "equations"
@@ -57,8 +57,8 @@ class Variational(System):
     def __init__(self, system: System, disturbances: int) -> None:
         if system.keeper is not None or system.around:
             raise UnsupportedError(
-                f"tolerance: Lyapunov exponents have none where there is a control, a surface or friction, got {system!r}; give "
-                f"dt= and steps="
+                f"tolerance: Lyapunov exponents of a system with a control, a surface or friction need fixed steps, got "
+                f"{system!r}; give dt= and steps="
             )
         self.of, self.disturbances = system, disturbances
         n_v, n_y = maps.size(system)
@@ -68,15 +68,15 @@ class Variational(System):
         operations = (1 + 3 * disturbances) * len(traced.tape)
         if operations > MAX_OPERATIONS:
             raise UnsupportedError(
-                f"exponents: with a tolerance expected rates of {MAX_OPERATIONS:,} operations at most, with those of the "
-                f"disturbances, got about {operations:,}, of {disturbances} disturbances of {system!r}; ask for fewer"
+                f"exponents: with a tolerance expected at most {MAX_OPERATIONS:,} operations for the rates of the system and of "
+                f"its disturbances, got about {operations:,} for {disturbances} disturbances of {system!r}; ask for fewer"
             )
         self._tape, self._rates = traced.tape, traced.along(disturbances)
         functions = derivatives_of_functions(traced.tape, traced.marks)
         self._core = traced.tape.equations(self._rates[:n_v], self._rates[n_v:], [], None, functions)
 
     def repr_arguments(self) -> list[str]:
-        """The system, and how many disturbances."""
+        """The system, and the number of disturbances."""
         return [repr(self.of), str(self.disturbances)]
 
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
@@ -85,8 +85,8 @@ class Variational(System):
 
     def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
         """The operations of all rates, and the parameters of the system."""
-        given = {name: value for name, value in self.equation_parameters(batch).items() if name != RATES and not callable(value)}
-        return [(RATES, self._core), *flat(given, batch)]
+        values = {name: value for name, value in self.equation_parameters(batch).items() if name != RATES and not callable(value)}
+        return [(RATES, self._core), *flat(values, batch)]
 
     def reference_at_step(self, h: float, batch: Shape) -> Any:
         """The rates by NumPy."""

@@ -29,7 +29,7 @@ from .limit_digits import LADDER
 from .limit_search import ELEMENTS_AT_ONCE, GROWTH_EXPONENT, NEVER_STABLE_STEP, PAST_LIMIT, Search
 from .parts import function_of_rates
 
-#: A real part below the first fraction of a state's fastest rate counts as zero, and so does a rate below the second.
+#: A real part below the first fraction of a state's fastest rate counts as zero, and a rate below the second does, too.
 REAL_ZERO, RATE_ZERO = 1e-9, 1e-6
 
 #: The steps that are tried: every other one of the geometric grid of ``stability_limit``.
@@ -118,9 +118,9 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
     if not isinstance(run, Run):
         raise DTypeError(f"run: expected what integrate returns, got {type(run).__name__}")
     goes_forward(run)
-    how = run.method if method is None else find_method(method)
+    method = run.method if method is None else find_method(method)
     system = run.system.uncontrolled
-    fits_together(system, how)
+    fits_together(system, method)
     n = sum(maps.size(system))
     checks.fits("the matrices", 8 * n * n * len(run.t), run.status.shape, "save fewer states")
     A = _linearised(system, run)
@@ -128,7 +128,7 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
     flat = A.reshape(n, n, -1)
     finite = np.isfinite(flat).all(axis=(0, 1))
     flat = np.where(finite, flat, 0.0)
-    each = _limits(system, how, flat)
+    each = _limits(system, method, flat)
     growth = np.where(finite, eigen.eigenvalues(flat).real.max(axis=0), np.nan).reshape(shape)
     limits = np.where(finite, each.limits, np.nan).reshape(shape)
     rates = np.where(each.rates.imag < 0.0, each.rates.conj(), each.rates)  # of a pair, the one with the positive angle
@@ -138,9 +138,9 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
     for member in np.ndindex(shape[1:]):
         at = (int(index[member]), *member)
         if np.isfinite(limits[at]):
-            modes[member] = _mode(system, how, A[(slice(None), slice(None), *at)], float(limits[at]), complex(rates[at]))
+            modes[member] = _mode(system, method, A[(slice(None), slice(None), *at)], float(limits[at]), complex(rates[at]))
     dt = None if run.paces is not None else run.dt
-    return StabilityAlong(how, dt, run.t, limits, rates, growth, index, modes)
+    return StabilityAlong(method, dt, run.t, limits, rates, growth, index, modes)
 
 
 def _linearised(system: System, run: Run) -> Array:
@@ -157,14 +157,14 @@ def _linearised(system: System, run: Run) -> Array:
     return np.broadcast_to(A, (*A.shape[:2], len(run.t), *members))
 
 
-class _Found(NamedTuple):
-    """Of each state the limit and the rate of the mode that sets it, shape (states,)."""
+class _StateLimits(NamedTuple):
+    """For each state the limit and the rate of the mode that sets it, shape (states,)."""
 
     limits: Array
     rates: Complex
 
 
-def _limits(system: System, method: Method, A: Array) -> _Found:
+def _limits(system: System, method: Method, A: Array) -> _StateLimits:
     """The limits of states with these matrices, shape (n, n, states)."""
     n_v = maps.size(system)[0]
     n = len(A)
@@ -176,42 +176,42 @@ def _limits(system: System, method: Method, A: Array) -> _Found:
         size = np.abs(squares).max(axis=0)
         turning = np.abs(squares.imag) > REAL_ZERO * size
         squares = np.where(np.abs(squares) <= RATE_ZERO**2 * size, np.nan, squares.real)
-        found = _smallest(-np.sqrt(squares + 0j), lambda rates: _of_second_order(method, rates))
+        oscillating = _smallest(-np.sqrt(squares + 0j), lambda rates: _of_second_order(method, rates))
         if (other := turning.any(axis=0)).any():  # forces without a potential energy
             tried = _by_trying(method, A[:, :, other], n_v)
-            found.limits[other], found.rates[other] = tried
-        return found
+            oscillating.limits[other], oscillating.rates[other] = tried
+        return oscillating
     return _by_trying(method, A, n_v)
 
 
 def _of_second_order(method: Method, rates: Complex) -> Array:
-    """The limits of modes of ÿ = λ²·y: of one that oscillates, or of the decaying one of a pair of which the other grows."""
+    """The limits of modes of ÿ = λ²·y: modes that oscillate, and decaying modes, each paired with one that grows."""
     swings = rates.imag != 0.0
-    found = np.full(rates.shape, float(stability_limit(Oscillator(1.0), method)))
+    limits = np.full(rates.shape, float(stability_limit(Oscillator(1.0), method)))
     if not swings.all():
-        found[~swings] = _by_trying(method, np.array([[[0.0], [1.0]], [[1.0], [0.0]]]), 1).limits
-    return np.asarray(found / np.abs(rates))
+        limits[~swings] = _by_trying(method, np.array([[[0.0], [1.0]], [[1.0], [0.0]]]), 1).limits
+    return np.asarray(limits / np.abs(rates))
 
 
-def _smallest(rates: Complex, limit_of: Any) -> _Found:
+def _smallest(rates: Complex, limit_of: Any) -> _StateLimits:
     """The smallest limit of each state, from the rates of its modes, shape (modes, states); rates of NaN have no limit."""
     limits = np.full(rates.shape, np.inf)
     counts = np.isfinite(rates)
     limits[counts] = limit_of(rates[counts])
     first = limits.argmin(axis=0)[np.newaxis]
-    found, of = (np.take_along_axis(a, first, axis=0)[0] for a in (limits, rates))
-    return _Found(found, np.where(np.isfinite(found), of, np.nan))
+    smallest, rate = (np.take_along_axis(a, first, axis=0)[0] for a in (limits, rates))
+    return _StateLimits(smallest, np.where(np.isfinite(smallest), rate, np.nan))
 
 
 def _clean(rates: Complex) -> Complex:
-    """Rates with rounding errors of zeros removed; NaN for those that grow in the exact solution or are zero."""
+    """Rates whose real parts are zero where they are rounding; NaN for rates that are zero or grow in the exact solution."""
     size = np.abs(rates).max(axis=0)
     rates = np.where(np.abs(rates.real) <= REAL_ZERO * size, 1j * rates.imag, rates)
     return np.where((rates.real > 0.0) | (np.abs(rates) <= RATE_ZERO * size), np.nan, rates)
 
 
 def _stiffness(A: Array, n_v: int) -> Array | None:
-    """K of ÿ = K·y, if every matrix is of v̇ = K·y/c, ẏ = c·v; else None."""
+    """K of ÿ = K·y if every matrix is that of v̇ = K·y/c, ẏ = c·v; else None."""
     if 2 * n_v != len(A):
         return None
     speed = A[n_v, 0]
@@ -224,33 +224,32 @@ def _of_rates(method: Method, rates: Complex, n_v: int) -> Array:
     """The limits of modes of a method whose growth factors depend on λ·dt alone."""
     size = np.abs(rates)
     directions, which = np.unique(np.where(rates.imag < 0.0, rates.conj(), rates) / size, return_inverse=True)
-    found = np.empty(directions.shape)
+    limits = np.empty(directions.shape)
     turns = directions.imag != 0.0
     if not turns.all():
-        found[~turns] = stability_limit(LinearSystem([[-1.0]], velocities=1 if n_v else 0), method)
+        limits[~turns] = stability_limit(LinearSystem([[-1.0]], velocities=1 if n_v else 0), method)
     if turns.any():
         some = directions[turns]
         turning = np.array([[some.real, -some.imag], [some.imag, some.real]])
-        velocities = (
-            1 if function_of_rates(method) else 2 if n_v else 0
-        )  # where both blocks are treated alike, it is all the same
-        found[turns] = Search(LinearSystem(turning, velocities=velocities), method, None, None, 0.0).limits()[0]
-    return np.asarray(found[which.reshape(-1)] / size)
+        # A method that treats both blocks alike has the same limits however the numbers are divided among the blocks.
+        velocities = 1 if function_of_rates(method) else 2 if n_v else 0
+        limits[turns] = Search(LinearSystem(turning, velocities=velocities), method, None, None, 0.0).limits()[0]
+    return np.asarray(limits[which.reshape(-1)] / size)
 
 
-def _by_trying(method: Method, A: Array, n_v: int) -> _Found:
-    """The limits by trying steps of many lengths: the first at which a mode grows that does not grow in the exact solution."""
+def _by_trying(method: Method, A: Array, n_v: int) -> _StateLimits:
+    """The limits found on a grid of steps: the first step with which a mode grows that does not grow in the exact solution."""
     true = eigen.eigen(A)
     fastest = np.nan_to_num(np.abs(_clean(true.values)), nan=0.0).max(axis=0)
     states = np.flatnonzero(fastest > 0.0)
     limits, rates = np.full(A.shape[2], np.inf), np.full(A.shape[2], np.nan, dtype=np.complex128)
     if not states.size:
-        return _Found(limits, rates)
+        return _StateLimits(limits, rates)
     at_once = max(1, ELEMENTS_AT_ONCE // len(A) ** 2)
     for k in range(0, len(states), at_once):
         some = states[k : k + at_once]
         limits[some], rates[some] = _Trials(method, A[:, :, some], n_v).limits(fastest[some])
-    return _Found(limits, rates)
+    return _StateLimits(limits, rates)
 
 
 class _Trials:
@@ -261,16 +260,16 @@ class _Trials:
         self.true = eigen.eigen(A)
 
     def growth(self, dt: Array) -> tuple[Array, Array, Complex]:
-        """For steps of shape (states,): how far the fastest-growing mode is outside the unit circle, its tolerance, its rate."""
+        """Of steps of shape (states,): how far the fastest-growing mode is outside the unit circle, its tolerance, its rate."""
         P = maps.transition(self.system, self.method, dt)
         finish = maps.finish(self.system, self.method, dt, dt.shape)
-        found = eigen.eigen(P, eigen.slot_units(finish, self.true.units))
-        rates = eigen.matched(found.values, eigen.product("ij...,jk...->ik...", finish, found.own), self.true)
+        spectrum = eigen.eigen(P, eigen.slot_units(finish, self.true.units))
+        rates = eigen.matched(spectrum.values, eigen.product("ij...,jk...->ik...", finish, spectrum.own), self.true)
         size = np.abs(self.true.values).max(axis=0)
         grows = rates.real > REAL_ZERO * size
         still = np.abs(rates) <= RATE_ZERO * size
-        tolerance = found.tolerance()
-        beyond = np.where(grows | still, -np.inf, np.abs(found.values) - 1.0)
+        tolerance = spectrum.tolerance()
+        beyond = np.where(grows | still, -np.inf, np.abs(spectrum.values) - 1.0)
         first = (beyond - tolerance).argmax(axis=0)[np.newaxis]
         beyond, tolerance, rates = (np.take_along_axis(a, first, axis=0)[0] for a in (beyond, tolerance, rates))
         finite = np.isfinite(P).all(axis=(0, 1))
@@ -313,13 +312,13 @@ def _mode(system: System, method: Method, A: Array, limit: float, rate: complex)
     true = eigen.eigen(A)
     dt = np.array([past])
     P, finish = maps.transition(linear, method, dt)[:, :, 0], maps.finish(linear, method, dt, (1,))[:, :, 0]
-    found = eigen.eigen(P, eigen.slot_units(finish, true.units))
-    shapes = eigen.product("ij,jk->ik", finish, found.own)
-    continues = eigen.matched(found.values, shapes, true)
+    spectrum = eigen.eigen(P, eigen.slot_units(finish, true.units))
+    shapes = eigen.product("ij,jk->ik", finish, spectrum.own)
+    continues = eigen.matched(spectrum.values, shapes, true)
     near = np.minimum(np.abs(continues - rate), np.abs(continues - rate.conjugate()))
     ours = near <= near.min() + RATE_ZERO * np.abs(true.values).max()
-    which = int(np.where(ours, np.abs(found.values), -np.inf).argmax())
-    leaving, shape, own = found.values[which], shapes[:, which], continues[which]
+    which = int(np.where(ours, np.abs(spectrum.values), -np.inf).argmax())
+    leaving, shape, own = spectrum.values[which], shapes[:, which], continues[which]
     on = eigen.eigenvalues(maps.transition(linear, method, np.array([limit]))[:, :, 0]) if limit else np.ones(1, dtype=complex)
     crossing = on[np.abs(on - leaving).argmin()]
     if own.imag < 0.0:

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: How a sequence of samples behaves (§4), by the dominant eigenvalue. A single negative eigenvalue, which the document does not
-#: list, changes the sign at every step: an oscillation of two samples per period. If so many eigenvalues nearly
-#: coincide that rounding hides whether they are outside the unit circle, the kind is "not decided", and not stable.
+#: list, changes the sign at every step: an oscillation with two samples per period. If so many eigenvalues nearly coincide that
+#: rounding hides whether they are outside the unit circle, the kind is "not decided", which does not count as stable.
 KINDS = (
     "monotonic stable",
     "constant",
@@ -47,7 +47,7 @@ KINDS = (
 
 
 class Analysis(ValueEquality):
-    """One step as a linear map. ``members`` is the shape to which dt, the parameters and the states broadcast.
+    """A step as a linear map. ``members`` is the shape to which dt, the parameters and the states broadcast.
 
     Attributes:
         system: the system.
@@ -60,8 +60,8 @@ class Analysis(ValueEquality):
         polynomial: coefficients of det(Iz − P), highest power first, shape (n + 1, *members).
         p: half the trace of P, for two states; the polynomial is z² − 2pz + q. None for other numbers of states.
         q: the determinant of P, for two states, and r₁² of a conjugate pair; else None.
-        eigenvalues: of P, shape (n, *members): the largest first, of equal ones the fastest first.
-        rates: for each eigenvalue of P the eigenvalue λ of the rates of the same mode; e^(λ·dt) would be exact.
+        eigenvalues: of P, shape (n, *members): the largest first, among equal ones the fastest first.
+        rates: for each eigenvalue of P the eigenvalue λ of the same mode of the rates; e^(λ·dt) would be exact.
         radius: r₁, the largest magnitude of an eigenvalue.
         angle: Ψ in 0 … π, the angle per step of that eigenvalue, by atan2.
         true_angle: Φ, the angle per step of the same mode of the exact solution: ω₀·dt for the undamped oscillator.
@@ -98,11 +98,11 @@ class Analysis(ValueEquality):
             single_vector = np.broadcast_to(single_vector, z.shape)
         else:
             true = eigen.eigen(A)
-            found = eigen.eigen(P, eigen.slot_units(finish, true.units))
-            exact = eigen.matched(found.values, eigen.product("ij...,jk...->ik...", finish, found.own), true)
-            z, tolerances, single_vector = eigen.settled(found)
+            spectrum = eigen.eigen(P, eigen.slot_units(finish, true.units))
+            exact = eigen.matched(spectrum.values, eigen.product("ij...,jk...->ik...", finish, spectrum.own), true)
+            z, tolerances, single_vector = eigen.settled(spectrum)
             if system.linear and n <= MAX_ROWS:
-                doubtful = (found.tolerance() > eigen.REFINE_ABOVE).any(axis=0) & np.isfinite(z).all(axis=0)
+                doubtful = (spectrum.tolerance() > eigen.REFINE_ABOVE).any(axis=0) & np.isfinite(z).all(axis=0)
                 for index, values, own in self._in_more_digits(doubtful, A, z):
                     at: Any = (slice(None), *index)
                     exact[at], tolerances[at] = own, 16.0 * n * eigen.EPS * np.maximum(1.0, np.abs(values))
@@ -129,24 +129,24 @@ class Analysis(ValueEquality):
             self.samples_per_period = _plain(np.asarray(2.0 * np.pi / np.asarray(self.angle)))
 
     def _in_more_digits(self, doubtful: Any, A: Array, z: Complex) -> list[tuple[Shape, Complex, Complex]]:
-        """Put in the eigenvalues of a linear system that rounding moves, found in as many digits as it takes.
+        """Replace in ``z`` the eigenvalues of a linear system that rounding moves by values from arithmetic with more digits.
 
         Returns:
-            Of each such member the index, the eigenvalues, and the rates that they continue.
+            For each such member the index, the eigenvalues, and the rates that they continue.
         """
         dt = np.broadcast_to(self.dt, z.shape[1:])
         alike: dict[bytes, list[Shape]] = {}
         for index in map(tuple, np.argwhere(doubtful).tolist()):
             alike.setdefault(checks.member(A, index).tobytes(), []).append(index)
-        found = []
+        refined = []
         for members in alike.values():
             steps = np.array([dt[index] for index in members])
             values, rates = spectra(checks.member(A, members[0]), maps.size(self.system)[0], self.method, steps)
             for k, index in enumerate(members):
                 at: Any = (slice(None), *index)
                 z[at] = values[:, k]
-                found.append((index, values[:, k], rates[:, k]))
-        return found
+                refined.append((index, values[:, k], rates[:, k]))
+        return refined
 
     @property
     def radii(self) -> Array:
@@ -169,8 +169,8 @@ class Analysis(ValueEquality):
     def monodromy(self) -> Array:
         """The derivative of a run's end with respect to its start, in slots, shape (n, n, *batch): the product of its steps' P.
 
-        For a run of which every step was saved. Its eigenvalues decide on the stability of a periodic orbit; those of
-        single steps do not.
+        The run must have saved every step. The eigenvalues decide whether a periodic orbit is stable; those of single steps do
+        not.
         """
         if self._run is None:
             raise ArgumentError("monodromy: expected an analysis along a run (at=run), got that of single steps")
@@ -182,15 +182,15 @@ class Analysis(ValueEquality):
         if self._run.paces is not None or len(self._run.t) != self._run.steps + 1:
             raise ArgumentError(f"monodromy: expected a run of which every step was saved (every=1), got {self._run!r}")
         product = self.P[:, :, 0]
-        for k in range(1, self._run.steps):  # the last saved state makes no step in the run
+        for k in range(1, self._run.steps):  # no step of the run begins at the last saved state
             product = eigen.product("ij...,jk...->ik...", self.P[:, :, k], product)
         return product
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the eigenvalues of the step in the z-plane, with those of the exact solution, and write the picture if asked.
+        """Draw the eigenvalues of the step in the z-plane, with those of the exact solution.
 
         Args:
-            path: the file; its ending says in which format.
+            path: the file to write, or None; its ending is that of the format.
 
         Returns:
             The figure; a notebook shows it.
@@ -206,7 +206,7 @@ class Analysis(ValueEquality):
         return drawn(path, lambda: registry.task("draw_eigenvalues")(self))
 
     def _repr_html_(self) -> str:
-        """The same as a table, for notebooks."""
+        """The analysis as a table, for notebooks."""
         title = f"{type(self.system).__name__} by {self.method.title}"
         if self.P.ndim > 2:
             stable = np.asarray(self.stable)
@@ -241,19 +241,19 @@ def analyse(
 ) -> Analysis:
     """Find the transition matrix of a step and its eigenvalues, and classify them (§4).
 
-    P of a linear system is found by stepping unit vectors. For a nonlinear system it is the Jacobian of a step at a state, exact
-    to rounding, which maps a small disturbance to that after the step. Verlet is analysed with its two positions as the state;
-    at small steps its angle has a relative rounding error of up to 2⁻⁵²/Φ².
+    The columns of P of a linear system are the unit vectors after a step. For a nonlinear system P is the Jacobian of a step at a
+    state, exact to rounding: it maps a small disturbance before the step to the one after it. Verlet is analysed with its two
+    positions as the state; at small steps its angle has a relative rounding error of up to 2⁻⁵²/Φ².
 
     Args:
-        system: the system; its parameters may be arrays. That of a run under control is ``run.system``.
+        system: the system; its parameters may be arrays. For a run under control it is ``run.system``.
         method: its name, or what ``stepwell.method`` returns.
-        dt: the step, in units of time, above zero; an array broadcasts with the parameters. Left out for a run, it is the run's.
-        at: the state at which a system that is not linear is linearised: a pair ``(v, y)`` of shapes (*block, *batch), or a
-            ``Run``, whose saved states then are the first axis of the members.
-        t: the time of the linearisation; a run has its own.
-        v: in place of ``at``, the velocities of the state.
-        y: in place of ``at``, its coordinates.
+        dt: the step, in units of time, above zero; an array broadcasts with the parameters. With a run, None is the run's step.
+        at: the state at which a nonlinear system is linearised: a pair ``(v, y)`` of shapes (*block, *batch), or a ``Run``, whose
+            saved states then are the first axis of the members.
+        t: the time of the linearisation; a run has its own times.
+        v: the velocities of the state, in place of ``at``.
+        y: the coordinates of the state, in place of ``at``.
 
     Returns:
         An ``Analysis``; numbers for one member, arrays of the shape of the members otherwise.
@@ -267,10 +267,10 @@ def analyse(
         >>> bool(step.stable), step.kind
         (True, 'damped oscillation')
     """
-    how = find_method(method)
-    at = given_state(at, v, y)
+    method = find_method(method)
+    at = state_argument(at, v, y)
     system = a_system(system).for_state_shapes(*(at if isinstance(at, (tuple, list)) else ()))
-    fits_together(system, how)
+    fits_together(system, method)
     if isinstance(at, Run):
         if type(at.system) is not type(system):
             raise ShapeError(f"at: expected a run of {system!r}, got one of {at.system!r}")
@@ -292,26 +292,28 @@ def analyse(
             )
         return Analysis(
             system,
-            how,
+            method,
             step,
-            np.broadcast_to(maps.transition(system, how, step), (n, n, *members)),
-            maps.response(system, how, step, members),
+            np.broadcast_to(maps.transition(system, method, step), (n, n, *members)),
+            maps.response(system, method, step, members),
             maps.rates(system),
-            maps.finish(system, how, step, members),
+            maps.finish(system, method, step, members),
         )
     if isinstance(at, Run):
-        return _along(system, how, step, at)
+        return _along(system, method, step, at)
     v, y = state("at", system, at, "or a run")
     batches = {"dt and system": members, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
     checks.fits("at: the matrices", 8 * n * n, checks.batch_shape(batches), "ask for fewer")
-    P = maps.jacobian(system, how, step, t, v, y)
+    P = maps.jacobian(system, method, step, t, v, y)
     none = np.zeros((n, 0, *P.shape[2:]))
-    Q = none if not system.linear else maps.response(system, how, step, P.shape[2:])
-    return Analysis(system, how, step, P, Q, maps.rates(system, t, v, y), maps.finish(system, how, step, P.shape[2:], t, v, y))
+    Q = none if not system.linear else maps.response(system, method, step, P.shape[2:])
+    return Analysis(
+        system, method, step, P, Q, maps.rates(system, t, v, y), maps.finish(system, method, step, P.shape[2:], t, v, y)
+    )
 
 
-def given_state(at: Any, v: Any, y: Any) -> Any:
-    """The state given as ``at``, or as ``v`` and ``y``."""
+def state_argument(at: Any, v: Any, y: Any) -> Any:
+    """The state argument of a call: ``at``, or ``v`` and ``y``."""
     if v is None and y is None:
         return at
     if y is None:
@@ -322,25 +324,22 @@ def given_state(at: Any, v: Any, y: Any) -> Any:
 
 
 def state(argument: str, system: System, at: Any, or_what: str = "of blocks") -> tuple[Array, Array]:
-    """A state from what users give."""
+    """The blocks of a state from an argument that should be a pair (v, y)."""
     if not isinstance(at, (tuple, list)) or len(at) != 2:
-        raise DTypeError(f"{argument}: expected a pair (v, y) {or_what}, got {_given(at)}")
+        got = f"{len(at)} of them" if isinstance(at, (tuple, list)) else type(at).__name__
+        raise DTypeError(f"{argument}: expected a pair (v, y) {or_what}, got {got}")
     v = checks.block(f"{argument}[0], v", velocities(system, at[0]), system.v_shape, system.axes)
     y = checks.block(f"{argument}[1], y", at[1], system.y_shape, system.axes)
     return v, y
 
 
 def velocities(system: System, v: Any) -> Any:
-    """The velocities that were given; a system without velocities needs none."""
+    """The velocities of an argument; None stands for none where the system has no velocities."""
     if v is not None:
         return v
     if system.v_shape != (0,):
         raise ArgumentError(f"v: expected the velocities of the state, since {system!r} has some, got None")
     return 0.0
-
-
-def _given(at: Any) -> str:
-    return f"{len(at)} of them" if isinstance(at, (tuple, list)) else type(at).__name__
 
 
 def goes_forward(run: Run) -> None:
@@ -352,7 +351,7 @@ def goes_forward(run: Run) -> None:
 
 
 def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
-    """The saved states of a run, one after the other."""
+    """The analysis at every saved state of a run."""
     goes_forward(run)
     if run.t.ndim > 1:
         raise UnsupportedError("at: expected a run whose members have their times in common; analyse a run for each t0")
@@ -371,7 +370,7 @@ def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
 
 
 def _wide(matrix: Array, members: Shape) -> Array:
-    """A matrix with as many axes of members as there are."""
+    """A matrix with axes of length 1 in front of those of its members, so that it has as many as ``members``."""
     return matrix.reshape(*matrix.shape[:2], *(1,) * (len(members) - matrix.ndim + 2), *matrix.shape[2:])
 
 
@@ -390,7 +389,7 @@ def _polynomial(P: Array, z: Complex) -> Array:
 
 
 def _kind(z: Complex, single_vector: Any, tolerances: Array) -> Any:
-    """Which of ``KINDS`` the eigenvalues make, of which the first decides unless another is not known well enough."""
+    """The index in ``KINDS``: the first eigenvalue decides, unless another is too uncertain."""
     first = z[0]
     with np.errstate(invalid="ignore"):
         beyond = np.abs(z) - 1.0

@@ -24,7 +24,7 @@ class Operations(NamedTuple):
         multiplications: products.
         divisions: quotients.
         square_roots: square roots.
-        rate_evaluations: evaluations of the rate of v; of a series, to how many its coefficients are equal by their operations.
+        rate_evaluations: evaluations of the rate of v; for a series, the number of evaluations that have as many operations.
         rate_evaluations_y: evaluations of the rate of y, which cost little where ẏ is v times a number.
     """
 
@@ -37,10 +37,10 @@ class Operations(NamedTuple):
 
 
 def operations(method: str | Method, system: System | None = None) -> Operations:
-    """Count the operations of a step, those of the system's rates included.
+    """Count the operations of a step, including those of the system's rates.
 
-    Changes of sign are not counted, since a processor subtracts as fast as it adds. What is computed once for a whole
-    run (Φ = ω₀·dt) is not counted either; what an input takes that changes with the time is.
+    Changes of sign are not counted, since a processor subtracts as fast as it adds. Operations that are done once for a whole run
+    (Φ = ω₀·dt) are not counted either; those of an input that changes with time are.
 
     Args:
         method: its name, or what ``stepwell.method`` returns.
@@ -54,13 +54,13 @@ def operations(method: str | Method, system: System | None = None) -> Operations
         >>> sw.stability.operations("rk4").rate_evaluations
         4
     """
-    how = find_method(method)
+    method = find_method(method)
     system = Oscillator() if system is None else a_system(system)
-    fits_together(system, how)
+    fits_together(system, method)
     if system.batch:
         raise ShapeError(f"system: expected one member to count the operations of, got a batch of shape {system.batch}")
-    counted = written(Plan(system, how, (), 1.0))
-    kinds = Counter(name for name, _, _ in _core.program(how.name)[0])
-    of_v, of_y = [evaluations(how, system)] * 2 if how.has_series else [kinds["dv"], kinds["dy"]]
+    counted = written(Plan(system, method, (), 1.0))
+    kinds = Counter(name for name, _, _ in _core.program(method.name)[0])
+    of_v, of_y = [evaluations(method, system)] * 2 if method.has_series else [kinds["dv"], kinds["dy"]]
     arithmetic = {kind: counted[kind] for kind in Operations._fields[:4]}
     return Operations(**arithmetic, rate_evaluations=of_v, rate_evaluations_y=of_y)

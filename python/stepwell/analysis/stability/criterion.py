@@ -27,7 +27,7 @@ from .limit import StabilityLimit, stability_limit
 #: The angles per step at which errors are given: 63, 13 and 6 samples per period.
 PHI = (0.1, 0.5, 1.0)
 
-#: What is nearer to 1 than this is 1 but for rounding, when it is written down.
+#: A difference below this is written as 0: it is rounding.
 ROUNDING = 1e-13
 
 
@@ -38,9 +38,9 @@ class At(NamedTuple):
     Attributes:
         phi: Φ = ω₀·dt.
         r1_squared: r₁², the square of the largest eigenvalue's magnitude: the factor of the energy per step.
-        r1_squared_series: the same by the first two terms of its series.
+        r1_squared_series: r₁² from the first two terms of its series.
         deviation: Ψ/Φ − 1, the relative error of the frequency.
-        deviation_series: the same by the first two terms of its series.
+        deviation_series: Ψ/Φ − 1 from the first two terms of its series.
         kind: what the samples do, in the document's words.
     """
 
@@ -57,11 +57,11 @@ class Criterion(NamedTuple):
 
     Attributes:
         method: the method.
-        limit: the undamped oscillator is stable for Φ below this; 0 for never.
-        samples_per_period: there must be more steps per period than this, 2π/limit; infinite for never.
+        limit: the undamped oscillator is stable for Φ below this; 0 if never.
+        samples_per_period: the least steps per period, 2π/limit; infinite if it is never stable.
         series: the exact polynomials and series in Φ.
         at: errors at each of the chosen angles per step.
-        operations: of a step of the undamped oscillator.
+        operations: the operations of a step of the undamped oscillator.
     """
 
     method: Method
@@ -87,7 +87,7 @@ class Criterion(NamedTuple):
 
 
 class Criteria(tuple[Criterion, ...]):
-    """A ``Criterion`` for each method, with ways to write them down."""
+    """A ``Criterion`` for each method, and their table as text, Markdown, HTML and JSON."""
 
     __slots__ = ()
 
@@ -96,11 +96,11 @@ class Criteria(tuple[Criterion, ...]):
         return shortened(f"<criteria of {', '.join(c.method.name for c in self)}; errors at Φ = {phis}>", MAX_LINE)
 
     def _repr_html_(self) -> str:
-        """The same as a table, for notebooks."""
+        """The criteria as a table, for notebooks."""
         return table("The undamped oscillator by each method, Φ = ω₀·dt", *self.table())
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each method. What never holds or is not there is None."""
+        """A row for each method; None for values that do not exist."""
         rows = []
         for c in self:
             row: dict[str, Any] = {
@@ -117,11 +117,11 @@ class Criteria(tuple[Criterion, ...]):
         return rows
 
     def to_json(self, path: str | Path) -> None:
-        """Write ``rows()``; what is not finite is null."""
+        """Write ``rows()``; values that are not finite become null."""
         write_json(self.rows(), path)
 
     def table(self) -> tuple[list[str], list[list[str]]]:
-        """Head and rows of texts, for a page or a screen. Heads that end in ``>`` are of numbers."""
+        """Head and rows as text, for a page or a screen. A head that ends in ``>`` is that of a column of numbers."""
         head = ["method", "stable for Φ <>", "steps a period >>", "r₁² − 1", "Ψ/Φ − 1"]
         phis = [at.phi for at in self[0].at] if self else []
         head += [f"{what} at {phi:g}>" for phi in phis for what in ("r₁² − 1", "Ψ/Φ − 1")]
@@ -145,14 +145,14 @@ class Criteria(tuple[Criterion, ...]):
 
 
 def signed(value: float, *, percent: bool = False, digits: int = 3) -> str:
-    """A difference from what is exact as one writes it, with its sign; what is rounding alone is 0."""
+    """An error as text, with its sign; 0 if it is only rounding."""
     if abs(value) <= ROUNDING:
         return "0"
     return f"{100 * value:+.{digits}g} %" if percent else f"{value:+.{digits}g}"
 
 
 def criteria(methods: Iterable[Method | str] | None = None, *, phi: Any = PHI) -> Criteria:
-    """The document's four criteria (§1) for methods on the undamped oscillator.
+    """Answer the document's four criteria (§1) for methods on the undamped oscillator.
 
     Args:
         methods: names, or what ``stepwell.method`` returns; all if None.
@@ -183,8 +183,8 @@ def _criterion(method: Method, angles: list[float]) -> Criterion:
     radius, ratio = (_sum(terms) for terms in (expansion.radius_terms(), expansion.ratio_terms()))
     at = []
     for phi in angles:
-        found = analyse(Oscillator(), method, dt=phi)
-        at.append(At(phi, float(found.radius**2), 1.0 + radius(phi), float(found.frequency_ratio) - 1.0, ratio(phi), found.kind))
+        step = analyse(Oscillator(), method, dt=phi)
+        at.append(At(phi, float(step.radius**2), 1.0 + radius(phi), float(step.frequency_ratio) - 1.0, ratio(phi), step.kind))
     samples = 2.0 * math.pi / limit if limit else math.inf
     return Criterion(method, limit, samples, expansion, tuple(at), operations(method))
 

@@ -17,38 +17,41 @@ Truths = np.ndarray[Any, np.dtype[np.bool_]]
 
 EPS = float(np.finfo(np.float64).eps)
 
-#: Operations on matrices at once: some hundredths of a second, so that Ctrl-C is noticed in between.
+#: The operations on matrices done in one call: some hundredths of a second, so that Ctrl-C is noticed in between.
 OPERATIONS_AT_ONCE = 2e6
 
-#: Operations for eigenvalues and eigenvectors of a matrix of n rows, about, over n³.
+#: Eigenvalues and eigenvectors of a matrix of n rows take about this many operations times n³.
 OPERATIONS_OF_EIG = 25
 
-#: Up to so many rows an eigenvector is found by a singular value decomposition, which then takes some milliseconds.
+#: Up to this many rows an eigenvector is computed by a singular value decomposition, which takes some milliseconds at most.
 SVD_MAX_ROWS = 40
 
-#: Rows and columns are brought to like size in this many rounds at most; a round halves the powers of two that are left.
+#: Balancing brings rows and columns to similar size in at most this many rounds; a round halves the exponents of two that remain.
 BALANCING_ROUNDS = 20
 
-#: And only where their sum becomes smaller by this factor at least (Parlett and Reinsch 1969).
+#: A row and a column are balanced only if that makes their sum smaller by this factor (Parlett and Reinsch 1969).
 BALANCING_GAIN = 0.95
 
-
-#: Eigenvalues that rounding may move by more than this are found in more digits. Where that cannot be had, nothing is said of
-#: what it may move by more than the second: two that meet on the circle are moved by a root of some eps, and are not in doubt.
+#: Eigenvalues that rounding may move by more than the first are computed in more digits. Where that is impossible, those that it
+#: may move by more than the second stay undecided. The second is large, since two eigenvalues that meet on the circle are moved
+#: by the root of some eps and still need a decision.
 REFINE_ABOVE, UNDECIDED_ABOVE = 1e-9, 1e-4
 
-
-#: Two eigenvalues of two states that are as close as this part of their size are moved by a root of some eps.
+#: Rounding moves both eigenvalues of two states by the root of some eps if their distance is below this fraction of their size.
 NEARLY_DOUBLE = 1e-5
+
+#: Eigenvalues of more than two states that are closer than this count as one: rounding moves a double eigenvalue by the square
+#: root of its own size.
+CLUSTER_DISTANCE = 1e-6
 
 
 class Eigen(NamedTuple):
-    """Eigenvalues and eigenvectors of matrices, in units of the states in which rows and columns are of like size.
+    """Eigenvalues and eigenvectors of matrices, in units of the states in which rows and columns have similar size.
 
     Attributes:
-        values: shape (n, *members); a pair stands with its positive angle first; NaN where the matrix is not finite.
-        vectors: in these units, of unit length, shape (n, n, *members).
-        units: of each state, shape (n, *members): what is x in the matrix's own units is x/units in these.
+        values: the eigenvalues, shape (n, *members); a pair has its positive angle first; NaN where the matrix is not finite.
+        vectors: the eigenvectors in these units, of unit length, shape (n, n, *members).
+        units: the unit of each state, shape (n, *members): x in the matrix's own units is x/units in these.
         size: the norm of the matrix in these units, shape (*members).
     """
 
@@ -63,17 +66,17 @@ class Eigen(NamedTuple):
         return self.units[:, np.newaxis] * self.vectors
 
     def tolerance(self, least: float = 1.0) -> Array:
-        """How far each eigenvalue may be from where it is by rounding, shape (n, *members).
+        """How far rounding may move each eigenvalue, shape (n, *members).
 
-        The elements of a step's matrix are wrong by some eps of the sums that make them, and finding the eigenvalues adds as
-        much: together a matrix of norm below 16·n·eps·max(least, ‖P‖). It moves an eigenvalue by at most 1/|wᴴx| times that, of
-        its left and right vectors of unit length, which is large where two eigenvalues nearly meet.
+        The elements of a step's matrix are wrong by some eps of the sums that make them, and computing the eigenvalues adds as
+        much: together this is a matrix of norm below 16·n·eps·max(least, ‖P‖). It moves an eigenvalue by at most that norm over
+        |wᴴx|, with its left and right vectors of unit length; the factor is large where two eigenvalues nearly meet.
         """
         return 16.0 * len(self.values) * EPS * np.maximum(least, self.size) * _conditions(self.vectors)
 
 
 def eigenvalues(matrix: Array) -> Complex:
-    """Eigenvalues; a pair stands with its positive angle first. NaN where the matrix is not finite."""
+    """Eigenvalues; a pair has its positive angle first. NaN where the matrix is not finite."""
     if len(matrix) == 1:
         return np.asarray(matrix[0], dtype=np.complex128)
     if len(matrix) == 2:
@@ -101,7 +104,7 @@ def _of_two(matrix: Array) -> Complex:
 
 
 def eigen(matrix: Array, units: Array | None = None) -> Eigen:
-    """Eigenvalues and eigenvectors, in these units of the states or in such as suit the matrix."""
+    """Eigenvalues and eigenvectors, in these units of the states, or in units that balance the matrix."""
     finite: Any = np.isfinite(matrix).all(axis=(0, 1))
     matrix = np.where(finite, matrix, 0.0)
     if units is None:
@@ -112,37 +115,37 @@ def eigen(matrix: Array, units: Array | None = None) -> Eigen:
     each = stacked.reshape(-1, n, n)
     at_once = max(1, int(OPERATIONS_AT_ONCE / (n**3 + 200)))
     work = OPERATIONS_OF_EIG * n**3
-    found = [heard(work, np.linalg.eig, each[k : k + at_once]) for k in range(0, len(each), at_once)]
-    values, vectors = (np.concatenate([f[i] for f in found]) for i in range(2))
+    chunks = [heard(work, np.linalg.eig, each[k : k + at_once]) for k in range(0, len(each), at_once)]
+    values, vectors = (np.concatenate([chunk[i] for chunk in chunks]) for i in range(2))
     values, vectors = values.reshape(*members, n), vectors.reshape(*members, n, n)
-    # The positive angle of a pair first: LAPACK gives it so, and what is sorted later keeps it.
+    # LAPACK returns the positive angle of a pair first, and later sorting keeps that order.
     values = np.where(finite, np.moveaxis(values, -1, 0), np.nan).astype(np.complex128)
     vectors = np.moveaxis(vectors.astype(np.complex128), (-2, -1), (0, 1))
     return Eigen(values, vectors, units, np.sqrt((scaled * scaled).sum(axis=(0, 1))))
 
 
 def vector(matrix: Array, value: complex) -> Complex:
-    """The eigenvector of a known eigenvalue, also of a multiple one, shape (n,): what the matrix without it makes smallest."""
+    """An eigenvector of a known eigenvalue z, also a multiple one, shape (n,): the unit vector x with the least |P·x − z·x|."""
     n, units = len(matrix), units_of(matrix)
     less = matrix * units / units[:, np.newaxis] - value * np.eye(n)
     if n > SVD_MAX_ROWS:  # by inverse iteration, which is faster, where the inverse exists
-        found = np.cos(1.7 * np.arange(n)) + 0.5j * np.sin(2.3 * np.arange(n))
+        direction = np.cos(1.7 * np.arange(n)) + 0.5j * np.sin(2.3 * np.arange(n))
         try:
             for _ in range(3):
-                found = heard(n**3, np.linalg.solve, less, found)
-                found /= np.sqrt((np.abs(found) ** 2).sum())
+                direction = heard(n**3, np.linalg.solve, less, direction)
+                direction /= np.sqrt((np.abs(direction) ** 2).sum())
         except np.linalg.LinAlgError:
-            found[:] = np.nan
-        if np.isfinite(found).all():
-            return np.asarray(units * found)
+            direction[:] = np.nan
+        if np.isfinite(direction).all():
+            return np.asarray(units * direction)
     return np.asarray(units * heard(OPERATIONS_OF_EIG * n**3, np.linalg.svd, less)[2][-1].conj())
 
 
 def units_of(matrix: Array) -> Array:
-    """Units of the states in which rows and columns of a matrix are of like size, shape (n, *members), all powers of two.
+    """Units of the states in which rows and columns of a matrix have similar size, shape (n, *members), all powers of two.
 
-    What is then said of norms and angles does not depend on the units that a user has, and powers of two round nothing. A state
-    that drives no other, or that no other drives, has a row or a column of zeros; the other then becomes 1.
+    In these, norms and angles do not depend on the user's units, and scaling by powers of two is exact. A state that drives no
+    other, or that no other drives, has a column or a row of zeros; its row or column then becomes 1.
     """
     n = len(matrix)
     size = np.abs(matrix)
@@ -168,19 +171,19 @@ def units_of(matrix: Array) -> Array:
 
 
 def product(subscripts: str, a: Any, b: Any) -> Any:
-    """Matrices times matrices, by ``einsum``, of all members."""
+    """Products of the matrices of all members, by ``einsum``."""
     return heard(len(a) * max(a.size, b.size), np.einsum, subscripts, a, b)
 
 
 def slot_units(finish: Array, units: Array) -> Array:
-    """Units of the slots whose states have these units, shape (n, *members): in both, what a slot makes of a state is at most 1.
+    """Units of the slots for states with these units, shape (n, *members): in them no element of ``finish`` is above about 1.
 
-    A step is analysed in the units of the rates. Units that suit its own matrix may hide its rounding: near z = −1 velocity
-    and coordinate of a mode leave each other alone, whatever happened between.
+    A step is analysed in the units of the rates. Units that balance its own matrix may hide its rounding: near z = −1 velocity
+    and coordinate of a mode seem independent of each other, whatever happened within the step.
     """
     with np.errstate(all="ignore"):
-        found = 1.0 / np.abs(finish / units[:, np.newaxis]).max(axis=0)
-        return np.where(np.isfinite(found) & (found > 0.0), np.exp2(np.round(np.log2(found))), 1.0)
+        unit = 1.0 / np.abs(finish / units[:, np.newaxis]).max(axis=0)
+        return np.where(np.isfinite(unit) & (unit > 0.0), np.exp2(np.round(np.log2(unit))), 1.0)
 
 
 def _conditions(vectors: Complex) -> Array:
@@ -192,7 +195,7 @@ def _conditions(vectors: Complex) -> Array:
     for k in range(0, len(flat), at_once):
         try:
             left[k : k + at_once] = heard(len(vectors) ** 3, np.linalg.inv, flat[k : k + at_once])
-        except np.linalg.LinAlgError:  # one of many is enough
+        except np.linalg.LinAlgError:  # one singular matrix is enough for that
             for i, each in enumerate(flat[k : k + at_once], k):
                 try:
                     left[i] = heard(len(vectors) ** 3, np.linalg.inv, each)
@@ -205,14 +208,14 @@ def _conditions(vectors: Complex) -> Array:
 
 
 def tolerance(matrix: Array) -> Array:
-    """How far an eigenvalue of one or two states may be from the unit circle by rounding, shape (*members).
+    """How far rounding may move an eigenvalue of one or two states off the unit circle, shape (*members).
 
-    The elements of P are wrong by some eps, and so are its trace and its determinant, sums of at most two products, and with them
-    the radius of a pair: 16·n·eps times the square of the norm that P has in units in which b = c. Not for double eigenvalues,
-    which move by the square root.
+    The elements of P are wrong by some eps. So are its trace and its determinant, sums of at most two products, and with them the
+    radius of a pair: by 16·n·eps times the square of the norm of P in units in which b = c. This does not hold for double
+    eigenvalues, which move by the square root.
     """
     n = len(matrix)
-    with np.errstate(over="ignore"):  # of steps so long that nothing can be said of them
+    with np.errstate(over="ignore"):  # with very long steps
         squares = matrix[0, 0] ** 2
         if n > 1:
             squares = squares + matrix[1, 1] ** 2 + 2.0 * np.abs(matrix[0, 1] * matrix[1, 0])
@@ -222,8 +225,8 @@ def tolerance(matrix: Array) -> Array:
 def matched(values: Complex, states: Complex, exact: Eigen) -> Complex:
     """For each eigenvalue of a step the eigenvalue of the rates whose mode it continues.
 
-    Modes are told apart by their shape, the states of a step's mode as columns: the pairs that overlap most belong together,
-    those of equal overlap (as conjugate vectors of the same real shape) by the sign of their angle.
+    Modes are matched by their shapes, which are the columns of ``states`` for the step: those that overlap most belong together,
+    and where overlaps are equal (for conjugate vectors of the same real shape) the sign of the angle decides.
     """
     n = len(values)
     with np.errstate(all="ignore"):
@@ -233,10 +236,10 @@ def matched(values: Complex, states: Complex, exact: Eigen) -> Complex:
     same_side = np.sign(values.imag)[:, np.newaxis] * np.sign(exact.values.imag)[np.newaxis]
     score = overlap + 1e-6 * same_side
     score = np.where(np.isfinite(score), score, 0.0)
-    found = np.empty_like(values)
+    continued = np.empty_like(values)
     members = score.shape[2:]
     score = score.reshape(n, n, -1)
-    flat, true = found.reshape(n, -1), np.broadcast_to(exact.values, values.shape).reshape(n, -1)
+    flat, true = continued.reshape(n, -1), np.broadcast_to(exact.values, values.shape).reshape(n, -1)
     every = np.arange(score.shape[2])
     for _ in range(n):
         best = score.reshape(n * n, -1).argmax(axis=0)
@@ -248,13 +251,13 @@ def matched(values: Complex, states: Complex, exact: Eigen) -> Complex:
 
 
 def matched_of_two(matrix: Array, values: Complex, rates: Array, exact: Complex, finish: Array) -> Complex:
-    """``matched`` for two states, without the work of ``eigen``: only two real eigenvalues can belong to the wrong one.
+    """``matched`` for two states, without the work of ``eigen``: only two real eigenvalues can be in the wrong order.
 
-    ``finish`` makes states of slots.
+    ``finish`` maps slots to states.
     """
 
     def vectors(m: Array, z: Complex) -> Array:
-        """Of z the row of (m − z)·x = 0 with the larger difference, which has the more digits; shape (2, *members)."""
+        """Solutions x of (m − z)·x = 0 by the row with the larger m − z, which has more digits; shape (2, *members)."""
         (a, b), (c, d) = m
         by_a, by_d = z.real - a, z.real - d
         first = np.abs(by_a) >= np.abs(by_d)
@@ -265,7 +268,7 @@ def matched_of_two(matrix: Array, values: Complex, rates: Array, exact: Complex,
         unit = np.where(np.isfinite(unit) & (unit > 0.0), unit, 1.0)
 
         def likeness(x: Array, y: Array) -> Array:
-            """How parallel two vectors are, 1 at most."""
+            """The magnitude of the cosine between two vectors."""
             (a, b), (c, d) = (np.stack([v[0] / unit, v[1]]) for v in (x, y))
             return np.asarray(np.abs(a * c + b * d) / np.sqrt((a * a + b * b) * (c * c + d * d)))
 
@@ -278,43 +281,38 @@ def matched_of_two(matrix: Array, values: Complex, rates: Array, exact: Complex,
 
 
 def nearest(values: Complex, rates: Complex, exact: Complex) -> Complex:
-    """For each eigenvalue of one step the rate of the same mode, found by the exact eigenvalue e^(λ·dt) alone, shape (n,)."""
+    """For each eigenvalue of one step the rate whose exact eigenvalue e^(λ·dt) is closest, each rate once, shape (n,)."""
     with np.errstate(all="ignore"):
         distance = np.nan_to_num(np.abs(values[:, np.newaxis] - exact), nan=np.inf)
-    found = np.empty_like(values)
+    continued = np.empty_like(values)
     for _ in values:
         i, j = np.unravel_index(distance.argmin(), distance.shape)
-        found[i] = rates[j]
+        continued[i] = rates[j]
         distance[i], distance[:, j] = np.inf, np.inf
-    return found
+    return continued
 
 
 def one_vector(matrix: Array, values: Complex) -> Truths:
-    """Which eigenvalues of one matrix are one with others and have fewer vectors than there are of them, shape (n,)."""
+    """Which eigenvalues of one matrix are multiple with fewer eigenvectors than their multiplicity, shape (n,)."""
     n = len(values)
     units = units_of(matrix)
     scaled = matrix * units / units[:, np.newaxis]
     least = CLUSTER_DISTANCE * max(1.0, float(np.sqrt((scaled * scaled).sum())))
-    found = np.zeros(n, dtype=np.bool_)
+    defective = np.zeros(n, dtype=np.bool_)
     for i in range(n):
         if (one := np.abs(values - values[i]) < CLUSTER_DISTANCE).sum() > 1:
             singular = np.linalg.svd(scaled - values[one].mean() * np.eye(n), compute_uv=False)
-            found[i] = (singular < least).sum() < one.sum()
-    return found
+            defective[i] = (singular < least).sum() < one.sum()
+    return defective
 
 
-#: Eigenvalues of more than two states that are nearer to each other than this count as one: rounding moves a double eigenvalue
-#: by the square root of its own size.
-CLUSTER_DISTANCE = 1e-6
+def settled(spectrum: Eigen) -> tuple[Complex, Array, Truths]:
+    """Eigenvalues in which the two parts of a double one are replaced by their mean, tolerances, and which have only one vector.
 
-
-def settled(found: Eigen) -> tuple[Complex, Array, Truths]:
-    """Eigenvalues with double ones put back together, their tolerances, and which of them have one vector only for two values.
-
-    The mean of a double eigenvalue is as exact as a single one; its parts are not. A double eigenvalue that has two
-    vectors (two equal oscillators that do not touch) is two single ones.
+    The mean is as exact as a single eigenvalue; the parts are not. A double eigenvalue that has two vectors (two equal
+    oscillators that do not touch) counts as two single ones.
     """
-    values, tolerances = found.values.copy(), found.tolerance()
+    values, tolerances = spectrum.values.copy(), spectrum.tolerance()
     single_vector = np.zeros(values.shape, dtype=np.bool_)
     n = len(values)
     for i in range(n):
@@ -322,21 +320,21 @@ def settled(found: Eigen) -> tuple[Complex, Array, Truths]:
             with np.errstate(invalid="ignore"):
                 near = np.abs(values[i] - values[j]) < CLUSTER_DISTANCE
             if near.any():
-                overlap = np.abs((found.vectors[:, i].conj() * found.vectors[:, j]).sum(axis=0))
+                overlap = np.abs((spectrum.vectors[:, i].conj() * spectrum.vectors[:, j]).sum(axis=0))
                 double = near & (overlap > 1.0 - CLUSTER_DISTANCE)
                 mean = 0.5 * (values[i] + values[j])
                 for k in (i, j):
                     values[k] = np.where(double, mean, values[k])
                     single_vector[k] |= double
-    of_one = 16.0 * n * EPS * np.maximum(1.0, found.size**2)
+    of_one = 16.0 * n * EPS * np.maximum(1.0, spectrum.size**2)
     return values, np.where(single_vector, np.minimum(tolerances, of_one), tolerances), single_vector
 
 
 def order(values: Complex, tolerances: Array, first: Truths) -> np.ndarray[Any, np.dtype[np.int64]]:
     """The order of eigenvalues in which the one that decides comes first.
 
-    What is outside the unit circle by more than its tolerance, then what is on it, then what is inside; by magnitude; of equal
-    ones those that ``first`` names, then by angle, the fastest first; pairs stay together.
+    First those outside the unit circle by more than their tolerance, then those on it, then those inside; in each by magnitude;
+    among equal ones those of ``first``, then by angle, the fastest first. Pairs stay together.
     """
     with np.errstate(invalid="ignore"):
         beyond, angle = np.abs(values) - 1.0, np.angle(values)

@@ -1,8 +1,8 @@
-"""Eigenvalues in as many digits as it takes, for matrices whose eigenvalues nearly meet.
+"""Eigenvalues in as many digits as needed, for matrices whose eigenvalues nearly meet.
 
 Rounding of ε moves each of m eigenvalues that nearly meet by the m-th root of ε: in double precision eight that meet are known
-to two digits. Here a matrix of n rows is computed with in more than 24·n digits, and what is returned is right to double
-precision for the matrix as it is given.
+to two digits. Here the arithmetic for a matrix of n rows has more than 24·n digits, and the results are right to double precision
+for the matrix exactly as it is.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ MAX_ROWS = 32
 #: Digits for each row (the n-th root of ε = 10^(−24·n) is 10⁻²⁴), and guard digits besides.
 DIGITS_PER_ROW, GUARD_DIGITS = 24, 30
 
-#: Roots are found by this many rounds at most. Where m are one, a round leaves (m − 1)/(m + 1) of their distance, and so every
-#: so many-th takes all that would follow.
+#: The most rounds of the iteration for the roots. At an m-fold root a round leaves the fraction (m − 1)/(m + 1) of the distance,
+#: so every ``AITKEN_EVERY``-th round extrapolates to the sum of all that would follow.
 MAX_ITERATIONS, AITKEN_EVERY = 2000, 4
 
-#: The iteration for the roots has converged when they move by less than this part of their size.
+#: The iteration for the roots has converged when they move by less than this fraction of their size.
 ROOT_TOLERANCE = 1e-22
 
-#: An imaginary part that is this small a part of a root is rounding, and so is a root that is this small a part of the largest.
+#: An imaginary part below the first fraction of a root is rounding, and so is a root below the second fraction of the largest.
 REAL_TOLERANCE, ZERO_TOLERANCE = 1e-20, 1e-30
 
 Number = np.ndarray[Any, np.dtype[np.object_]]
 
 
 def digits(matrix: Any) -> int:
-    """How many digits the eigenvalues of a matrix of floats or decimals take: for each row, and for the range of its elements."""
+    """The digits needed for the eigenvalues of a matrix of floats or decimals, by its rows and by the range of its elements."""
     powers = [Decimal(x).adjusted() for x in np.ravel(matrix).tolist() if x]
     return DIGITS_PER_ROW * len(matrix) + GUARD_DIGITS + 2 * (max(powers, default=0) - min(powers, default=0))
 
 
 def context(digits: int) -> Context:
-    """Arithmetic of so many digits."""
+    """Arithmetic with this many digits."""
     return Context(prec=digits, Emin=-999999, Emax=999999)
 
 
@@ -57,23 +57,23 @@ decimals: Any = np.frompyfunc(
 
 
 def eigenvalues(matrix: Any, near: Complex) -> Complex:
-    """The eigenvalues of one matrix, shape (n,), right to double precision; a pair stands with its positive angle first.
+    """The eigenvalues of one matrix, shape (n,), right to double precision; a pair has its positive angle first.
 
     Args:
         matrix: floats, or decimals, shape (n, n).
-        near: where they roughly are, as double precision finds them, shape (n,).
+        near: the eigenvalues as computed in double precision, shape (n,).
     """
     with localcontext(context(digits(matrix))):
-        given = matrix.copy() if matrix.dtype == object else decimals(matrix)
-        x, y = _roots(_characteristic(given), np.asarray(near))
+        elements = matrix.copy() if matrix.dtype == object else decimals(matrix)
+        x, y = _roots(_characteristic(elements), np.asarray(near))
     return _in_pairs(x, y)
 
 
 def unrounded(rates: Array, velocities: int, method: Method) -> tuple[Any, int]:
-    """P of ṡ = A·s as exact polynomials in dt/2ᵏ, shape (n, n), in units that suit A, and k.
+    """P of ṡ = A·s as exact polynomials in dt/2ᵏ, shape (n, n), in units that balance A, and k.
 
-    In that unit of time all elements of A are whole numbers, which ``polynomials`` takes as they are, and not for the simple
-    fraction that they may have been rounded from.
+    In that unit of time all elements of A are whole numbers, which ``polynomials`` takes as they are; other floats it replaces by
+    simple fractions that round to them.
     """
     units = eigen.units_of(rates)
     scaled = rates * units / units[:, np.newaxis]
@@ -82,12 +82,12 @@ def unrounded(rates: Array, velocities: int, method: Method) -> tuple[Any, int]:
 
 
 class Step:
-    """A step of ṡ = A·s in as many digits as it takes.
+    """A step of ṡ = A·s in as many digits as needed.
 
     Args:
         rates: A in the order (v, y), shape (n, n).
         velocities: how many of the states are velocities.
-        method: what steps them.
+        method: the method.
     """
 
     def __init__(self, rates: Array, velocities: int, method: Method) -> None:
@@ -98,18 +98,18 @@ class Step:
             self.powers = [decimals(np.frompyfunc(lambda p, k=k: p[k], 1, 1)(P)) for k in range(most)]
 
     def eigenvalues(self, dt: float) -> Complex:
-        """Those of P, right to double precision, shape (n,)."""
+        """The eigenvalues of P, right to double precision, shape (n,)."""
         return eigenvalues(*self._matrix(dt))
 
     def beyond(self, dt: float) -> float:
-        """How far the largest eigenvalue of P is outside the unit circle, to more digits than |z| − 1 would have."""
+        """How far the largest eigenvalue of P is outside the unit circle, with more digits than |z| − 1 of doubles has."""
         matrix, near = self._matrix(dt)
         with localcontext(context(digits(matrix))):
             x, y = _roots(_characteristic(matrix), near)
             return float((x * x + y * y).max().sqrt() - 1)
 
     def _matrix(self, dt: float) -> tuple[Number, Complex]:
-        """P, and its eigenvalues as double precision finds them."""
+        """P, and its eigenvalues as computed in double precision."""
         with localcontext(context(self.digits)):
             h, P = Decimal(dt) / (1 << self.clock), self.powers[-1]
             for power in self.powers[-2::-1]:
@@ -148,11 +148,11 @@ def _characteristic(m: Number) -> list[Decimal]:
 def _roots(coefficients: list[Decimal], near: Complex) -> tuple[Number, Number]:
     """Real and imaginary parts of all roots at once (Ehrlich 1967, Aberth 1973).
 
-    The values of the polynomial take all digits; the corrections, and the differences of roots that go into them, do not.
+    The values of the polynomial have all digits; the corrections, and the differences of roots in them, are in double precision.
     """
     n = len(near)
     size = float(np.abs(near).max(initial=0.0)) or 1.0
-    # Starts that are apart, and not the mirror image of each other's.
+    # The starts are apart from each other, and no two are mirror images.
     start = near + 1e-9 * (np.abs(near) + 1e-3 * size) * np.exp(1j * (0.7 + 2.0 * np.pi * np.arange(n) / n))
     x, y = decimals(start.real), decimals(start.imag)
     before = np.full(n, np.nan + 0j)
@@ -167,22 +167,22 @@ def _roots(coefficients: list[Decimal], near: Complex) -> tuple[Number, Number]:
         none = np.array([not a for a in norm])
         norm[none] = one
         newton = ((p * d + p_i * d_i) / norm).astype(float) + 1j * ((p_i * d - p * d_i) / norm).astype(float)
-        found = np.array([not (a or b) for a, b in zip(p, p_i, strict=True)])
+        at_root = np.array([not (a or b) for a, b in zip(p, p_i, strict=True)])
         between = (x[:, np.newaxis] - x).astype(float) + 1j * (y[:, np.newaxis] - y).astype(float)
         with np.errstate(all="ignore"):
             inverse = np.where(between == 0.0, 0.0, 1.0 / between)
             move = newton / (1.0 - newton * inverse.sum(axis=1))
-        move = np.where(found, 0.0, np.where(np.isfinite(move) & ~none, move, 1e-6 * size * np.exp(0.3j * np.arange(n))))
-        if k % AITKEN_EVERY == AITKEN_EVERY - 1:  # Of a multiple root each round leaves the same share: their sum, by Aitken.
+        move = np.where(at_root, 0.0, np.where(np.isfinite(move) & ~none, move, 1e-6 * size * np.exp(0.3j * np.arange(n))))
+        if k % AITKEN_EVERY == AITKEN_EVERY - 1:  # at a multiple root each round leaves the same fraction: extrapolate
             with np.errstate(all="ignore"):
                 share = move / before
                 move = np.where(np.abs(share) < 0.99, move / (1.0 - share), move)
         before = move
         x, y = x - decimals(move.real), y - decimals(move.imag)
         here = np.hypot(x.astype(float), y.astype(float))
-        # A root is within n times Newton's correction; two guesses that are nearly one hinder each other's moves.
+        # A root is within n times Newton's correction; ``move`` alone may be small because two guesses are close together.
         if (
-            np.maximum(np.abs(move), np.where(found, 0.0, np.abs(newton)))
+            np.maximum(np.abs(move), np.where(at_root, 0.0, np.abs(newton)))
             <= ROOT_TOLERANCE * np.maximum(here, ROOT_TOLERANCE * size)
         ).all():
             break
@@ -190,11 +190,11 @@ def _roots(coefficients: list[Decimal], near: Complex) -> tuple[Number, Number]:
 
 
 def _in_pairs(x: Number, y: Number) -> Complex:
-    """Roots as doubles: those that are real but for the last digits real, the others in pairs, the positive angle first."""
+    """Roots as doubles: imaginary parts that are rounding removed, the others in pairs, the positive angle first."""
     z = x.astype(float) + 1j * y.astype(float)
     z[np.abs(z) <= ZERO_TOLERANCE * np.abs(z).max()] = 0.0
     real = np.abs(z.imag) <= REAL_TOLERANCE * np.abs(z)
     up, down = z[~real & (z.imag > 0.0)], z[~real & (z.imag < 0.0)]
-    if len(up) != len(down):  # a real one that is so nearly double that its last digits are not real
+    if len(up) != len(down):  # a real root so nearly double that its imaginary part is above the tolerance
         return np.concatenate([z[real], up, down])
     return np.concatenate([z[real].real + 0j, np.stack([up, up.conj()], axis=1).ravel()])

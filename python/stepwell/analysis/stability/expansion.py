@@ -18,10 +18,10 @@ from ...model.systems import Oscillator, System
 from . import maps
 from .numbers import Polynomial
 
-#: Terms that series in Φ² are computed with; the last is lost where one is divided by Φ².
+#: The number of terms of series in Φ²; the last is lost where a series is divided by Φ².
 TERMS = 8
 
-#: A coefficient this small is the rounding of a method's own coefficients, and none of the series.
+#: A coefficient this small is rounding of the method's coefficients and not a term of the series.
 NEGLIGIBLE = Fraction(1, 10**12)
 
 
@@ -30,8 +30,8 @@ class Series(NamedTuple):
 
     Attributes:
         p: half the trace of P, a polynomial.
-        q: its determinant, a polynomial: r₁² of a conjugate pair.
-        ratio: Ψ/Φ, the first terms of its series.
+        q: the determinant of P, a polynomial: r₁² of a conjugate pair.
+        ratio: the first terms of the series of Ψ/Φ.
     """
 
     p: Polynomial
@@ -117,18 +117,18 @@ def _times(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
 
 
 def _inverse(a: list[Fraction]) -> list[Fraction]:
-    found = [1 / a[0]]
+    coefficients = [1 / a[0]]
     for k in range(1, TERMS):
-        found.append(-sum((a[i] * found[k - i] for i in range(1, k + 1)), Fraction(0)) / a[0])
-    return found
+        coefficients.append(-sum((a[i] * coefficients[k - i] for i in range(1, k + 1)), Fraction(0)) / a[0])
+    return coefficients
 
 
 def _root(a: list[Fraction]) -> list[Fraction]:
     """The square root of a series that begins with 1."""
-    found = [Fraction(1)]
+    coefficients = [Fraction(1)]
     for k in range(1, TERMS):
-        found.append((a[k] - sum((found[i] * found[k - i] for i in range(1, k)), Fraction(0))) / 2)
-    return found
+        coefficients.append((a[k] - sum((coefficients[i] * coefficients[k - i] for i in range(1, k)), Fraction(0))) / 2)
+    return coefficients
 
 
 def _terms(p: Polynomial, most: int) -> list[tuple[int, Fraction]]:
@@ -140,7 +140,7 @@ SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def text(terms: list[tuple[int, Fraction]]) -> str:
-    """Terms as one writes them: −Φ⁶/72 + Φ⁸/576."""
+    """Terms as text: −Φ⁶/72 + Φ⁸/576."""
     written = ""
     for power, c in terms:
         sign = "−" if c < 0 else "+"

@@ -1,17 +1,19 @@
 """``stability_limit``: the largest step below which no mode grows that should not, and the mode that grows beyond it.
 
-A linear system of more than two states is taken apart first (``parts``). Each part, or a system of two states, is then searched:
-the step is sought on a ladder of steps for all members at once; the first rung on which a mode grows and the one before it
-enclose the limit, of two states also a narrow window between rungs. Bisection finds it, and where an eigenvalue crosses the unit
-circle at an angle, the crossing itself is solved for. An eigenvalue that leaves the circle after a collision with another (False
-Euler at Φ = 2) does so with the square root of the excess, so there bisection alone is exact to rounding for two states; for
-more, the square of the growth is followed back to where it began. Where eigenvalues nearly meet, rounding would decide; they are
-computed in more digits (``exact``), on a ladder of wider rungs.
+A linear system of more than two states is first decomposed (``parts``). Each part, or a system of two states, is then searched on
+a ladder of steps, all members at once: the first rung on which a mode grows and the one before it enclose the limit. For two
+states a narrow window between two rungs is found as well. Bisection makes the enclosure narrow, and where an eigenvalue crosses
+the unit circle at an angle, the crossing itself is solved for. An eigenvalue that leaves the circle after a collision with
+another (False Euler at Φ = 2) does so with the square root of the excess. There bisection alone is exact to rounding for two
+states; for more, the square of the growth is extrapolated to zero. Where eigenvalues nearly meet, rounding would decide, so they
+are computed in more digits (``exact``), on a ladder of wider rungs.
 """
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from functools import partial
 from math import prod
 from typing import Any
 
@@ -29,7 +31,7 @@ from ...model.systems.base import a_system
 from ...model.systems.own import OwnSystem
 from ..derivatives import traced
 from . import exact, maps
-from .analysis import given_state, state
+from .analysis import state, state_argument
 from .eigen import EPS
 from .limit_result import Mode, StabilityLimit, StabilityLimits, limits_of
 from .limit_search import NUMBERS_OF_AN_ELEMENT, Search, members_at_once
@@ -46,17 +48,16 @@ __all__ = ["Mode", "StabilityLimit", "StabilityLimits", "stability_limit"]
 def stability_limit(system: System, method: str | Method, *, at: Any = None, t: float = 0.0, v: Any = None, y: Any = None) -> Any:
     """Find the largest step below which a method is stable for every mode of a system.
 
-    Stable means that every eigenvalue of the transition matrix stays in or on the unit circle for
-    all smaller steps. At the limit itself two eigenvalues may meet, as at Φ = 2 by False Euler, and the samples then grow
-    linearly. A method whose samples grow at the smallest steps is never stable, even if larger steps damp (Fehlberg's);
-    neither is a system whose exact solution grows.
+    Stable means that every eigenvalue of the transition matrix stays in or on the unit circle for all smaller steps. At the limit
+    itself two eigenvalues may meet, as at Φ = 2 by False Euler, and the samples then grow linearly. A method whose samples grow
+    at the smallest steps is never stable, even if larger steps damp (Fehlberg's); neither is a system whose exact solution grows.
 
     Limits of systems of one or two states are exact to some 1e-15, whatever the units. So are those of systems that decompose
     into such parts: filters in series, chains, and any linear system by a method that treats both blocks alike (Runge-Kutta). For
     others the accuracy depends on the condition of the mode that becomes unstable, some 1e-9 of the step at worst. Multiple or
-    nearly multiple eigenvalues are computed in as many digits as needed. The result holds for the matrix as given: where n
-    eigenvalues meet, a change of its last digits moves them by the n-th root of that. With more than 32 states that cannot be
-    decomposed, or about a state that moves by equations which are not linear, the limit may stay undecided; see ``decided``.
+    nearly multiple eigenvalues are computed in as many digits as needed. The result holds for the matrix exactly as it is: where
+    n eigenvalues meet, a relative change ε of the matrix moves them by about the n-th root of ε. With more than 32 states that
+    cannot be decomposed, or about a state that moves by nonlinear equations, the limit may stay undecided; see ``decided``.
     Damping of less than a millionth of critical damping counts as none. Where a method grows in a window of steps and is stable
     beyond it, the window is found for two states, however narrow; for others, a window narrower than 2 % of the step may be
     missed, or 17 % where many digits are needed.
@@ -64,11 +65,11 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     Args:
         system: a linear system; parameters may be arrays. Its inputs do not matter: their contribution to the samples is bounded.
         method: its name, or what ``stepwell.method`` returns.
-        at: a state (v, y) at which a nonlinear system is linearised. Of ``Springs`` it is the limit of small motions of what is
-            not fixed; ``safe_step`` is a bound of it for every state, and for any number of springs.
+        at: a state (v, y) at which a nonlinear system is linearised. For ``Springs`` the result is the limit of small motions of
+            the particles that are not fixed; ``safe_step`` bounds it for every state and any number of springs.
         t: the time of that state.
-        v: in place of ``at``, the velocities of the state.
-        y: in place of ``at``, its coordinates.
+        v: the velocities of the state, in place of ``at``.
+        y: the coordinates of the state, in place of ``at``.
 
     Returns:
         A ``StabilityLimit``, which is a float with a ``mode``; an array of them for a batch (``StabilityLimits``). It is NaN, and
@@ -76,7 +77,7 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot step the system, or the system is not linear and no state is given.
+        UnsupportedError: if the method cannot step the system, or a nonlinear system comes without a state.
 
     Warns:
         AccuracyWarning: if a limit is not decided.
@@ -85,23 +86,23 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
         >>> sw.stability_limit(sw.LinearSystem([[-1, 0, 0], [1, -1, 0], [0, 1, -1]]), "rk4")
         2.785293563405282
     """
-    how = find_method(method)
-    at = given_state(at, v, y)
+    method = find_method(method)
+    at = state_argument(at, v, y)
     system = a_system(system).for_state_shapes(*(at if isinstance(at, (tuple, list)) else ()))
-    fits_together(system, how)
+    fits_together(system, method)
     t = checks.number("t", t)
     if at is None and not system.linear:
         bound = ", or ask its safe_step for a bound" if isinstance(system, Springs) else ""
         raise UnsupportedError(f"at: {system!r} is not linear; give at=(v, y) for the limit of small disturbances there{bound}")
     v, y = (None, None) if at is None else state("at", system, at)
-    found = limit_of(system, how, v, y, t)
-    if not np.all(found.decided):
-        _warn(system, how, found)
-    return found
+    limit = limit_of(system, method, v, y, t)
+    if not np.all(limit.decided):
+        _warn(system, method, limit)
+    return limit
 
 
 def limit_of(system: System, method: Method, v: Array | None = None, y: Array | None = None, t: float = 0.0) -> Any:
-    """``stability_limit`` of arguments that were checked, without a warning where it is not decided."""
+    """``stability_limit`` for checked arguments, without a warning where the limit is not decided."""
     members = system.batch if v is None or y is None else maps.together(system, np.asarray(1.0), v, y)
     if v is None or y is None or system.linear:
         _fit(sum(maps.size(system)), members)
@@ -110,7 +111,7 @@ def limit_of(system: System, method: Method, v: Array | None = None, y: Array | 
     else:
         _fit(sum(maps.size(system)), members)
         if (motions := _linear_part(system, method, v, y, t, members)) is not None:
-            return _reshaped(system, limit_of(motions, method))
+            return _with_modes(limit_of(motions, method), partial(_shaped, system))
     limits, grows, modes = _of_all(system, method, v, y, t, members)
     spread: list[Any] = [np.array(np.broadcast_to(each, members)) for each in (limits, grows, modes)]
     limits, grows, modes = spread
@@ -119,15 +120,15 @@ def limit_of(system: System, method: Method, v: Array | None = None, y: Array | 
     return limits_of(limits, modes, grows)
 
 
-#: Numbers that the limit of a member takes beside the shape of its mode.
+#: The numbers in memory for the limit of a member, besides the shape of its mode.
 NUMBERS_OF_A_LIMIT = 250
 
-#: How often the matrix of small motions is there before the search begins: as it is made, cut or joined, and in the system.
+#: How many copies of the matrix of small motions are in memory before the search: as computed, cut or joined, and in the system.
 COPIES_OF_A_MATRIX = 4
 
 
 def _fit(n: int, members: Shape, of_matrix: int = 0) -> None:
-    """Raise if the limits of systems of n states do not fit in memory, with a matrix of so many numbers for each member."""
+    """Raise if the limits of systems of n states do not fit in memory, with a matrix of ``of_matrix`` numbers for each member."""
     beside = 8.0 * NUMBERS_OF_AN_ELEMENT * n * n * min(prod(members), members_at_once(n))
     numbers = NUMBERS_OF_A_LIMIT + 4 * n + COPIES_OF_A_MATRIX * of_matrix
     checks.fits("the limits", numbers, members, "ask for fewer, or of fewer states", beside=beside)
@@ -136,7 +137,7 @@ def _fit(n: int, members: Shape, of_matrix: int = 0) -> None:
 def _of_all(
     system: System, method: Method, v: Array | None, y: Array | None, t: float, members: Shape
 ) -> tuple[Array, Array, Any]:
-    """The limits of all members, the smallest steps known to grow, and the modes; so many members at once as memory allows."""
+    """The limits of all members, the smallest steps known to grow, and the modes; as many members at once as memory allows."""
     if system.linear or v is None or y is None:
         system, v, y, t, members = system.without_inputs(), None, None, 0.0, system.batch
     n, count = sum(maps.size(system)), prod(members)
@@ -153,7 +154,7 @@ def _of_all(
 
 
 def _of_some(search: Search) -> tuple[Array, Array, Any]:
-    """The same of the members of a search."""
+    """The limits, the smallest steps known to grow, and the modes of the members of a search."""
     if search.v is None and len(search.rates) > 2:
         return _by_parts(search)
     limits, grows = search.limits()
@@ -163,38 +164,38 @@ def _of_some(search: Search) -> tuple[Array, Array, Any]:
 def _linear_part(system: System, method: Method, v: Array, y: Array, t: float, members: Shape) -> LinearSystem | None:
     """A linear system whose steps are those of small disturbances of a state of own equations, or None.
 
-    There is one where the derivative of the rates is the same in all stages of a step: of equations that are linear but for what
-    drives them, and where nothing moves. Its eigenvalues are those of a step of a matrix, which are found however they meet.
+    There is one where the derivative of the rates is the same in all stages of a step: for equations that are linear except for
+    what drives them, and at rest. The eigenvalues of its steps are known even where they meet.
     """
     if not isinstance(system, OwnSystem) or system.around:
         return None
-    of = traced.reading(system)
-    if not of.linear and of.time:
+    reading = traced.reading(system)
+    if not reading.linear and reading.time:
         return None
     n, count = sum(maps.size(system)), prod(members)
     if count <= members_at_once(n):
         matrix, rates = traced.matrix(system, "rates", None, members, v, y, t)
-        if not of.linear and not _is_at_rest(system, matrix, rates, v, y):
+        if not reading.linear and not _is_at_rest(system, matrix, rates, v, y):
             return None
         return LinearSystem(matrix, velocities=maps.size(system)[0])
     every = Batch(system, method, v, y, members)
-    found: list[Array] = []
+    matrices: list[Array] = []
     for k in range(0, count, members_at_once(n)):
         some = np.arange(k, min(k + members_at_once(n), count))
         own, own_v, own_y = every.of(some)
         assert own_v is not None
         assert own_y is not None
         matrix, rates = traced.matrix(own, "rates", None, some.shape, own_v, own_y, t)
-        if not of.linear and not _is_at_rest(own, matrix, rates, own_v, own_y):
+        if not reading.linear and not _is_at_rest(own, matrix, rates, own_v, own_y):
             return None
-        if not found:
+        if not matrices:
             _fit(n, members, n * n)
-        found.append(matrix)
-    return LinearSystem(np.concatenate(found, axis=-1).reshape(n, n, *members), velocities=maps.size(system)[0])
+        matrices.append(matrix)
+    return LinearSystem(np.concatenate(matrices, axis=-1).reshape(n, n, *members), velocities=maps.size(system)[0])
 
 
 def _is_at_rest(system: System, matrix: Array, rates: Array, v: Array, y: Array) -> bool:
-    """Whether the rates of all members are no more than the rounding of what they are sums of."""
+    """Whether the rates of all members are no more than the rounding of their terms."""
     members = rates.shape[1:]
     blocks = (maps.spread(block, shape, members) for block, shape in ((v, system.v_shape), (y, system.y_shape)))
     numbers = np.concatenate([block.reshape(-1, *members) for block in blocks])
@@ -202,27 +203,27 @@ def _is_at_rest(system: System, matrix: Array, rates: Array, v: Array, y: Array)
     return bool((np.abs(rates) <= rounding).all())
 
 
-def _reshaped(system: System, found: Any) -> Any:
-    """The limit of a linear system as that of one whose blocks have these shapes."""
-    if isinstance(found, StabilityLimit):
-        return StabilityLimit(found.stable, _shaped(system, found.mode), found.grows)
-    modes = np.empty(found.shape, dtype=object)
-    for index in np.ndindex(found.shape):
-        modes[index] = _shaped(system, found.modes[index])
-    return limits_of(found.stable, modes, found.grows)
+def _with_modes(limit: Any, change: Callable[[Mode | None], Mode | None]) -> Any:
+    """The limit, or the limits of a batch, with changed modes."""
+    if isinstance(limit, StabilityLimit):
+        return StabilityLimit(limit.stable, change(limit.mode), limit.grows)
+    modes = np.empty(limit.shape, dtype=object)
+    for index in np.ndindex(limit.shape):
+        modes[index] = change(limit.modes[index])
+    return limits_of(limit.stable, modes, limit.grows)
 
 
 def _shaped(system: System, mode: Mode | None) -> Mode | None:
-    """A mode whose blocks have the shapes of the system's."""
+    """A mode whose blocks have the shapes of those of the system."""
     return None if mode is None else mode._replace(v=mode.v.reshape(system.v_shape), y=mode.y.reshape(system.y_shape))
 
 
-def _warn(system: System, method: Method, found: Any) -> None:
-    """Warn of limits that are not decided, which are NaN."""
-    doubtful = np.atleast_1d(~np.asarray(found.decided))
-    stable, grows = (np.atleast_1d(each)[doubtful][0] for each in (found.stable, found.grows))
-    one = isinstance(found, StabilityLimit)
-    which = "" if one else f" of {share(int(doubtful.sum()), found.shape, found.size)}"
+def _warn(system: System, method: Method, limit: Any) -> None:
+    """Warn of limits that are NaN because they are not decided."""
+    doubtful = np.atleast_1d(~np.asarray(limit.decided))
+    stable, grows = (np.atleast_1d(each)[doubtful][0] for each in (limit.stable, limit.grows))
+    one = isinstance(limit, StabilityLimit)
+    which = "" if one else f" of {share(int(doubtful.sum()), limit.shape, limit.size)}"
     hint = (
         f"systems of more than {exact.MAX_ROWS} states that cannot be decomposed are not computed in more digits"
         if system.linear
@@ -239,17 +240,11 @@ def _warn(system: System, method: Method, found: Any) -> None:
 def _of_springs(springs: Springs, method: Method, v: Array, y: Array, members: Shape) -> Any:
     """The limit of small motions about a state."""
     _fit(2 * len(free_numbers(springs)), members, sum(maps.size(springs)) ** 2)
-    found = limit_of(linearised(springs, v, y), method)
-    if isinstance(found, StabilityLimit):
-        return StabilityLimit(found.stable, lifted(springs, found.mode), found.grows)
-    modes = np.empty(found.shape, dtype=object)
-    for index in np.ndindex(found.shape):
-        modes[index] = lifted(springs, found.modes[index])
-    return limits_of(found.stable, modes, found.grows)
+    return _with_modes(limit_of(linearised(springs, v, y), method), partial(lifted, springs))
 
 
 def _by_parts(search: Search) -> tuple[Array, Array, Any]:
-    """The limits of a linear system, the smallest steps known to grow, and the modes, by the part that is the first to grow."""
+    """The limits of a linear system, the smallest steps known to grow, and the modes: those of the part that grows first."""
     n_v = maps.size(search.system)[0]
     alike: dict[tuple[int, int], list[tuple[Shape, Array]]] = {}
     for index in np.ndindex(search.members):
@@ -261,13 +256,13 @@ def _by_parts(search: Search) -> tuple[Array, Array, Any]:
     for (_, velocities), each in alike.items():
         stacked = np.stack([matrix for _, matrix in each], axis=-1)
         part = Search(LinearSystem(stacked, velocities=velocities), search.method, None, None, 0.0)
-        found, above = part.limits()
+        stable, above = part.limits()
         own, leaving = part.modes(above)
         for k, (index, _) in enumerate(each):
-            # Of those that are never stable what grows by itself is told, and else the fastest.
+            # Among parts that are never stable, one whose exact solution grows comes first, else the fastest.
             rank = (above[k], not part.grows_by_itself[k], -part.fastest[k])
             if own[k] is not None and (index not in best or rank < best[index]):
                 best[index], modes[index], past[index] = rank, own[k], leaving[k]
-            limits[index], grows[index] = min(limits[index], found[k]), min(grows[index], above[k])
+            limits[index], grows[index] = min(limits[index], stable[k]), min(grows[index], above[k])
     search.lift(modes, grows, past)
     return limits, grows, modes

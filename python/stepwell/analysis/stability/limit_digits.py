@@ -1,4 +1,4 @@
-"""The ladder of steps of the search for a stability limit, and the search on it in as many digits as it takes."""
+"""The ladder of steps of the search for a stability limit, and the search on it in as many digits as needed."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from . import exact
 from .eigen import EPS
 from .numbers import Polynomial
 
-#: The ladder of steps, as multiples of the fastest rate: from where the limits of light damping are (2D by Standard Euler) to
-#: beyond the limit of a method of a hundred stages. It is fine from FINE_FROM on, where methods have limits of their own.
+#: The ladder of steps, times the fastest rate: from the limits of light damping (2D by Standard Euler) to beyond the limit of a
+#: method of a hundred stages. It is fine from FINE_FROM on, where methods have limits of their own.
 FINE_FROM, RUNG_RATIO = 1e-2, 1.02
 LADDER = np.concatenate([np.geomspace(1e-6, FINE_FROM, 97)[:-1], FINE_FROM * RUNG_RATIO ** np.arange(466)])
 
-#: With more digits, only every so many-th rung of the ladder is tried, and an eigenvalue outside the unit circle by more than
-#: ``CIRCLE_TOLERANCE`` grows.
+#: With more digits, only every ``COARSE_STRIDE``-th rung of the ladder is tried, and an eigenvalue outside the unit circle by
+#: more than ``CIRCLE_TOLERANCE`` grows.
 COARSE_STRIDE, CIRCLE_TOLERANCE = 8, 1e-13
 
 
 def passes_zero(f: Polynomial, x: float) -> bool:
-    """Whether a polynomial has another sign a few last digits on."""
+    """Whether a polynomial changes its sign within a few last digits of x."""
     before, after = (f(Fraction(x * (1.0 + 8.0 * side * EPS))) for side in (-1, 1))
     return bool((before < 0) != (after < 0))
 
 
 def in_many_digits(step: exact.Step, fastest: float, near: float = 0.0) -> float:
-    """The step at which something begins to grow, in as many digits as it takes: near one, or on a ladder of wide rungs."""
+    """The step at which a mode begins to grow, in as many digits as needed: near this step, or on a ladder of wide rungs."""
     low, high = near * (1.0 - 1e-3), near * (1.0 + 1e-3)
     below, above = (step.beyond(low), step.beyond(high)) if near else (0.0, 0.0)
     if not below < -CIRCLE_TOLERANCE < CIRCLE_TOLERANCE < above:
@@ -41,7 +41,7 @@ def in_many_digits(step: exact.Step, fastest: float, near: float = 0.0) -> float
             return np.inf
         if not low:
             return 0.0  # already at the smallest steps
-    crosses = below < -CIRCLE_TOLERANCE  # else the eigenvalue is on the circle below
+    crosses = below < -CIRCLE_TOLERANCE  # else the eigenvalue is on the circle at smaller steps
     for k in range(60):
         middle = 0.5 * (low + high)
         if crosses and k % 2:  # the secant; every other time the middle, so that both ends move

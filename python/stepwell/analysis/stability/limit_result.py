@@ -1,4 +1,4 @@
-"""What ``stability_limit`` returns: numbers that know which mode grows beyond them."""
+"""The results of ``stability_limit``: numbers with the mode that grows beyond them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Mode(NamedTuple):
         angle: Ψ in 0 … π, its angle per step.
         rate: λ of the mode in the exact solution, in 1 per unit of time; its imaginary part is its frequency.
         kind: what it does past the limit, in the document's words.
-        v: its shape in the velocities, complex, shape (*block); its largest number in both blocks is 1.
+        v: its shape in the velocities, complex, shape (*block); the largest number of both blocks is 1.
         y: its shape in the coordinates.
     """
 
@@ -35,9 +35,9 @@ class Mode(NamedTuple):
 
 
 class StabilityLimit(float):
-    """A stability limit: the largest stable step, in units of time, 0 for never and infinity for always.
+    """A stability limit: the largest stable step, in units of time; 0 if no step is stable, infinite if all are.
 
-    It is a number; NaN where rounding hides what happens between the two steps ``stable`` and ``grows``.
+    It is a number, and NaN where rounding hides what happens between the two steps ``stable`` and ``grows``.
 
     Attributes:
         mode: what begins to grow there; None if nothing does.
@@ -58,7 +58,7 @@ class StabilityLimit(float):
         return limit
 
     def __getnewargs__(self) -> tuple[Any, ...]:
-        """What pickle and copy make it of."""
+        """The arguments for pickle and copy."""
         return self.stable, self.mode, self.grows
 
     @property
@@ -67,14 +67,14 @@ class StabilityLimit(float):
         return self.grows == self.stable
 
     def __repr__(self) -> str:
-        """A number, or between which two it is."""
+        """The number, or the two between which it is."""
         return f"{self.stable!r}" if self.decided else f"<between {self.stable!r} and {self.grows!r}, not decided>"
 
     __str__ = __repr__
 
     @property
     def dt(self) -> float:
-        """The number alone."""
+        """The limit as a plain float."""
         return float(self)
 
 
@@ -84,7 +84,7 @@ class StabilityLimits(np.ndarray[Any, np.dtype[np.float64]]):
     They are NaN where they are not decided.
 
     Attributes:
-        modes: what begins to grow, an array of the same shape of ``Mode`` or None; None of what is computed from limits.
+        modes: the modes that begin to grow, an array of the same shape of ``Mode`` or None; None after arithmetic on limits.
         stable: the largest steps that are known to be stable: the limits themselves where they are decided.
         grows: the smallest steps that are known to grow, likewise.
     """
@@ -94,29 +94,29 @@ class StabilityLimits(np.ndarray[Any, np.dtype[np.float64]]):
     grows: Any = None
 
     def __array_finalize__(self, other: Any) -> None:
-        """What is computed from limits is no longer a limit, and has no modes."""
+        """A result of arithmetic on limits is no longer a limit, and has no modes."""
         self.modes = self.stable = self.grows = None
 
     @property
     def decided(self) -> Any:
-        """Of each whether it is known, as ``StabilityLimit.decided``."""
+        """Whether each limit is known, as ``StabilityLimit.decided``."""
         return np.asarray(self.grows == self.stable)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What pickle and copy make it of."""
+        """The function and the arguments for pickle and copy."""
         return limits_of, (self.stable, self.modes, self.grows)
 
     def __copy__(self) -> StabilityLimits:
-        """Another with the same modes."""
+        """A copy with the same modes."""
         return limits_of(self.stable, self.modes, self.grows)
 
     def __deepcopy__(self, memo: Any) -> StabilityLimits:
-        """Another with copies of them."""
+        """A copy with copies of the modes."""
         return limits_of(self.stable.copy(), copy.deepcopy(self.modes, memo), copy.deepcopy(self.grows, memo))
 
 
 def limits_of(stable: Array, modes: Any, grows: Any) -> StabilityLimits:
-    """Limits between these steps, of these modes."""
-    found = np.where(stable == grows, stable, np.nan).view(StabilityLimits)
-    found.modes, found.stable, found.grows = modes, stable, grows
-    return found
+    """Limits between these steps, with these modes."""
+    limits = np.where(stable == grows, stable, np.nan).view(StabilityLimits)
+    limits.modes, limits.stable, limits.grows = modes, stable, grows
+    return limits

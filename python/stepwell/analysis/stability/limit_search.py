@@ -1,4 +1,4 @@
-"""The search for a stability limit: a ladder of steps, bisection, and crossings that are solved for."""
+"""The search for a stability limit: on a ladder of steps, by bisection, and by solving for crossings of the unit circle."""
 
 from __future__ import annotations
 
@@ -18,46 +18,48 @@ from .limit_result import Mode
 from .parts import rates
 from .some_members import Batch
 
-#: Rungs that are computed at once, and elements of the matrices of all members in them, so that Ctrl-C is noticed in between and
-#: memory has room for them.
+#: The most rungs computed at once, and the most elements of the matrices of all members in them, so that Ctrl-C is noticed in
+#: between and the memory suffices.
 RUNGS_AT_ONCE, ELEMENTS_AT_ONCE = 64, 1 << 18
 
-#: Numbers that a search keeps at a time for each element of a matrix: of steps, eigenvectors, their inverse, and what is between.
+#: The numbers that a search has in memory for each element of a matrix: steps, eigenvectors, their inverse, and temporary arrays.
 NUMBERS_OF_AN_ELEMENT = 60
 
-#: An eigenvalue of the rates that is this small a part of the largest is zero: such a mode (a chain that floats freely) has an
+#: An eigenvalue of the rates below this fraction of the largest is zero: such a mode (a chain that floats freely) has an
 #: eigenvalue 1 with every method at every step, and does not count.
 ZERO_RATE = 1e-6
 
-#: A rate whose real part is below this part of it is imaginary.
+#: A rate whose real part is below this fraction of its magnitude is imaginary.
 BY_ITSELF = 1e-9
 
-#: How far rounding moves them is known to first order; an eigenvalue that is outside the circle by so many times that is surely
-#: outside.
+#: The tolerance of an eigenvalue is a first-order estimate of its rounding; one outside the circle by this many tolerances is
+#: surely outside.
 SURE_FACTOR = 100.0
 
-#: Growth that begins at the smallest steps, like a power of dt, is lost in rounding there: where it first shows it is above its
-#: tolerance by no more than a rung with this exponent makes of it. A mode that begins to grow at a limit is far above at once.
+#: Growth that begins at the smallest steps, like a power of dt, is lost in rounding there. On the first rung where it shows, it
+#: is above its tolerance by at most the ratio of two rungs to this power. A mode that begins to grow at a limit is far above at
+#: once.
 GROWTH_EXPONENT = 20.0
 
-#: An eigenvalue whose magnitude changes by less than this for a relative change of the step is solved for exactly: rounding of
-#: some eps would move its crossing by more than a hundred eps.
+#: A crossing is solved for exactly if the magnitude of the eigenvalue changes by less than this over a relative change of the
+#: step: rounding of some eps would move the crossing by more than a hundred eps.
 MIN_SLOPE = 0.03
 
-#: Two eigenvalues that leave the circle at an angle and as close together as this are solved for exactly too: critical damping
+#: The crossing is solved for exactly, too, if two eigenvalues this close together leave the circle at an angle: critical damping
 #: makes them double, and rounding moves a double eigenvalue by the square root of its own size.
 NEARLY_DOUBLE = 1e-4
 
-#: The crossing is searched from this share below the limit, more than rounding moves apart two real eigenvalues that are equal.
+#: The search for a crossing begins this fraction below the limit: further than rounding separates two equal real eigenvalues.
 SEARCH_BELOW = 1e-7
 
-#: A crossing that rounding may move by more than this part of the step is found in more digits.
+#: A crossing that rounding may move by more than this fraction of the step is computed in more digits.
 MAX_CROSSING_ERROR = 1e-9
 
-#: A limit extrapolated to where two eigenvalues meet is accepted if it is this near, relative to the length of the extrapolation.
+#: A limit extrapolated to where two eigenvalues meet is accepted if it is this close, relative to the length of the
+#: extrapolation.
 MEETING_TOLERANCE = 1e-3
 
-#: The unstable mode is computed this share past its limit; one that is never stable, at this step times the fastest rate.
+#: The unstable mode is computed at this fraction past its limit; one that is never stable, at this step times the fastest rate.
 PAST_LIMIT, NEVER_STABLE_STEP = 1e-4, 0.1
 
 
@@ -83,7 +85,7 @@ class Search:
         self.rates = maps.rates(system, t, v, y) if rates is None else rates
         self.members: Shape = self.rates.shape[2:]
         self.exact = eigen.eigen(self.rates) if exact_rates is None else exact_rates
-        #: Whether eigenvalues that nearly meet can be had in as many digits as it takes.
+        #: Whether eigenvalues that nearly meet can be computed in more digits.
         self.exactable = v is None and 2 < len(self.rates) <= exact.MAX_ROWS
 
     @cached_property
@@ -93,8 +95,8 @@ class Search:
     def of(self, members: Truths) -> tuple[Search, Any]:
         """The search of these members and their places among all, or that of all if these are most of them.
 
-        A step is the same for one member as among others; so is what was found of the rates. Members of two states cost less
-        than it takes to part them, and those that are found in many digits are all looked at as long as one needs it.
+        A member has the same steps and rates alone as among others. A batch of members of two states is not split, since that
+        takes more time than it saves; nor is one that may need more digits, whose members are all examined until none needs them.
         """
         if len(self.rates) <= 2 or self.exactable or 2 * np.count_nonzero(members) > members.size:
             return self, ...
@@ -136,7 +138,7 @@ class Search:
         else:
             rate, rounding = self.exact.values, self.exact.tolerance(0.0)
             size = np.abs(rate)
-            # What is zero comes out of rounding as some root of eps, and is not what grows.
+            # Rounding turns zero into some root of eps, which must not count as growth.
             zero = size <= np.maximum(ZERO_RATE * size.max(axis=0), rounding)
             rounding = np.maximum(rounding, BY_ITSELF * size.max(axis=0))
         fastest = np.where(size.max(axis=0) > 0.0, size.max(axis=0), np.abs(self.rates).max(axis=(0, 1)))
@@ -161,11 +163,11 @@ class Search:
         return eigen.eigen(P, eigen.slot_units(finish, units))
 
     def eigenvalues(self, dt: Array) -> tuple[Complex, Array]:
-        """Those of P, and how far rounding may have moved them. Past the range of numbers, they are infinite."""
+        """The eigenvalues of P, and how far rounding may have moved them; infinite where P is not finite."""
         P = self.matrix(dt)
         if len(P) > 2:
-            found = self.modes_of(P, self.finish(dt))
-            z, tolerance = found.values, found.tolerance()
+            spectrum = self.modes_of(P, self.finish(dt))
+            z, tolerance = spectrum.values, spectrum.tolerance()
         else:
             z = eigen.eigenvalues(P)
             tolerance = np.broadcast_to(eigen.tolerance(P), z.shape)
@@ -173,10 +175,12 @@ class Search:
         return np.where(finite, z, np.inf), np.where(finite, tolerance, 1.0)
 
     def growth(self, dt: Array) -> tuple[Array, Array, Any, Any]:
-        """Of the eigenvalue that is farthest outside the unit circle: how far it is, how far it may seem so by rounding.
+        """Which side of the unit circle the eigenvalues are on.
 
-        And where all are: 1 if that one grows, −1 if all damp, 0 if it is on the circle, for all one can see. And whether one can
-        not see, because eigenvalues that nearly meet are moved by too much.
+        Returns:
+            For the eigenvalue that is farthest outside: the distance from the circle and its tolerance. Then the side: 1 if it is
+            outside, −1 if all are inside, 0 if it is on the circle as far as rounding allows to see. Then whether this is in
+            doubt, because rounding moves eigenvalues that nearly meet by too much.
         """
         z, tolerance = self.eigenvalues(dt)
         beyond = np.abs(z) - 1.0
@@ -193,11 +197,11 @@ class Search:
 
     @property
     def rungs_at_once(self) -> int:
-        """How many rungs are computed at once."""
+        """The number of rungs computed at once."""
         return max(1, min(RUNGS_AT_ONCE, ELEMENTS_AT_ONCE // max(1, self.rates.size)))
 
     def limits(self) -> tuple[Array, Array]:
-        """The limit of each member, and the smallest step known to grow: another one where rounding hides what is between."""
+        """The limit of each member, and the smallest step known to grow: a larger one where rounding hides what is between."""
         fastest = np.where(self.fastest > 0.0, self.fastest, 1.0)
         none = len(LADDER)
         first = np.full(self.members, none)
@@ -234,15 +238,15 @@ class Search:
             high[at], blurred = part.crossing(*narrow, seek[at])
             doubtful[at] |= seek[at] & blurred & self.exactable
         grows = np.where(never, 0.0, np.where((first < none) & (self.fastest > 0.0), high, np.inf))
-        found = np.where(doubtful & ~never, sure, grows)
+        limits = np.where(doubtful & ~never, sure, grows)
         for index in np.argwhere(doubtful & ~never & self.exactable).tolist():
             at = tuple(index)
             step = exact.Step(checks.member(self.rates, at), maps.size(self.system)[0], self.method)
-            found[at] = grows[at] = in_many_digits(step, fastest[at], grows[at] if np.isfinite(grows[at]) else 0.0)
-        return found, grows
+            limits[at] = grows[at] = in_many_digits(step, fastest[at], grows[at] if np.isfinite(grows[at]) else 0.0)
+        return limits, grows
 
     def margins(self, dt: Array) -> tuple[Array, Array]:
-        """Of two states, what must not be below zero (1 − q, 1 + q − 2p, 1 + q + 2p), shape (3, …), and their rounding."""
+        """For two states, the margins 1 − q, 1 + q − 2p, 1 + q + 2p, negative if unstable, shape (3, …), and their rounding."""
         P = self.matrix(dt)
         (a, b), (c, d) = P
         with np.errstate(all="ignore"):
@@ -250,10 +254,10 @@ class Search:
             return np.stack([1.0 - q, 1.0 + q - twice_p, 1.0 + q + twice_p]), eigen.tolerance(P)
 
     def valleys(self, fastest: Array, low: Array, high: Array, first: Any, never: Any) -> tuple[Array, Array, Any]:
-        """The same enclosure, or an earlier one between two rungs, where a method grows for less than a rung's length.
+        """The same enclosure, or an earlier one between two rungs, where a method grows in a window that contains no rung.
 
-        Of two states stability is three smooth functions that must not be below zero. Where one has a valley on the ladder that
-        may go so deep, its lowest point is looked up.
+        A step of two states is stable if three smooth margins are not negative. Where one has a valley between rungs that may be
+        so deep, its lowest point is searched.
         """
         last = int(np.where(never, 0, np.minimum(first, len(LADDER) - 1)).max(initial=0))
         done = np.zeros(self.members, dtype=bool)
@@ -293,20 +297,21 @@ class Search:
         return low, high
 
     def crossing(self, low: Array, high: Array, seek: Any) -> tuple[Array, Truths]:
-        """Where the eigenvalue that leaves the unit circle crosses it, if it does so at an angle; else ``high``.
-
-        And whether rounding of that eigenvalue moves the crossing by more than ``MAX_CROSSING_ERROR`` of the step.
+        """The step at which the eigenvalue that leaves the unit circle crosses it, if it does so at an angle; else ``high``.
 
         Bisection stops where growth shows above rounding. The secant through |z| − 1 a little on both sides finds the crossing
         itself, because its errors on both sides cancel to the rounding of one.
+
+        Returns:
+            The steps, and whether rounding of that eigenvalue moves them by more than ``MAX_CROSSING_ERROR`` of the step.
         """
 
         def modes(dt: Array) -> tuple[Complex, Array, Complex]:
             if len(self.rates) == 2:
                 z, tolerance = self.eigenvalues(dt)
                 return z, tolerance, np.ones((1, *z.shape), dtype=np.complex128)
-            found = self.modes_of(self.matrix(dt), self.finish(dt))
-            return found.values, found.tolerance(), found.vectors
+            spectrum = self.modes_of(self.matrix(dt), self.finish(dt))
+            return spectrum.values, spectrum.tolerance(), spectrum.vectors
 
         start, tolerance, vectors = modes(high * (1.0 + 1e-6))
         largest = (np.abs(start) - tolerance).argmax(axis=0)[np.newaxis]
@@ -314,7 +319,7 @@ class Search:
         shape = np.take_along_axis(vectors, largest[np.newaxis], axis=1)[:, 0]
 
         def beyond(dt: Array) -> Array:
-            """Of the same mode. Another of any shape may be as near to z, as all slow ones are at 1."""
+            """|z| − 1 of the same mode, recognised by z and shape: all slow modes have a z near 1."""
             z, _, vectors = modes(dt)
             other = 1.0 - np.abs((shape.conj()[:, np.newaxis] * vectors).sum(axis=0))
             distance = np.abs(z - leaving) + other
@@ -338,10 +343,10 @@ class Search:
             b, above = np.where(inside, b, c), np.where(inside, above, value)
             if not at_an_angle.any():
                 break
-        found = np.where(at_an_angle, c, high)
+        limits = np.where(at_an_angle, c, high)
         if len(self.rates) > 2:
-            # The logarithm of the growth of two eigenvalues that met goes like the root of the excess; its square, a smooth
-            # function, is followed back to zero. Bisection stops early, where rounding of what nearly meets hides growth.
+            # The logarithm of the growth of two eigenvalues that met goes like the root of the excess. Its square is smooth and
+            # is extrapolated to zero, since bisection stops early, where rounding of eigenvalues that nearly meet hides growth.
             excess = 1e-5 * np.arange(1.0, 4.0)
             one, two, three = (np.log1p(beyond(high * (1.0 + x))) ** 2 for x in excess)
             bend = (one - 2.0 * two + three) / 2.0  # of the parabola through the three, over the number of the point, from 1 on
@@ -351,48 +356,51 @@ class Search:
                 k = -level / rise
                 k = k - (level + k * (rise + k * bend)) / (rise + 2.0 * k * bend)
             met = seek & ~at_an_angle & (np.abs(k) < MEETING_TOLERANCE)
-            found = np.where(met, high * (1.0 + excess[0] * k), found)
+            limits = np.where(met, high * (1.0 + excess[0] * k), limits)
         doubtful = seek & (np.abs(slope) < MIN_SLOPE)
         if len(self.rates) == 2:
-            z, _ = self.eigenvalues(found)
+            z, _ = self.eigenvalues(limits)
             doubtful |= at_an_angle & (np.abs(z[0] - z[1]) < NEARLY_DOUBLE)
         with np.errstate(invalid="ignore"):
             blurred = ~(np.take_along_axis(tolerance, largest, axis=0)[0] <= MAX_CROSSING_ERROR * np.abs(slope))
-        return self.exactly(found, doubtful), blurred
+        return self.exactly(limits, doubtful), blurred
 
     def exactly(self, limits: Array, flat: Any) -> Array:
-        """The limits of two states that leave the circle at so flat an angle, or so close together, that rounding moves them.
+        """The limits of two states, refined where eigenvalues leave the circle at a flat angle or close together (``flat``).
 
-        Of z² − 2pz + q, whose p and q are exact polynomials in dt, a pair is on the circle where q = 1, and a single eigenvalue
-        where 1 + q ∓ 2p = 0. Newton's steps from the crossing found go to the nearest of these.
+        There rounding moves the crossing. But p and q of z² − 2pz + q are exact polynomials in dt. A pair is on the circle where
+        q = 1, and a single eigenvalue where 1 + q ∓ 2p = 0. Newton's method leads from the crossing to the nearest of these
+        roots.
         """
         if len(self.rates) != 2 or self.v is not None or not flat.any():
             return limits
-        found = np.array(limits)
+        refined = np.array(limits)
         for at in map(tuple, np.argwhere(flat).tolist()):
             ((a, b), (c, d)), clock = exact.unrounded(checks.member(self.rates, at), maps.size(self.system)[0], self.method)
             twice_p, q, near = a + d, a * d - b * c, np.ldexp(limits[at], -clock)
-            # From a little below, so that of two that nearly meet (both eigenvalues, one after the other) the first is found.
+            # From a little below, so that the first of two roots that nearly meet is found (both eigenvalues, one after the
+            # other).
             margins = [f for f in (q - 1, 1 + q - twice_p, 1 + q + twice_p) if f.coefficients]
             roots = [(f, f.root_near(float(near * (1.0 - SEARCH_BELOW)))) for f in margins]
-            # A function that only nearly reaches zero (of a pair that nearly meets on the real line) has no root there.
+            # A margin that only nearly reaches zero (for a pair that nearly meets on the real line) has no root there.
             passed = [x for f, x in roots if abs(x / near - 1.0) < 10.0 * SEARCH_BELOW and passes_zero(f, x)]
             nearest = min(passed, default=min((x for _, x in roots), key=lambda x: abs(x - near)))
-            found[at] = np.ldexp(nearest, clock) if abs(nearest / near - 1.0) < RUNG_RATIO - 1.0 else limits[at]
-        return found
+            refined[at] = np.ldexp(nearest, clock) if abs(nearest / near - 1.0) < RUNG_RATIO - 1.0 else limits[at]
+        return refined
 
     def modes(self, limits: Array) -> tuple[Any, Complex]:
-        """The mode that begins to grow at each limit, a ``Mode`` or None, and its eigenvalue past that, of the members' shape."""
-        # Two steps for each: at the limit, and past it, where the mode that leaves is told from those that stay.
+        """The mode that begins to grow at each limit, a ``Mode`` or None, and its eigenvalue past the limit, shape (*members)."""
+        # Two steps for each member: at the limit, and past it, where the mode that leaves the circle differs from those that
+        # stay.
         fastest = np.where(self.fastest > 0.0, self.fastest, 1.0)
         known = np.isfinite(limits) & (limits > 0.0)
         at = np.where(known, limits, NEVER_STABLE_STEP / fastest)
         steps = np.stack([at, np.where(known, at * (1.0 + PAST_LIMIT), at)])
         z, tolerance = self.eigenvalues(steps)
         finish = self.finish(steps)
-        found = self.modes_of(self.matrix(steps), finish)
-        states = eigen.product("ij...,jk...->ik...", finish, found.own)[:, :, 1]
-        exact = eigen.matched(found.values[:, 1], states, self.exact)
+        spectrum = self.modes_of(self.matrix(steps), finish)
+        states = eigen.product("ij...,jk...->ik...", finish, spectrum.own)[:, :, 1]
+        exact = eigen.matched(spectrum.values[:, 1], states, self.exact)
 
         modes, left = np.empty(self.members, dtype=object), np.ones(self.members, dtype=np.complex128)
         for index in np.ndindex(self.members):
@@ -401,7 +409,7 @@ class Search:
             on, past = z[(slice(None), 0, *index)], z[(slice(None), 1, *index)]
             leaving = past[np.argmax(np.abs(past) - tolerance[(slice(None), 1, *index)])]
             crossing = on[np.argmin(np.abs(on - leaving))] if known[index] else np.complex128(1.0)
-            which = int(np.abs(found.values[(slice(None), 1, *index)] - leaving).argmin())
+            which = int(np.abs(spectrum.values[(slice(None), 1, *index)] - leaving).argmin())
             rate, shape = exact[(which, *index)], states[(slice(None), which, *index)]
             if rate.imag < 0.0:  # of a pair, the one that turns forwards
                 rate, shape, crossing, leaving = rate.conj(), shape.conj(), crossing.conj(), leaving.conj()
@@ -410,7 +418,10 @@ class Search:
         return modes, left
 
     def lift(self, modes: Any, steps: Array, past: Complex) -> None:
-        """Give modes of parts their shapes in the whole, a little past these steps, where these are their eigenvalues."""
+        """Replace the shapes of modes of parts by those in the whole system, a little past these steps.
+
+        ``past`` has the eigenvalues of the modes there.
+        """
         growing = np.isfinite(steps) & (steps > 0.0)
         dt = np.where(growing, steps * (1.0 + PAST_LIMIT), 1.0)
         P, finish = self.matrix(dt), self.finish(dt)
@@ -441,24 +452,24 @@ class Search:
         )
 
 
-#: What ``growth`` says of members that are not sought: on the circle, to a tolerance of any size, without doubt.
+#: The result of ``growth`` for members that are not sought: on the circle, with any tolerance, without doubt.
 NOTHING = (0.0, 1.0, 0, False)
 
 
 class Sought:
-    """The members of a search whose limit is still sought; what is asked of others is not computed."""
+    """The members of a search whose limit is still sought; nothing is computed for the others."""
 
     def __init__(self, search: Search) -> None:
-        self._search, self._part, self._at = search, search, ...  # of the part's members, where they stand among all
+        self._search, self._part, self._at = search, search, ...  # the places of the part's members among all
 
     def keep(self, members: Truths) -> Search:
-        """Let all but these members go, once they are less than half of those that are left. Returns the search of the rest."""
+        """Drop the other members once these are at most half of the remaining ones; returns the search of those that remain."""
         if 2 * np.count_nonzero(members) <= self._part.rates[0, 0].size:
             self._part, self._at = self._search.of(members)
         return self._part
 
     def growth(self, dt: Array) -> Any:
-        """``Search.growth`` of steps of shape (…, *members); of members that are not sought, that they neither grow nor damp."""
+        """``Search.growth`` of steps of shape (…, *members), with ``NOTHING`` for members that are not sought."""
         if self._at is ...:
             return self._search.growth(dt)
         of_part = self._part.growth(dt[(..., *self._at)])

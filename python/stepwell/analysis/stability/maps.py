@@ -19,8 +19,8 @@ from ...runs import engine
 from ...runs.engine import linear
 from ..derivatives import traced
 
-#: The imaginary part that stands for an infinitesimal. Its square is below the smallest number, so derivatives by the complex
-#: step, f'(x) = Im f(x + iε)/ε, have no truncation error.
+#: The step ε of derivatives by the complex step, f'(x) = Im f(x + iε)/ε. Its square is below the smallest number, so they have no
+#: truncation error.
 COMPLEX_STEP = 1e-200
 
 
@@ -32,8 +32,7 @@ def size(system: System) -> tuple[int, int]:
 def transition(system: System, method: Method, dt: Array) -> Array:
     """P of a linear system, of shape (n, n, *members): the unit vectors of the slots after a step.
 
-    A single step length goes through the core. Different ones go through the reference at once, which equals the core to the
-    last bit.
+    For one step length the core computes it; for several, the reference does so at once, with the same bits.
     """
     free = system.without_inputs()
     if dt.ndim == 0:
@@ -47,21 +46,21 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
     n = sum(size(system))
     q = np.zeros((n, len(system.input_names), *members))
     for j, name in enumerate(system.input_names):
-        held = system.with_pulse(name, np.ones(1), 1.0)
+        constant = system.with_pulse(name, np.ones(1), 1.0)
         if dt.ndim == 0:
-            one = linear.one_step(engine.Plan(held, method, held.batch, float(dt)))
+            one = linear.one_step(engine.Plan(constant, method, constant.batch, float(dt)))
             q[:, j] = one.reshape(n, *(1,) * (len(members) - one.ndim + 1), *one.shape[1:])
         else:
             v, y = (np.zeros((*shape, 1, *members)) for shape in (system.v_shape, system.y_shape))
-            q[:, j] = rows(system, *_step(held, method, dt, (1, *members), v, y))[:, 0]
+            q[:, j] = rows(system, *_step(constant, method, dt, (1, *members), v, y))[:, 0]
     return q
 
 
 def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: Array) -> Array:
     """P of any system at the state (v, y) and time t: the exact derivative of the reference step with respect to the slots.
 
-    By the complex step where the system's reference accepts complex numbers, else from the tape of the step, as that of a series,
-    which goes number by number. A projection of the system onto its energy is part of the step.
+    It is computed by the complex step where the system's reference accepts complex numbers and the method is no series, else from
+    the tape of the step. A projection of the system onto its energy is part of the step.
     """
     members = together(system, dt, v, y)
     slot = _started(system, method, dt, members, t, v, y) if method.carry else v
@@ -74,7 +73,7 @@ def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: A
 
 
 def rates(system: System, t: float = 0.0, v: Array | None = None, y: Array | None = None) -> Array:
-    """The matrix of the rates: A of a linear system, and otherwise their derivative at a state."""
+    """The matrix of the rates: A of a linear system, else the derivative of the rates at a state."""
 
     def both(v: Array, y: Array) -> Blocks:
         s = _scaled(system, np.asarray(1.0), (1, *members))
@@ -95,7 +94,7 @@ def finish(
 ) -> Array:
     """The linear map from slots to states: the identity for a method that carries v, else the derivative of its ``finish``.
 
-    That of a system which is not linear is taken at the state (v, y) and time t.
+    For a nonlinear system it is taken at the state (v, y) and time t.
     """
     n = sum(size(system))
     if not method.carry:
@@ -112,7 +111,7 @@ def finish(
 
 
 def _started(system: System, method: Method, dt: Array, members: Shape, t: float, v: Array, y: Array) -> Array:
-    """The carry of a method, where each member may have its own step."""
+    """The slot that a method carries in place of v, where each member may have its own step."""
     v, y = spread(v, system.v_shape, members), spread(y, system.y_shape, members)
     return method.steps.start(_scaled(system, dt, members), 0, t, v, y)
 
@@ -143,7 +142,7 @@ def _scaled(system: System, dt: Array, batch: Shape) -> Any:
 
 
 def _step(system: System, method: Method, dt: Array, batch: Shape, v: Array, y: Array) -> Blocks:
-    """A step of a linear system. Time stands still: what is given for an input is held."""
+    """A step of a linear system with h = 0 in its times, so that inputs keep their values."""
     with np.errstate(all="ignore"):
         return method.steps.step(_scaled(system, dt, batch), 0.0, 0.0, v, y)
 
@@ -155,9 +154,9 @@ def together(system: System, dt: Array, v: Array, y: Array) -> Shape:
 
 
 def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[[Any, Any], Blocks]) -> Array:
-    """The derivative of a function of both blocks by the complex step, in the direction of each number of a state.
+    """The derivative of a function of both blocks with respect to each number of a state, by the complex step.
 
-    Directions lie along the axis after the blocks'. Some are taken at once, so that memory has room for them and Ctrl-C is heard.
+    Directions lie along the axis after the blocks'. They are taken in chunks, so that the memory suffices and Ctrl-C is noticed.
     """
     n = sum(size(system))
 
@@ -175,7 +174,7 @@ def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[
             each[(slice(None),) * len(shape) + (some,)] for each, shape in ((unit_v, system.v_shape), (unit_y, system.y_shape))
         )
         with np.errstate(all="ignore"):
-            made = rows(system, *f(seeded(v, system.v_shape, along_v), seeded(y, system.y_shape, along_y)))
-            for row, of_row in zip(derivative, made, strict=True):  # the memory of all rows at once may take a second to get
+            values = rows(system, *f(seeded(v, system.v_shape, along_v), seeded(y, system.y_shape, along_y)))
+            for row, of_row in zip(derivative, values, strict=True):  # the memory of all rows at once may take a second to get
                 row[some] = of_row.imag / COMPLEX_STEP
     return derivative

@@ -7,10 +7,10 @@ those of Bᵀ·M⁻¹·B·diag(k), none of which is larger than the largest sum 
 spring from i to j these sum to Wᵢ/mᵢ + Wⱼ/mⱼ, with W the stiffness of all springs at a particle. It is the bound of ω². Dampers
 of the springs have the same form, and drag adds its largest drag/m.
 
-In a mode x of a damped net v̇ = −C·v − K·y each eigenvalue λ solves λ² + c·λ + κ = 0 with c = x*C·x and κ = x*K·x, x*x = 1: real
+For a mode x of a damped net v̇ = −C·v − K·y each eigenvalue λ solves λ² + c·λ + κ = 0 with c = x*C·x and κ = x*K·x, x*x = 1: real
 numbers between 0 and the bounds. A Runge-Kutta method is stable if it is for every such oscillator; so is False Euler, whose
-eigenvalues solve z² − (2 − h·c − h²·κ)·z + 1 − h·c = 0. As the step grows, oscillators come in at the upper bounds of κ and c
-only, so those are tried. Undamped, every method takes modes one by one, and its limit Φ is that of an oscillator.
+eigenvalues solve z² − (2 − h·c − h²·κ)·z + 1 − h·c = 0. As the step grows, new values of h·c and h²·κ appear at the upper bounds
+of κ and c only, so those are tried. In an undamped net every method steps each mode by itself, with the limit Φ of an oscillator.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ from ...model.parameters import aligned
 from ...model.systems import LinearSystem, Springs
 from .limit import stability_limit
 
-#: Oscillators that are tried along each of the two upper bounds.
+#: The number of oscillators that are tried along each of the two upper bounds.
 SAMPLES = 17
 
 
 def safe_step(springs: Springs, method: str | Method) -> Any:
     """The step below which a method is stable on a net, from bounds: see ``Springs.safe_step``."""
-    how = find_method(method)
-    fits_together(springs, how)
+    method = find_method(method)
+    fits_together(springs, method)
     by_mass = 1.0 / springs.masses
     by_mass = np.array(np.broadcast_to(by_mass, (springs.n, *by_mass.shape[1:])))
     by_mass[springs.fixed] = 0.0
     square = _bound(springs, springs.stiffness, by_mass)
     if springs.velocity_term is None:
-        return _shaped(_undamped(square, how), springs)
+        return _shaped(_undamped(square, method), springs)
     rate = np.zeros(()) if springs.damping is None else _bound(springs, springs.damping, by_mass)
     if springs.drag is not None:
         rate = rate + _share(springs.drag, by_mass).max(axis=0)
     square, rate = np.broadcast_arrays(square, rate)
-    return _shaped(_damped(square, rate, how), springs)
+    return _shaped(_damped(square, rate, method), springs)
 
 
 def _share(numbers: Array, by_mass: Array) -> Array:
@@ -54,12 +54,12 @@ def _share(numbers: Array, by_mass: Array) -> Array:
 
 
 def _wide(numbers: Array, axes: int) -> Array:
-    """Numbers with as many axes as others, those of the batch last."""
+    """Numbers of the particles with ``axes`` axes at least, those of the batch last."""
     return aligned(numbers, 1, (1,) * max(axes - 1, numbers.ndim - 1))
 
 
 def _bound(springs: Springs, numbers: Array, by_mass: Array) -> Array:
-    """The largest Wᵢ/mᵢ + Wⱼ/mⱼ of a spring from i to j with a number above zero, W the sum of the numbers at a particle."""
+    """The largest Wᵢ/mᵢ + Wⱼ/mⱼ over springs from i to j whose number is above zero; W sums the numbers at a particle."""
     numbers = np.broadcast_to(numbers, (len(springs.pairs), *numbers.shape[1:]))
     sums = np.zeros((springs.n, *numbers.shape[1:]))
     for ends in springs.pairs.T:
@@ -70,11 +70,11 @@ def _bound(springs: Springs, numbers: Array, by_mass: Array) -> Array:
     return largest
 
 
-def _damped(square: Array, rate: Array, how: Method) -> Array:
+def _damped(square: Array, rate: Array, method: Method) -> Array:
     """The least limit of oscillators with ω² and damping up to these bounds."""
     unit = np.maximum(np.sqrt(square), rate)  # of frequency
     still = unit == 0.0
-    if not how.limit:
+    if not method.limit:
         return np.where(still, np.inf, 0.0)
     unit = np.where(still, 1.0, unit)
     square, rate = square / unit**2, rate / unit
@@ -82,14 +82,14 @@ def _damped(square: Array, rate: Array, how: Method) -> Array:
     kappa = np.concatenate([np.broadcast_to(square, (SAMPLES, *square.shape)), parts * square])
     c = np.concatenate([parts * rate, np.broadcast_to(rate, (SAMPLES, *rate.shape))])
     one, none = np.ones(c.shape), np.zeros(c.shape)
-    limits = stability_limit(LinearSystem(np.array([[-c, -kappa], [one, none]]), velocities=1), how)
-    least = np.minimum(np.asarray(limits, dtype=np.float64).min(axis=0), _undamped(square, how))
+    limits = stability_limit(LinearSystem(np.array([[-c, -kappa], [one, none]]), velocities=1), method)
+    least = np.minimum(np.asarray(limits, dtype=np.float64).min(axis=0), _undamped(square, method))
     return np.where(still, np.inf, least / unit)
 
 
-def _undamped(square: Array, how: Method) -> Array:
-    """The limit of an oscillator of ω²; infinite for none."""
-    return np.where(square > 0.0, how.limit / np.sqrt(np.where(square > 0.0, square, 1.0)), np.inf)
+def _undamped(square: Array, method: Method) -> Array:
+    """The limit of an undamped oscillator with this ω²; infinite for ω² = 0."""
+    return np.where(square > 0.0, method.limit / np.sqrt(np.where(square > 0.0, square, 1.0)), np.inf)
 
 
 def _shaped(step: Array, springs: Springs) -> Any:

@@ -1,6 +1,6 @@
-"""Numbers that are not numbers: run a reference step on them and it says what it does.
+"""Polynomials that a reference step computes with in place of numbers.
 
-``Polynomial`` carries an unknown exactly. It lives in NumPy arrays of objects, whose operations are those of their elements, so
+``Polynomial`` stands for an expression in an unknown, exactly. NumPy arrays of objects apply the operations of their elements, so
 the reference needs no change for it.
 """
 
@@ -16,7 +16,7 @@ from ...reference.series import Series
 
 
 def exact(value: float | Fraction) -> Fraction:
-    """The fraction that a float stands for: a simple one that rounds to it if there is one (1/6), else the float's own value."""
+    """The fraction that a float stands for: a simple one that rounds to it if there is one (1/6), else its exact value."""
     if isinstance(value, Fraction):
         return value
     simple = Fraction(value).limit_denominator(100_000)
@@ -29,10 +29,10 @@ class Polynomial:
     __slots__ = ("coefficients",)
 
     def __init__(self, *coefficients: float | Fraction) -> None:
-        kept = [exact(c) for c in coefficients]
-        while kept and not kept[-1]:
-            kept.pop()
-        self.coefficients = tuple(kept)
+        fractions = [exact(c) for c in coefficients]
+        while fractions and not fractions[-1]:
+            fractions.pop()
+        self.coefficients = tuple(fractions)
 
     def __eq__(self, other: object) -> bool:
         return self.coefficients == other.coefficients if isinstance(other, Polynomial) else NotImplemented
@@ -77,16 +77,16 @@ class Polynomial:
     __rmul__ = __mul__
 
     def __call__(self, x: Any) -> Any:
-        """Its value, by Horner's rule; exact for a ``Fraction``."""
+        """The value at x, by Horner's rule; exact for a ``Fraction``."""
         value = x * 0
         for c in reversed(self.coefficients):
             value = value * x + (c if isinstance(x, Fraction) else float(c))
         return value
 
     def root_near(self, x: float) -> float:
-        """The root to which Newton's steps from ``x`` lead, with values that are exact; infinite if they lead nowhere."""
+        """The root that Newton's method reaches from ``x``, computed with exact values; infinite where the slope vanishes."""
         slope = Polynomial(*(k * c for k, c in enumerate(self.coefficients) if k))
-        for _ in range(64):  # a few, and one for each bit where the root is a double one
+        for _ in range(64):  # a few suffice, except one for each bit at a double root
             at = Fraction(x)
             value, rise = self(at), slope(at)
             if not value:

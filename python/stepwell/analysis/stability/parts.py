@@ -26,18 +26,18 @@ from . import eigen, exact, maps
 from .eigen import EPS, Complex
 from .expansion import polynomials
 
-#: An eigenvalue whose rounding is 1/|wᴴx| = this times that of the matrix is found in more digits: it nearly meets another.
+#: An eigenvalue with a condition 1/|wᴴx| above this is computed in more digits: it nearly meets another.
 MAX_CONDITION = 1e3
 
-#: A rate of which rounding hides whether it grows, and more than this part of it, is found in more digits: others are faster.
+#: A rate is computed in more digits if rounding hides whether it grows and is above this fraction of it: others are much faster.
 SLOW_RATE = 1e-9
 
-#: What the rounding of A may have made of zero, or of an imaginary rate, is taken for that if it is below this part of the size.
+#: A rate, or a real part, that the rounding of A explains counts as zero if it is below this fraction of the size.
 ROUNDED_ZERO = 1e-6
 
 
 class Part(NamedTuple):
-    """A system of its own: ``matrix`` of the rates in the order (v, y), and how many of its states are velocities."""
+    """A linear system: ``matrix`` of the rates in the order (v, y), and the number of its states that are velocities."""
 
     matrix: Array
     velocities: int
@@ -47,7 +47,7 @@ class Rates(NamedTuple):
     """Eigenvalues of a matrix of rates.
 
     Attributes:
-        values: shape (n,); a pair stands with its positive angle first.
+        values: shape (n,); a pair has its positive angle first.
         decided: whether they are known to double precision, or well enough to decide which modes grow.
     """
 
@@ -58,20 +58,20 @@ class Rates(NamedTuple):
 def rates(matrix: Array) -> Rates:
     """The eigenvalues of a matrix of rates, refined to double precision where needed.
 
-    Elements that come from data are rounded: of 2/3 the last digit. A real or imaginary part below a millionth that this rounding
-    explains is set to zero.
+    The elements of a matrix are rounded, such as 2/3 in its last digit. A real or imaginary part below a millionth that this
+    rounding explains is set to zero.
     """
     n = len(matrix)
     if n == 1:
         return Rates(np.array(matrix[0], dtype=np.complex128), True)
-    found = eigen.eigen(matrix)
-    values, tolerance = found.values, found.tolerance(0.0)
+    spectrum = eigen.eigen(matrix)
+    values, tolerance = spectrum.values, spectrum.tolerance(0.0)
     fastest = np.abs(values).max()
-    meet = (tolerance > 16.0 * n * EPS * found.size * MAX_CONDITION).any()
+    meet = (tolerance > 16.0 * n * EPS * spectrum.size * MAX_CONDITION).any()
     slow = ((np.abs(values.real) <= tolerance) & (tolerance > SLOW_RATE * np.abs(values)) & (values != 0.0)).any()
     if n <= exact.MAX_ROWS and (meet or slow):
-        values = exact.eigenvalues(matrix * found.units / found.units[:, np.newaxis], values)
-        rounding = _by_rounding(matrix, values, found)
+        values = exact.eigenvalues(matrix * spectrum.units / spectrum.units[:, np.newaxis], values)
+        rounding = _by_rounding(matrix, values, spectrum)
         beside = np.minimum(rounding, ROUNDED_ZERO * np.abs(values))
     else:
         rounding = tolerance
@@ -82,69 +82,69 @@ def rates(matrix: Array) -> Rates:
     return Rates(values, n <= exact.MAX_ROWS or not meet)
 
 
-def _by_rounding(matrix: Array, values: Complex, found: eigen.Eigen) -> Array:
-    """How far eigenvalues move if each element of the matrix is moved by some eps of itself, shape (n,).
+def _by_rounding(matrix: Array, values: Complex, spectrum: eigen.Eigen) -> Array:
+    """How far eigenvalues move if each element of the matrix changes by some eps of itself, shape (n,).
 
-    That is Σ|wᵢ||aᵢⱼ||xⱼ|/|wᴴx| of left and right vectors (Higham 2002, §3 and §7): much less than by some eps of its norm where
-    elements are of unlike size.
+    That is Σ|wᵢ||aᵢⱼ||xⱼ|/|wᴴx| with left and right vectors (Higham 2002, §3 and §7): much less than for a change by some eps of
+    the norm where elements have very different sizes.
     """
-    vectors = found.vectors
-    size = np.abs(matrix * found.units / found.units[:, np.newaxis])
+    vectors = spectrum.vectors
+    size = np.abs(matrix * spectrum.units / spectrum.units[:, np.newaxis])
     try:
         left = np.linalg.inv(vectors)
     except np.linalg.LinAlgError:
         return np.full(len(values), np.inf)
     moved = 4.0 * EPS * np.einsum("ki,ij,jk->k", np.abs(left), size, np.abs(vectors))
-    return np.asarray(moved[np.abs(values[:, np.newaxis] - found.values).argmin(axis=1)])
+    return np.asarray(moved[np.abs(values[:, np.newaxis] - spectrum.values).argmin(axis=1)])
 
 
 def parts(matrix: Array, velocities: int, method: Method) -> list[Part]:
-    """The parts of ṡ = A·s whose steps have all eigenvalues of its step but those that are 1 at every step.
+    """The parts of ṡ = A·s: their steps have all eigenvalues of its step, except those that are always 1.
 
     Args:
         matrix: A in the order (v, y), shape (n, n).
         velocities: how many of the states are velocities.
-        method: what steps them.
+        method: the method.
     """
-    found: list[Part] = []
+    decomposed: list[Part] = []
     for states in components(matrix):
         part = Part(matrix[np.ix_(states, states)], int((states < velocities).sum()))
-        if part.matrix.any():  # else it stays as it is by every method
-            found += _split(part, method) if len(states) > 2 else [part]
-    return found
+        if part.matrix.any():  # else it is constant
+            decomposed += _split(part, method) if len(states) > 2 else [part]
+    return decomposed
 
 
 def components(matrix: Array) -> list[np.ndarray[Any, np.dtype[np.intp]]]:
-    """The states that drive each other, in a circle, however long: those of each such part, in their order."""
+    """The strongly connected components of the states: groups whose states all drive each other, in their order."""
     drives = matrix != 0.0  # which column drives which row
 
     def reached(drives: eigen.Truths, start: int) -> eigen.Truths:
-        found = np.zeros(len(drives), dtype=np.bool_)
-        found[start] = True
-        while (more := found | drives[:, found].any(axis=1)).sum() > found.sum():
-            found = more
-        return found
+        seen = np.zeros(len(drives), dtype=np.bool_)
+        seen[start] = True
+        while (more := seen | drives[:, seen].any(axis=1)).sum() > seen.sum():
+            seen = more
+        return seen
 
-    found, left = [], np.ones(len(matrix), dtype=np.bool_)
+    groups, left = [], np.ones(len(matrix), dtype=np.bool_)
     for i in range(len(matrix)):
         if left[i]:
             both = reached(drives, i) & reached(drives.T, i)
-            found.append(np.flatnonzero(both))
+            groups.append(np.flatnonzero(both))
             left &= ~both
-    return found
+    return groups
 
 
 def spectra(matrix: Array, velocities: int, method: Method, dt: Array) -> tuple[Complex, Complex]:
-    """The eigenvalues of steps by parts, and the rates that they continue, both of shape (n, steps).
+    """The eigenvalues of steps, computed by parts, and the rates that they continue, both of shape (n, steps).
 
     Args:
         matrix: A in the order (v, y), shape (n, n).
         velocities: how many of the states are velocities.
-        method: what steps them.
+        method: the method.
         dt: the steps, shape (steps,).
     """
     z, exactly = np.ones((len(matrix), len(dt)), dtype=np.complex128), np.zeros((len(matrix), len(dt)), dtype=np.complex128)
-    k = 0  # what is in no part stays as it is: z = 1
+    k = 0  # states that are in no part are constant: z = 1
     for part in parts(matrix, velocities, method):
         n = len(part.matrix)
         rows = slice(k, k := k + n)
@@ -166,7 +166,7 @@ def spectra(matrix: Array, velocities: int, method: Method, dt: Array) -> tuple[
 
 
 def _split(part: Part, method: Method) -> list[Part]:
-    """A part of which all states hang together, split further if its step is a function of one matrix."""
+    """A connected part, split further if its step is a function of one matrix."""
     matrix, n_v = part
     n = len(matrix)
     if 2 * n_v == n:
@@ -174,31 +174,31 @@ def _split(part: Part, method: Method) -> list[Part]:
         multiples = [[_multiple(b) for b in row] for row in blocks]
         for i, j in ((0, 1), (1, 0)):
             if all(multiples[k][m] is not None for k in range(2) for m in range(2) if (k, m) != (i, j)):
-                found = rates(blocks[i][j])
-                if found.decided:
-                    return [_with(multiples, i, j, value) for value in found.values if value.imag >= 0.0]
+                eigenvalues = rates(blocks[i][j])
+                if eigenvalues.decided:
+                    return [_with(multiples, i, j, value) for value in eigenvalues.values if value.imag >= 0.0]
     if function_of_rates(method) or n_v in (0, n):
-        found = rates(matrix)
-        if found.decided:
+        eigenvalues = rates(matrix)
+        if eigenvalues.decided:
             turning = n_v // n * 2 if n_v in (0, n) else 1
-            ones = [value for value in found.values if value.imag >= 0.0 and value != 0.0]
+            ones = [value for value in eigenvalues.values if value.imag >= 0.0 and value != 0.0]
             return [Part(_turning(z), turning) if z.imag else Part(np.array([[z.real]]), n_v // n) for z in ones]
     return [part]
 
 
 def _multiple(block: Array) -> float | None:
-    """The number of which a block is a multiple of the identity, or None."""
+    """The number c if a block is c times the identity, else None."""
     value = block[0, 0]
     return float(value) if (block == value * np.eye(len(block))).all() else None
 
 
 def _turning(z: complex) -> Array:
-    """The matrix of a pair."""
+    """The real matrix with the eigenvalues z and its conjugate."""
     return np.array([[z.real, -z.imag], [z.imag, z.real]])
 
 
 def _with(multiples: list[list[float | None]], i: int, j: int, value: complex) -> Part:
-    """A part of two numbers, or of two pairs, with an eigenvalue in place of a block."""
+    """A part of two numbers, or of four for a complex eigenvalue, with the eigenvalue in place of a block."""
     one = np.eye(2) if value.imag else np.eye(1)
     rows = [[one * (m or 0.0) for m in row] for row in multiples]
     rows[i][j] = _turning(value) if value.imag else value.real * one
@@ -207,7 +207,7 @@ def _with(multiples: list[list[float | None]], i: int, j: int, value: complex) -
 
 @cache
 def function_of_rates(method: Method) -> bool:
-    """Whether a step of ṡ = A·s is a polynomial in h·A: it treats both blocks alike. Asked of one matrix, in fractions."""
+    """Whether a step of ṡ = A·s is a polynomial in h·A: the method treats both blocks alike. Tested exactly on one matrix."""
     a = np.array([[2.0, 3.0], [-5.0, 7.0]])
     both = LinearSystem(a, velocities=1)
     try:

@@ -1,7 +1,7 @@
 """Small motions of a net of springs about a state: a linear system of the particles that are not fixed.
 
-A fixed particle keeps any velocity, and a net without one drifts. Of a linear system ``parts`` finds such motions exactly and
-sets them aside; in the eigenvalues of a whole step their rounding would hide the limit.
+A fixed particle keeps any velocity, and a net without one drifts. ``parts`` finds such motions of a linear system exactly and
+removes them; in the eigenvalues of a whole step their rounding would hide the limit.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ def free_numbers(springs: Springs) -> Any:
 
 
 def linearised(springs: Springs, v: Array, y: Array) -> LinearSystem:
-    """The rates of small disturbances of a state, its batch last; velocities first."""
+    """The linear system of small disturbances of a state, velocities first, with the batch of the state."""
     free = free_numbers(springs)
-    kept = np.concatenate([free, springs.n * springs.y_shape[1] + free])
-    return LinearSystem(maps.rates(springs, 0.0, v, y)[np.ix_(kept, kept)], velocities=len(free))
+    free_states = np.concatenate([free, springs.n * springs.y_shape[1] + free])
+    return LinearSystem(maps.rates(springs, 0.0, v, y)[np.ix_(free_states, free_states)], velocities=len(free))
 
 
 def lifted(springs: Springs, mode: Mode | None) -> Mode | None:
-    """A mode of the small motions as one of the net."""
+    """A mode of the small motions as a mode of the whole net."""
     if mode is None:
         return None
     blocks = [np.zeros(springs.y_shape, dtype=np.complex128) for _ in range(2)]

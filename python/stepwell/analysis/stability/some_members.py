@@ -1,4 +1,4 @@
-"""Some members of a batch of which something is sought, so that those that have it take no more time."""
+"""Some members of a batch, so that a search takes no more time for members that have their result."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from . import maps
 
 
 class Batch:
-    """A system, and a state if there is one, of which some members can be taken. These are counted along one axis."""
+    """A system, and a state if there is one, from which some members can be taken, by their indices in the flattened batch."""
 
     def __init__(self, system: System, method: Method, v: Array | None, y: Array | None, members: Shape) -> None:
         self._system = system
-        # A system that is the same for all members stays the same object, whose derivatives are traced already.
+        # A system without a batch stays the same object, so that its cached derivatives are found.
         self._every = Members(engine.Plan(system, method, members, 1.0)) if system.batch else None
         self._blocks: list[Array] | None = None
         if v is not None and y is not None:
@@ -28,7 +28,7 @@ class Batch:
             self._blocks = [maps.spread(block, shape, members).reshape((*shape, count)) for block, shape in both]
 
     def of(self, index: Any) -> tuple[System, Array | None, Array | None]:
-        """The system and the state of these members."""
+        """The system and the state of the members with these indices."""
         system = self._system if self._every is None else self._every.plan(index).system
         if self._blocks is None:
             complete(system, without_inputs=partial(changed, system))  # it has none
