@@ -127,7 +127,7 @@ def paper() -> str:
     parts = []
     for section in dict.fromkeys(entry.section for entry in sw.paper.entries()):
         entries = sw.paper.entries(section)
-        columns = [(entry.kind, entry.says, entry.corrected or "—", entry.here, entry.run().found) for entry in entries]
+        columns = [(entry.kind, entry.says, entry.corrected or "—", entry.here, entry.run().numbers) for entry in entries]
         rows = [[cell.replace("|", "\\|") for cell in row] for row in columns]
         parts.append(f"## {section}\n\n" + table(("what", "the document says", "right instead", "here", "found"), rows))
     return "\n" + "\n".join(parts) + "\n"

@@ -123,7 +123,7 @@ def test_both_ends_of_what_is_carried() -> None:
 def test_what_cannot_be_explained_says_so() -> None:
     bodies = sw.NBody([1.0, 1.0])
     for system, method, how, said in (
-        (sw.Oscillator(), "merson", {"attempt": True}, "attempt: one of float32 is two lists"),
+        (sw.Oscillator(), "merson", {"attempt": True}, "attempt: in float32 an attempt is two lists"),
         (sw.Oscillator(), "taylor", {}, "dtype: float32 does not go with taylor"),
         (bodies, "rk4", {"record": "energy"}, "record: float32 runs compute it of the saved states, in float64"),
         (sw.Oscillator(a=sw.Sampled([1.0, 2.0], 1.0)), "rk4", {}, "dtype: a listing has numbers of one width"),

@@ -18,8 +18,8 @@ PAGE = Path(__file__).parent.parent / "docs" / "theory" / "paper.md"
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=[f"{entry.section}-{entry.name}" for entry in ENTRIES])
 def test_each_statement_is_reproduced(entry):
-    found = entry.run()
-    assert found.holds, found.found
+    finding = entry.run()
+    assert finding.holds, finding.numbers
 
 
 def test_every_section_of_the_document_is_there():

@@ -19,7 +19,7 @@ ROOT_TOLERANCE = 4.0 * np.finfo(float).eps
 #: Shorter brackets have no roundings of their own.
 LEAST = float(np.finfo(float).tiny)
 
-#: The share of a step over which an event function's slope is taken: its roundings, over this, are half of the digits.
+#: The fraction of a step over which the slope of an event function is taken: rounding then takes half of its digits.
 SHORT = 2.0**-26
 
 #: The most values of an event function for one zero; bisection alone needs fewer than this many for any interval of floats.
@@ -27,14 +27,14 @@ MAX_VALUES = 2200
 
 
 class Event:
-    """An event function with what SciPy reads of its attributes.
+    """An event function with the attributes that SciPy reads.
 
     Attributes:
-        terminal: after how many occurrences the run ends; infinite if it does not.
+        terminal: the number of zeros after which the run ends; infinite if they do not end it.
         direction: above zero for zeros where the function grows, below zero where it falls, zero for both.
-        count: how many were found so far.
-        times: when.
-        states: the states then.
+        count: the number of zeros so far.
+        times: their times.
+        states: the states at these times.
     """
 
     def __init__(self, function: Any, args: tuple[Any, ...]) -> None:
@@ -54,13 +54,13 @@ class Event:
 
     def value(self, t: float, y: Array) -> float:
         """The value of the function."""
-        made = checks.as_array("events", self._function(t, y, *self._args))
-        if made.size != 1 or made.dtype.kind not in "biuf":
-            raise DTypeError(f"events: expected a function that returns one real number, got {checks.short(made)}")
-        return float(made.reshape(-1)[0])
+        value = checks.as_array("events", self._function(t, y, *self._args))
+        if value.size != 1 or value.dtype.kind not in "biuf":
+            raise DTypeError(f"events: expected a function that returns one real number, got {checks.short(value)}")
+        return float(value.reshape(-1)[0])
 
     def occurs(self, before: float, after: float) -> bool:
-        """Whether the values at both ends of a step have a zero between them, in the direction that is asked for."""
+        """Whether the function has a zero between these values at both ends of a step, in its ``direction``."""
         grows, falls = before <= 0.0 <= after, before >= 0.0 >= after
         return (grows and self.direction >= 0.0) or (falls and self.direction <= 0.0)
 
@@ -111,9 +111,10 @@ def root(g: Callable[[float], float], a: float, b: float, g_a: float, g_b: float
 def _parts(
     g: Callable[[float], float], span: tuple[float, float], before: float, g_a: float, g_b: float
 ) -> list[tuple[float, float, float, float]]:
-    """The parts of a step in which an event function has one zero: their times, and its values there.
+    """The parts of a step in which an event function has at most one zero: the times and the values at both ends of each.
 
-    That is the step itself, unless the function bends so much against the step before that it may have others.
+    The whole step is the only part, unless the function bends so much, compared with the step before, that it may have more
+    zeros.
     """
     begin, end = span
     h = end - begin
@@ -138,13 +139,13 @@ def _parts(
     return list(zip(*times, parts.g_low.tolist(), parts.g_high.tolist(), strict=True))
 
 
-def found(
+def note_zeros(
     events: list[Event], values: list[list[float]], state: Callable[[float], Array], span: tuple[float, float]
 ) -> float | None:
-    """Note the events of a step that goes over ``span``; the time at which the run ends by one of them, or None.
+    """Record the zeros of events in a step over ``span``; returns the time at which one of them ends the run, or None.
 
-    ``values`` are those of the event functions where the step before began, NaN at first, where this one begins, and where it
-    ends; ``state`` gives the state at a time within it.
+    ``values`` are those of the event functions at the start of the step before (NaN in the first step), at the start and at the
+    end of this one; ``state`` returns the state at a time within it.
     """
     begin, end = span
     zeros = []

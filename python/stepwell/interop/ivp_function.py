@@ -17,11 +17,11 @@ from ..model.equations.namespace import rebound
 
 
 class RightHandSide:
-    """What ``stepwell.system`` runs in place of a function: with the arguments given, and with time reversed on request.
+    """The function that ``stepwell.system`` runs in place of ``fun``: with its further arguments, and backward in time if asked.
 
     Args:
-        fun: a function, a method, a ``functools.partial`` or an object that can be called.
-        args: what it is given after t and y.
+        fun: a function, a method, a ``functools.partial`` or another callable.
+        args: its arguments after t and y.
         size: length of the state.
         vectorized: whether it expects the state as a column.
         backward: whether the time of the system is −t, for runs from a later to an earlier time.
@@ -36,13 +36,13 @@ class RightHandSide:
 
     def __call__(self, t: Any, y: Any) -> Any:
         """The rates of a state."""
-        made = self._call(-t if self._backward else t, y[:, np.newaxis] if self._vectorized else y, *self._args)
-        shape = np.shape(made)
+        rates = self._call(-t if self._backward else t, y[:, np.newaxis] if self._vectorized else y, *self._args)
+        shape = np.shape(rates)
         if shape == () and self._size == 1:
-            made = [made]
+            rates = [rates]
         elif len(shape) == 2 and shape[1] == 1:
-            made = [row[0] for row in made]
-        return [-each for each in made] if self._backward else made
+            rates = [row[0] for row in rates]
+        return [-each for each in rates] if self._backward else rates
 
     def system(self) -> Any:
         """The system of these rates.
@@ -74,7 +74,7 @@ def plain_function(fun: Any) -> Any:
 
 
 def traceable(fun: Any) -> Callable[..., Any]:
-    """The same callable, in whose functions ``np`` and ``math`` accept what is not known yet.
+    """The callable with ``np`` and ``math`` replaced in its functions, so that they accept symbols.
 
     Raises:
         DTypeError: if there is no Python function to trace.
@@ -82,8 +82,8 @@ def traceable(fun: Any) -> Callable[..., Any]:
     if isinstance(fun, partial):
         return partial(traceable(fun.func), *fun.args, **fun.keywords)
     if isinstance(fun, FunctionType):
-        made: Callable[..., Any] = rebound(fun)
-        return made
+        traced: Callable[..., Any] = rebound(fun)
+        return traced
     function = plain_function(fun)
     if not isinstance(function, FunctionType):
         raise DTypeError(
@@ -110,12 +110,12 @@ def takes(argument: str, function: Any, args: tuple[Any, ...]) -> None:
     """Raise if a function cannot be called with a time, a state and the further arguments.
 
     Raises:
-        ArgumentError: what it takes, and how many are given.
+        ArgumentError: the parameters of the function, and the number of arguments.
     """
     name = checks.short(getattr(function, "__name__", type(function).__name__))[1:-1]
     try:
         expected = inspect.signature(function)
-    except (TypeError, ValueError):  # what is not written in Python may not tell
+    except (TypeError, ValueError):  # functions that are not written in Python may have no signature
         return
     try:
         expected.bind(None, None, *args)

@@ -1,4 +1,4 @@
-"""The adaptive steps of one trajectory one by one, and its states between them, for ``solve_ivp``."""
+"""Single adaptive steps of one trajectory, and the states between their ends, for ``solve_ivp``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..reference import adaptive
 from ..reference.acceptance import Acceptance
 from ..runs import engine
 
-#: How many attempts at steps a run may make in one go: as many as are exact in the controller's numbers.
+#: The most attempts at steps in one run: up to here the counts of the step-size controller are exact.
 MAX_ATTEMPTS = 2**53 - 1
 
 #: Why a run ended early, by the status of the core.
@@ -26,14 +26,14 @@ FAILURES = {
 
 
 class Trajectory:
-    """Steps of one trajectory, made one at a time; the time of the system grows, whatever the direction of the user's.
+    """One trajectory, stepped one step at a time; the time of the system grows, whatever the direction of the user's.
 
     Attributes:
-        times: ends of the accepted steps, the start first.
-        states: the states there.
-        pace: where the step-size controller stands.
-        status: that of the core: ``adaptive.OK`` when the end was reached, ``adaptive.BUDGET`` before.
-        extra_steps: how many extra steps were made for states between the ends of steps.
+        times: the start and the ends of the accepted steps.
+        states: the states at these times.
+        pace: the state of the step-size controller.
+        status: the status of the core: ``adaptive.OK`` when the end was reached, ``adaptive.BUDGET`` before.
+        extra_steps: the number of extra steps for states between the ends of steps.
     """
 
     def __init__(self, system: Any, method: Method, span: tuple[float, float], y: Array, tolerance: tuple[Array, Array]) -> None:
@@ -61,15 +61,15 @@ class Trajectory:
     @property
     def evaluations(self) -> int:
         """Function evaluations so far."""
-        made = self.pace.accepted + self.pace.rejected + self.pace.extra_steps
-        return self._method.attempt_evaluations * (int(made) + self.extra_steps)
+        attempts = self.pace.accepted + self.pace.rejected + self.pace.extra_steps
+        return self._method.attempt_evaluations * (int(attempts) + self.extra_steps)
 
     def advance(self) -> bool:
-        """Make one step, after as many attempts as it takes; whether there was one."""
+        """Make one step, with as many attempts as needed; returns whether a step was made."""
         while self.status == adaptive.BUDGET:
             accepted = float(self.pace.accepted)
             attempts = int(accepted + self.pace.rejected) + 1
-            saved, last = self._made(self.pace, self.states[-1], np.array([self.end]), attempts)
+            saved, last = self._continued(self.pace, self.states[-1], np.array([self.end]), attempts)
             if self.status == adaptive.OK:
                 self.times.append(self.end)
                 self.states.append(saved[0])
@@ -81,46 +81,46 @@ class Trajectory:
         return False
 
     def straight_to_the_end(self, times: Array) -> Array:
-        """The states at ascending times, the last of which is the end; as many as were reached."""
-        saved, _ = self._made(self.pace, self.states[-1], times, MAX_ATTEMPTS)
+        """The states at ascending times up to the end, as many as were reached."""
+        saved, _ = self._continued(self.pace, self.states[-1], times, MAX_ATTEMPTS)
         return saved[: len(times) if self.status == adaptive.OK else int((times <= float(self.pace.t)).sum())]
 
     def state(self, t: float) -> Array:
         """The state at one time."""
-        made: Array = self.at(np.array([t]))[:, 0]
-        return made
+        state: Array = self.at(np.array([t]))[:, 0]
+        return state
 
     def at(self, times: Array) -> Array:
-        """The states at times from the start to the end of the steps so far, shape (numbers, times).
+        """The states at times from the start to the end of the steps so far, shape (n, times).
 
-        Each is computed by a step of the method from the end of the step before it, so its error is that of a shorter step.
+        Each is computed by a step of the method from the end of a step before it, so its error is that of a shorter step.
         """
-        made = np.empty((len(self.states[0]), len(times)))
+        states = np.empty((len(self.states[0]), len(times)))
         if not len(times):
-            return made
+            return states
         ends = np.array(self.times)
         steps = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 1)
         on_end = ends[steps] == times
         for k in np.flatnonzero(on_end):
-            made[:, k] = self.states[steps[k]]
+            states[:, k] = self.states[steps[k]]
         for i in np.unique(steps[~on_end]):
             within = np.flatnonzero((steps == i) & ~on_end)
             targets, places = np.unique(times[within], return_inverse=True)
-            made[:, within] = self._within(int(i), targets).T[:, places.reshape(-1)]
-        return made
+            states[:, within] = self._within(int(i), targets).T[:, places.reshape(-1)]
+        return states
 
     def _within(self, i: int, times: Array) -> Array:
-        """The states at ascending times within a step, which the controller takes for one that passes them."""
+        """The states at ascending times within a step, by extra steps from its start."""
         longer = 2.0 * (times[-1] - self.times[i])
         pace = self.pace._replace(t=self.times[i], h=longer, held=1.0, extra=0.0)
         before = self.pace, self.status
-        saved, _ = self._made(pace, self.states[i], times, MAX_ATTEMPTS)
+        saved, _ = self._continued(pace, self.states[i], times, MAX_ATTEMPTS)
         self.pace, self.status = before
         self.extra_steps += len(times)
         return saved
 
-    def _made(self, pace: Any, y: Array, times: Array, attempts: int) -> tuple[Array, Array]:
-        """Go on from a pace and a state: the states at the times, and the one where the controller stands then."""
+    def _continued(self, pace: Any, y: Array, times: Array, attempts: int) -> tuple[Array, Array]:
+        """Step on from a pace and a state; returns the states at these times, and the last state."""
         n = len(y)
         saved_v, saved_y = np.empty((len(times), 0)), np.empty((len(times), n))
         last, status = np.empty((n, 1)), np.empty(1, dtype=np.int64)
@@ -135,14 +135,14 @@ class Trajectory:
 class Solution:
     """The states of a trajectory at any time between its ends: ``sol`` of ``solve_ivp``.
 
-    Called with a time it returns the state, shape (n,); with times along one axis, their states, shape (n, times). Each is made
-    by one step of the method, from the end of the step before it: so many function evaluations more, and the error of a shorter
-    step.
+    Called with a time it returns the state, shape (n,); with times along one axis, their states, shape (n, times). Each is
+    computed by a step of the method from the end of the step before it. That takes the function evaluations of a step and has the
+    error of a shorter one.
 
     Attributes:
-        ts: the ends of the steps, in the direction of the run.
-        t_min: the earliest of them.
-        t_max: the latest.
+        ts: the start and the ends of the steps, in the direction of the run.
+        t_min: the earliest of these times.
+        t_max: the latest of these times.
         n_segments: the number of steps.
     """
 

@@ -1,7 +1,7 @@
-"""A run as named arrays and a description in JSON, and back: nothing in a file is code, and reading it runs none.
+"""A run as named arrays and a description in JSON, and back: a file contains no code, and reading it runs none.
 
-Only objects of the kinds listed here are made. A function is never stored: an own system is saved as the name of its function and
-a digest of its operations, and the function must be there when the file is read.
+Only objects of the kinds listed here are created. A function is never stored: of an own system the name of its function and a
+digest of its operations are saved, and the function must exist when the file is read.
 """
 
 from __future__ import annotations
@@ -31,30 +31,30 @@ from ..runs.result import Run
 
 Arrays = dict[str, Any]
 
-#: What goes through the steps of a run again, under the names of its attributes; see ``Run``.
+#: Functions that repeat the steps of a run, by the names of its attributes; see ``Run``.
 RERUNS: dict[str, Callable[..., Any]] = {
     "collision": encounters.collision,
     "encounter": encounters.of_member,
     "overshoots": encounters.overshoots,
 }
 
-#: The first key of an object of JSON tells what it stands for.
+#: The first key of an object of JSON; its value is the kind of the object.
 KIND = "is"
 
 
 def kinds(base: type[Any] = Immutable) -> dict[str, type[Any]]:
-    """Classes of stepwell below one, by name: below ``Immutable`` there are systems, controls, surfaces and inputs."""
-    found, todo = {}, [base]
+    """The subclasses of a class in stepwell, by name: those of ``Immutable`` are systems, controls, surfaces and inputs."""
+    classes, todo = {}, [base]
     while todo:
         for each in todo.pop().__subclasses__():
             todo.append(each)
             if each.__module__.startswith("stepwell.") and not each.__module__.startswith("stepwell.views."):
-                found[each.__name__] = each
-    return found
+                classes[each.__name__] = each
+    return classes
 
 
 class Writer:
-    """Takes a run apart; ``arrays`` is filled meanwhile."""
+    """Writes the description of a run, and collects its arrays in ``arrays``."""
 
     def __init__(self) -> None:
         self.arrays: Arrays = {}
@@ -100,7 +100,7 @@ class Writer:
             case tuple() if type(value) is not tuple:
                 fields = dict(zip(type(value)._fields, value, strict=True))  # type: ignore[attr-defined]  # a named tuple
                 if isinstance(value, engine.Plan):
-                    fields |= {"progress": None, "watched": None}  # the one was shown, and the other looked for
+                    fields |= {"progress": None, "watched": None}  # they are of use during the run only
                 return {KIND: type(value).__name__, "parts": self._parts(fields, name)}
             case tuple():
                 return {KIND: "tuple", "items": [self._part(each, f"{name}.{i}") for i, each in enumerate(value)]}
@@ -120,35 +120,35 @@ class Writer:
         state: Any = value.__getstate__()
         if type(value) not in kinds().values():
             raise ArgumentError(f"run: expected a system of stepwell, or of your own equations, got {type(value).__name__}")
-        made = {KIND: type(value).__name__, "parts": self._parts(state, name)}
+        description = {KIND: type(value).__name__, "parts": self._parts(state, name)}
         if isinstance(value, OwnSystem) and not value.definition.__module__.startswith("stepwell."):
-            made["operations"] = digest(value)
-        return made
+            description["operations"] = digest(value)
+        return description
 
     def _array(self, value: Any, name: str) -> Any:
-        """An array under the name of its place; one that is already there, and one that repeats itself, takes no more room."""
+        """The description of an array, which is stored by its name once, and without repeated elements."""
         array = np.asarray(value)
         if array.dtype.kind not in "biuf":
             raise ArgumentError(f"run: expected numbers, got an array of dtype {array.dtype} in {name}")
         key = (array.__array_interface__["data"][0], array.shape, array.strides, array.dtype.str)
         if key not in self._known:
-            self._known[key] = name, array  # which keeps its memory, so that no other array can have its address
+            self._known[key] = name, array  # the reference keeps the memory, so that no other array gets the address
             self.arrays[name] = checks.once_of(array)
-        made: dict[str, Any] = {KIND: "array", "of": self._known[key][0]}
-        if self.arrays[made["of"]].shape != array.shape:
-            made["over"] = list(array.shape)
-        return made
+        description: dict[str, Any] = {KIND: "array", "of": self._known[key][0]}
+        if self.arrays[description["of"]].shape != array.shape:
+            description["over"] = list(array.shape)
+        return description
 
 
 class Reader:
-    """Puts a run together again. ``system`` is what the caller gave for functions that are not found by name."""
+    """Reads a run from its description and arrays. ``system`` has the functions that are not found by name."""
 
     def __init__(self, arrays: Arrays, system: Any = None) -> None:
         self.arrays, self.system = arrays, system
         self._kinds, self._tuples = kinds(), kinds(tuple)
 
     def run(self, text: str) -> Run:
-        """The run that a description tells of."""
+        """The run of a description."""
         run = Run.__new__(Run)
         vars(run).update({name: self._whole(part) for name, part in json.loads(text).items()})
         return run
@@ -190,9 +190,9 @@ class Reader:
             case "rerun":
                 return partial(RERUNS[part["of"]], *self._whole(part["items"]))
             case "equations":
-                made = Equations(*(parts.pop(key) for key in ("definition", "v_shape", "y_shape", "own_shapes")))
-                vars(made).update(parts)
-                return made
+                equations = Equations(*(parts.pop(key) for key in ("definition", "v_shape", "y_shape", "own_shapes")))
+                vars(equations).update(parts)
+                return equations
             case kind if kind in self._tuples:
                 return self._tuples[kind](**parts)
             case kind:
@@ -203,43 +203,42 @@ class Reader:
                 return one
 
     def _definition(self, module: str, name: str) -> Definition:
-        """The kind of system that was given, or else the one of that name, in a module that is imported already."""
+        """The definition of ``system``, or else the one of that name in a module that is imported already."""
         if isinstance(self.system, Definition):
             return self.system
         if isinstance(self.system, OwnSystem):
             return self.system.definition
         if module.startswith("stepwell."):
             kinds()
-        found: Any = sys.modules.get(module)
+        place: Any = sys.modules.get(module)
         for each in name.split("."):
-            found = vars(found).get(each) if hasattr(found, "__dict__") else None
-        if not isinstance(found, Definition):
+            place = vars(place).get(each) if hasattr(place, "__dict__") else None
+        if not isinstance(place, Definition):
             raise ArgumentError(
                 f"system: the run is of equations of your own, {module}.{name}, which are not in the file and not imported; give "
                 f"them, system={name.rpartition('.')[2]}"
             )
-        return found
+        return place
 
     def _of_time(self, name: str) -> Any:
-        given = self.system.parameters_given if isinstance(self.system, OwnSystem) else {}
-        if not callable(given.get(name)):
+        parameters = self.system.parameters_given if isinstance(self.system, OwnSystem) else {}
+        if not callable(parameters.get(name)):
             raise ArgumentError(
                 f"system: the parameter {name} of the run is a function of the time, which is not in the file; give the system "
                 f"with it, system=…({name}=…)"
             )
-        return given[name]
+        return parameters[name]
 
     def _check(self, system: Any, operations: str) -> None:
         if digest(system) != operations:
             raise ArgumentError(
                 f"system: {system.definition.name} makes other operations now than when the run was saved, so it is another "
-                f"system, or another version of stepwell; the numbers of the file are found by their names, with numpy.load "
-                f"or zarr.open"
+                f"system, or another version of stepwell; numpy.load or zarr.open read the numbers of the file by their names"
             )
 
 
 def is_whole(run: Run) -> None:
-    """Raise if parts of a run do not fit together, as those that another version wrote may not."""
+    """Raise if parts of a run do not fit together, which may be so in a file of another version."""
     system: System = run.system
     repr(run)
     system.all_parameters(run.status.shape)

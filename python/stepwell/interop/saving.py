@@ -19,13 +19,13 @@ from .parts import Arrays, Reader, Writer, is_whole
 if TYPE_CHECKING:
     from ..runs.result import Run
 
-#: Endings of files that hold a run.
+#: Endings of files with a run.
 ENDINGS = (".npz", ".zarr")
 
-#: Under this name a file has the description of the run, and under the other the version of its form.
+#: The names of the description of a run in a file, and of the version of the file format.
 ABOUT, FORM = "stepwell", "stepwell_form"
 
-#: The version of the form of files; one that is read has the same.
+#: The version of the file format; only files of this version are read.
 VERSION = 1
 
 
@@ -34,7 +34,7 @@ def save(run: Run, path: str | Path) -> None:
     place = _place(path)
     writer = Writer()
     text = writer.text(run)
-    # Written beside the file and then put in its place, so that a stop in between loses nothing.
+    # A new file is written beside the old one and then replaces it, so that an interruption loses nothing.
     beside = place.with_name(f"{place.stem}.{uuid4().hex}{place.suffix}")
     if place.suffix == ".npz":
         checks.file("path", place)
@@ -54,9 +54,9 @@ def save(run: Run, path: str | Path) -> None:
     try:
         group = zarr.open_group(str(beside), mode="w")
         for name, array in writer.arrays.items():
-            # A chunk that is zero is left out by default, and then a −0 in it is lost.
-            made = group.create_array(name, shape=array.shape, dtype=array.dtype, config={"write_empty_chunks": True})
-            made[...] = array
+            # By default zarr omits a chunk of zeros, and then a −0 in it is lost.
+            stored = group.create_array(name, shape=array.shape, dtype=array.dtype, config={"write_empty_chunks": True})
+            stored[...] = array
         group.attrs.update({ABOUT: text, FORM: VERSION, "stepwell_version": _core.__version__})
         if replaced:
             place.replace(old := place.with_name(f"{place.stem}.{uuid4().hex}.old"))
@@ -69,22 +69,22 @@ def save(run: Run, path: str | Path) -> None:
 
 
 def load(path: str | Path, *, system: Any = None) -> Run:
-    """Read a run from a file that ``Run.save`` wrote; it is equal to the run that was saved, bit for bit, and goes on as it.
+    """Read a run from a file that ``Run.save`` wrote; it is equal to the saved run, bit for bit, and can be resumed like it.
 
-    No code is read: not even a damaged or malicious file can run any. What a run of your own equations needs beside the file is
-    their function.
+    No code is read: not even a damaged or malicious file can run any. A run of your own equations needs their function besides
+    the file.
 
     Args:
         path: the file, ending in .npz, or the folder, ending in .zarr.
-        system: for a run of your own equations, what ``stepwell.system`` made of their function; where a parameter is a function
-            of the time, the system with it. Not needed if the function stands, under the same name, in a module that is imported.
+        system: for a run of your own equations, what ``stepwell.system`` returned for their function; where a parameter is a
+            function of time, the system with this parameter. Not needed if an imported module has the function by its name.
 
     Returns:
         The ``Run``.
 
     Raises:
-        ArgumentError: if there is no such file; if it holds no run; if the function is missing, or makes other operations than
-            when the run was saved.
+        ArgumentError: if there is no such file; if it has no run; if the function is missing, or makes other operations than when
+            the run was saved.
         UnsupportedError: if the file ends in .zarr and zarr is not installed.
 
     Example:
@@ -127,10 +127,10 @@ def _no_run(place: Path, why: object) -> ArgumentError:
 
 def _from_npz(place: Path) -> tuple[Arrays, str]:
     try:
-        # Opened here: of a file that is damaged NumPy leaves open what it opened itself.
+        # Opened here, since NumPy does not close a damaged file that it opened itself.
         with place.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-    except Exception as error:  # what NumPy and zipfile raise of a damaged file is of many kinds
+    except Exception as error:  # NumPy and zipfile raise exceptions of many kinds for a damaged file
         raise _no_run(place, getattr(error, "strerror", None) or error) from None
     if ABOUT not in arrays or FORM not in arrays:
         raise _no_run(place, "it has arrays, and nothing that tells of a run")
@@ -157,8 +157,8 @@ def _current(place: Path, text: str, version: int) -> str:
 
 
 def _is_ours(zarr: Any, place: Path) -> bool:
-    """Whether a folder holds a run, so that another may take its place."""
+    """Whether a folder has a run, so that another run may replace it."""
     try:
         return ABOUT in zarr.open_group(str(place), mode="r").attrs
-    except Exception:  # anything else that is there is not touched
+    except Exception:  # anything else is not replaced
         return False

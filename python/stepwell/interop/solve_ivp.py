@@ -13,15 +13,15 @@ from ..base.arrays import Array
 from ..errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning
 from ..model.equations.definition import Definition
 from ..reference import adaptive
-from .ivp_events import Event, found
+from .ivp_events import Event, note_zeros
 from .ivp_function import RightHandSide, arguments, takes
 from .ivp_methods import chosen
 from .ivp_steps import FAILURES, Solution, Trajectory
 
-#: Relative tolerances below this are raised to it: rounding errors of a step are not much smaller.
+#: The smallest relative tolerance; smaller ones are raised to it, since rounding errors of a step are not much smaller.
 LEAST_RELATIVE = 100.0 * np.finfo(float).eps
 
-#: What is said of a run that reached its end, or an event that ends it.
+#: SciPy's messages for a run that reached its end, or an event that ends it.
 ENDS = {0: "The solver successfully reached the end of the integration interval.", 1: "A termination event occurred."}
 
 
@@ -33,12 +33,12 @@ class OdeResult(dict[str, Any]):
         y: states, shape (n, times).
         sol: the states at any time, if ``dense_output``; a ``Solution``, or None.
         t_events: for each event function the times at which it was zero, or None.
-        y_events: the states then, or None.
+        y_events: the states at these times, or None.
         nfev: number of function evaluations.
-        njev: 0, for no Jacobian is needed.
+        njev: 0, since no Jacobian is needed.
         nlu: 0.
         status: 0 if the end was reached, 1 if an event ended the run, −1 if a step failed.
-        message: the same in words.
+        message: the status in words.
         success: whether ``status`` is 0 or 1.
     """
 
@@ -86,19 +86,18 @@ def solve_ivp(
     uband: Any = None,
     min_step: float = 0.0,
 ) -> OdeResult:
-    """Solve ẏ = fun(t, y) from a state, called as SciPy's ``solve_ivp`` is, so that one import tries stepwell.
+    """Solve ẏ = fun(t, y) from a state, with the arguments of SciPy's ``solve_ivp``, so that changing an import tries stepwell.
 
-    ``fun`` is run at the start, with symbols, and not at every step; what cannot be traced (``if`` on a state, ``np.random``) is
-    an error that names the line. Results have the same bits on every machine.
+    ``fun`` is run with symbols at the start, not at every step. An operation that cannot be traced (``if`` on a state,
+    ``np.random``) is an error that names the line. Results have the same bits on every machine.
 
-    What is not as in SciPy: there is no RK45, so without ``method`` it is ``"dop853"``. Of a step the largest error of a
-    component counts, over what is tolerated of it, and not the root of their mean square. ``sol`` and events use no
-    interpolation, but short steps of the method. The state is real. For many trajectories, use ``stepwell.system`` and
-    ``integrate``.
+    Differences from SciPy: there is no RK45, and the default method is ``"dop853"``. A step is judged by the component with the
+    largest error relative to its tolerance, not by the root mean square over all. ``sol`` and events use short steps of the
+    method in place of interpolation. The state is real. For many trajectories, use ``stepwell.system`` and ``integrate``.
 
     Args:
         fun: ``fun(t, y, *args)``, which returns ẏ: a function, a method or another callable that is written in Python.
-        t_span: the times (t0, tf) of start and end; tf may be the earlier.
+        t_span: the times (t0, tf) of start and end; tf may be earlier than t0.
         y0: the state at t0, shape (n,).
         method: the name of a method with an ``error_order``: "dop853", "fehlberg", "fehlberg_5", "merson", by any of their names;
             None for "dop853".
@@ -106,18 +105,18 @@ def solve_ivp(
             depend on them.
         dense_output: whether to return ``sol``, which gives the state at any time.
         events: a function ``event(t, y, *args)`` or a list of them. It is called with numbers, at the end of each step; if its
-            sign differs from that at the start, the zero between is found, to 4 roundings of the time. Attributes as in SciPy:
-            ``event.terminal = True`` ends the run at the first zero, and a number at so many; ``event.direction`` above zero
+            sign differs from that at the start, the zero in between is found, to 4 roundings of the time. Attributes as in SciPy:
+            ``event.terminal = True`` ends the run at the first zero, a number n at the n-th; ``event.direction`` above zero
             counts zeros where the function grows, below zero where it falls. Two zeros within one step are found where values and
-            slopes at its ends tell of them; for a function that does more than a cubic within a step, ``max_step`` helps.
+            slopes at its ends indicate them; for a function that is wilder than a cubic within a step, ``max_step`` helps.
         vectorized: whether ``fun`` expects the state as a column, shape (n, 1).
         args: a tuple of further arguments of ``fun`` and of the events.
         first_step: the step to try first; None for a hundredth of the time in which the state changes at the start.
         max_step: the longest step.
         rtol: tolerated error of a component in a step, relative to its size before and after the step; a number, or one for each
             component, shape (n,).
-        atol: in addition, the tolerated error of a component, likewise.
-        jac: what methods for stiff equations need, of which there are none here; a warning, as in SciPy. So are the next.
+        atol: the absolute error of a component that is tolerated in addition, likewise.
+        jac: for methods for stiff equations, which stepwell does not have; ignored with a warning, as in SciPy.
         jac_sparsity: likewise.
         lband: likewise.
         uband: likewise.
@@ -129,21 +128,21 @@ def solve_ivp(
 
     Raises:
         ArgumentError: what is wrong with which argument.
-        TraceError: if ``fun`` does what cannot be traced.
-        UnknownNameError: if there is no such method; of one of SciPy's that is not here, it says what to write.
+        TraceError: if an operation of ``fun`` cannot be traced.
+        UnknownNameError: if there is no such method; for a method of SciPy that stepwell lacks, it says what to write.
 
     Example:
         >>> def lotka_volterra(t, z, a, b, c, d):
         ...     x, y = z
         ...     return [a * x - b * x * y, -c * y + d * x * y]
-        >>> found = sw.solve_ivp(lotka_volterra, (0, 15), [10, 5], args=(1.5, 1, 3, 1), dense_output=True, rtol=1e-9, atol=1e-9)
-        >>> found.sol([5.0, 10.0]).round(6)
+        >>> result = sw.solve_ivp(lotka_volterra, (0, 15), [10, 5], args=(1.5, 1, 3, 1), dense_output=True, rtol=1e-9, atol=1e-9)
+        >>> result.sol([5.0, 10.0]).round(6)
         array([[0.264187, 0.287213],
                [3.134133, 0.449777]])
-        >>> found.success, found.message
+        >>> result.success, result.message
         (True, 'The solver successfully reached the end of the integration interval.')
     """
-    how = chosen(method)
+    solver = chosen(method)
     begin, end = _span(t_span)
     state = _start(y0)
     sign = -1.0 if end < begin else 1.0
@@ -161,15 +160,15 @@ def solve_ivp(
     if not isinstance(fun, type):
         takes("fun", fun, args)
     right = RightHandSide(fun, args, len(state), vectorized=checks.flag("vectorized", vectorized), backward=sign < 0.0)
-    trajectory = Trajectory(right.system(), how, (sign * begin, sign * end), state, _tolerances(rtol, atol, len(state)))
+    trajectory = Trajectory(right.system(), solver, (sign * begin, sign * end), state, _tolerances(rtol, atol, len(state)))
     trajectory.limited(
         None if first_step is None else _first(first_step, abs(end - begin)),
         _longest(max_step),
     )
     if times is not None and noted is None and not dense_output and end != begin:
         wanted = sign * times
-        asked = wanted if len(wanted) and wanted[-1] == trajectory.end else np.append(wanted, trajectory.end)
-        states = trajectory.straight_to_the_end(asked)[: len(times)].T
+        output = wanted if len(wanted) and wanted[-1] == trajectory.end else np.append(wanted, trajectory.end)
+        states = trajectory.straight_to_the_end(output)[: len(times)].T
         return _result(trajectory, None, times[: states.shape[1]], np.ascontiguousarray(states), None, None)
 
     ended = _advanced(trajectory, noted, sign) if end != begin else None
@@ -177,16 +176,16 @@ def solve_ivp(
     if end == begin:
         ts, trajectory.status = np.array([begin]), adaptive.OK
     if times is None:
-        given, states = ts, np.array(trajectory.states).T.copy()
+        saved, states = ts, np.array(trajectory.states).T.copy()
     else:
-        given = times[sign * times <= trajectory.times[-1]]
-        states = trajectory.at(sign * given)
+        saved = times[sign * times <= trajectory.times[-1]]
+        states = trajectory.at(sign * saved)
     sol = Solution(trajectory, ts, sign) if dense_output else None
-    return _result(trajectory, ended, given, states, sol, noted)
+    return _result(trajectory, ended, saved, states, sol, noted)
 
 
 def _advanced(trajectory: Trajectory, events: list[Event] | None, sign: float) -> float | None:
-    """Make all steps, and note events; the time at which one of them ended the run, or None."""
+    """Make all steps and record the zeros of events; returns the time at which an event ended the run, or None."""
     events = events or []
     before = [float("nan") for _ in events]
     values = [event.value(sign * trajectory.times[0], trajectory.states[0]) for event in events]
@@ -195,7 +194,7 @@ def _advanced(trajectory: Trajectory, events: list[Event] | None, sign: float) -
             continue
         span = sign * trajectory.times[-2], sign * trajectory.times[-1]
         after = [event.value(span[1], trajectory.states[-1]) for event in events]
-        ended = found(events, [before, values, after], lambda t: trajectory.state(sign * t), span)
+        ended = note_zeros(events, [before, values, after], lambda t: trajectory.state(sign * t), span)
         before, values = values, after
         if ended is not None:
             last = trajectory.state(sign * ended)
@@ -207,7 +206,7 @@ def _advanced(trajectory: Trajectory, events: list[Event] | None, sign: float) -
 def _result(
     trajectory: Trajectory, ended: float | None, t: Array, y: Array, sol: Solution | None, events: list[Event] | None
 ) -> OdeResult:
-    """All of it, by SciPy's names."""
+    """The result, with SciPy's names."""
     status = 1 if ended is not None else 0 if trajectory.status == adaptive.OK else -1
     n = len(trajectory.states[0])
     return OdeResult(
@@ -272,12 +271,12 @@ def _longest(max_step: Any) -> float:
 
 
 def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
-    """The relative and the absolute tolerance, of each component where they are several numbers."""
+    """The relative and the absolute tolerance, each one number or one for each component."""
     relative = checks.numbers("rtol", rtol, positive=True)
     absolute = checks.not_negative("atol", atol)
-    for name, given in (("rtol", relative), ("atol", absolute)):
-        if given.shape not in ((), (n,)):
-            raise ShapeError(f"{name}: expected a number, or one for each of the {n} of the state, got shape {given.shape}")
+    for name, tolerance in (("rtol", relative), ("atol", absolute)):
+        if tolerance.shape not in ((), (n,)):
+            raise ShapeError(f"{name}: expected a number, or one for each of the {n} of the state, got shape {tolerance.shape}")
     least = float(relative.min())
     if least < LEAST_RELATIVE:
         warnings.warn(
@@ -290,9 +289,9 @@ def _is_several(events: Any) -> bool:
     return not callable(events) and bool(checks.several("events", events, "functions") or True)
 
 
-def _warn_of_useless(**given: Any) -> None:
+def _warn_of_useless(**arguments: Any) -> None:
     """Warn of arguments that only methods for stiff equations read."""
-    if useless := [name for name, value in given.items() if value is not None]:
+    if useless := [name for name, value in arguments.items() if value is not None]:
         warnings.warn(
             f"{', '.join(useless)}: of no use, for it goes with implicit methods only, of which there are none here",
             UserWarning,

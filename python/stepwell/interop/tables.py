@@ -45,13 +45,13 @@ def to_xarray(run: Run, dims: Sequence[str] | None = None, coords: Mapping[str, 
         variables |= {name: (members, getattr(run.paces, name)) for name in ("accepted", "rejected", "evaluations")}
     if coords is not None and not isinstance(coords, Mapping):
         raise DTypeError(f"coords: expected coordinates by name, got {checks.short(coords)} ({type(coords).__name__})")
-    given = dict(coords or {})
-    if clash := [name for name in given if name in variables or name == TIME]:
+    coordinates = dict(coords or {})
+    if clash := [name for name in coordinates if name in variables or name == TIME]:
         raise ArgumentError(f"coords: expected names of their own, got {', '.join(clash)}, which the run has")
     try:
         times: dict[str, Any] = {TIME: run.t} if run.t.ndim == 1 else {OWN_TIME: ((TIME, *members), run.t)}
-        return xarray.Dataset(variables, coords={**times, **given}, attrs=_attributes(run))
-    except (ValueError, TypeError, RuntimeError) as error:  # of the run itself it has no doubt
+        return xarray.Dataset(variables, coords={**times, **coordinates}, attrs=_attributes(run))
+    except (ValueError, TypeError, RuntimeError) as error:  # the variables of the run always fit
         raise ArgumentError(f"coords: expected coordinates that fit the axes {', '.join((TIME, *members))}: {error}") from None
 
 
@@ -79,7 +79,7 @@ def to_dataframe(run: Run, dims: Sequence[str] | None = None) -> Any:
 
 
 def _columns(name: str, array: Array, block: Shape) -> dict[str, Array]:
-    """The numbers of a block one by one: y, or y_0, y_1 or y_0_0."""
+    """The numbers of a block by the names of their columns: y, or y_0, y_1, or y_0_0."""
     return {"_".join(map(str, (name, *index))): array[(slice(None), *index)] for index in np.ndindex(block)}
 
 
@@ -110,10 +110,10 @@ def _axes(run: Run) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _attributes(run: Run) -> dict[str, Any]:
-    """What is told of a run beside its numbers: text and numbers, which files of tables can hold."""
-    told: dict[str, Any] = {"system": repr(run.system), "method": run.method.name}
+    """The attributes of a table of a run: text and numbers only, which files can store."""
+    attributes: dict[str, Any] = {"system": repr(run.system), "method": run.method.name}
     if np.ndim(run.t0) == 0:
-        told["t0"] = run.t0
+        attributes["t0"] = run.t0
     if run.paces is None:
-        told |= {"dt": run.dt, "start_step": run.start_step, "steps": run.steps}
-    return told | {"fused": int(run.fused), "stepwell": _core.__version__}
+        attributes |= {"dt": run.dt, "start_step": run.start_step, "steps": run.steps}
+    return attributes | {"fused": int(run.fused), "stepwell": _core.__version__}

@@ -1,8 +1,8 @@
 """Environments of Gymnasium whose steps are those of a ``World``: pendulum, cart-pole and double rod, thousands at once.
 
-Importing this module registers them, so that ``gymnasium.make_vec("stepwell/CartPole-v0", num_envs=1000)`` makes a thousand that
-are stepped together, and ``gymnasium.make`` makes one. Method, step and number of steps for each action are arguments. With the
-same seed and the same actions all numbers are the same on every machine.
+Importing this module registers them: ``gymnasium.make_vec("stepwell/CartPole-v0", num_envs=1000)`` then makes a thousand that are
+stepped together, and ``gymnasium.make`` makes one. Method, step and number of steps for each action are arguments. The same seed
+and the same actions give the same numbers on every machine.
 
 Needs the package gymnasium: ``pip install 'stepwell[gym]'``.
 """
@@ -13,7 +13,7 @@ from ...base.optional import imported
 
 gymnasium = imported("gymnasium", "stepwell.interop.gym")
 
-from .base import WorldEnv, WorldVectorEnv  # noqa: E402  # both need gymnasium, and the line above tells of it
+from .base import WorldEnv, WorldVectorEnv  # noqa: E402  # the line above raises if gymnasium is missing
 from .cart_pole import CartPoleEnv, CartPoleVectorEnv, cart_pole  # noqa: E402
 from .double_rod import DoubleRodEnv, DoubleRodVectorEnv  # noqa: E402
 from .pendulum import PendulumEnv, PendulumVectorEnv  # noqa: E402

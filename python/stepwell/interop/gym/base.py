@@ -1,4 +1,4 @@
-"""What all environments have in common: a world of many members, and one of them by itself."""
+"""The base classes of the environments: a vector of environments by a world of many members, and a single environment."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ Truths = np.ndarray[Any, np.dtype[np.bool_]]
 class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are not needed to check this
     """Environments that are stepped together, as the members of one ``World``.
 
-    An environment whose episode ended begins anew at the next call of ``step``, whose action for it is ignored
-    (``AutoresetMode.NEXT_STEP``). A kind of environment is a subclass with the spaces of one, which makes the world, draws
-    states, lets actions act, and says what is seen and rewarded; see docs/howto/interop.md.
+    An environment whose episode ended begins anew at the next call of ``step``, which ignores the action for it
+    (``AutoresetMode.NEXT_STEP``). A subclass is a kind of environment: it has the spaces of one environment, makes the world,
+    draws states, applies actions, and computes observations and rewards; see docs/howto/interop.md.
 
     Args:
-        num_envs: how many.
-        method: by which the world is stepped: its name, or what ``stepwell.method`` returns.
+        num_envs: the number of environments.
+        method: the method of the world: its name, or what ``stepwell.method`` returns.
         dt: the step of the method, in seconds.
-        substeps: how many of these steps there are for an action.
-        max_episode_steps: after how many actions an episode is truncated; None for never.
+        substeps: the number of steps for each action.
+        max_episode_steps: the number of actions after which an episode is truncated; None for never.
         render_mode: None; there are no pictures.
-        dtype: ``"float64"`` or ``"float32"``, in which the world is stepped. What is seen and rewarded is computed in float64 of
-            the states; what is seen is float32 in any case.
+        dtype: ``"float64"`` or ``"float32"``, the precision of the world. Observations and rewards are computed from the states
+            in float64; observations are always returned in float32.
 
     Attributes:
         world: the ``World``; its arrays are the states.
-        steps: how many actions each environment has had since it began.
+        steps: the number of actions of each environment since its episode began.
         dtype: NumPy's type of the world's arrays, for ``make_world``.
 
     Raises:
         ArgumentError: what is wrong with which argument.
-        UnsupportedError: if ``make_world`` makes arrays of another type than was asked for.
+        UnsupportedError: if ``make_world`` makes arrays of another type than ``dtype``.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -89,35 +89,35 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
 
     @property
     def states(self) -> tuple[Array, Array]:
-        """The blocks v and y in float64, to compute with; the world's own arrays, not copies, if it is stepped in float64."""
+        """The blocks v and y in float64; they are the world's own arrays, not copies, if it is stepped in float64."""
         return np.asarray(self.world.v, np.float64), np.asarray(self.world.y, np.float64)
 
     @abstractmethod
     def make_world(self, method: str | Method, dt: float) -> World:
-        """The world, at any state, of arrays of ``self.dtype``."""
+        """The world, in any state, with arrays of ``self.dtype``."""
 
     @abstractmethod
     def draw(self, count: int) -> tuple[Array, Array]:
-        """Random states to begin with, v and y, of so many members."""
+        """Random initial states, v and y, of ``count`` members."""
 
     @abstractmethod
     def act(self, actions: Any) -> None:
-        """Let actions act: called before each step of the method."""
+        """Apply the actions; called before each step of the method."""
 
     @abstractmethod
     def observe(self) -> Array:
-        """What is seen of the states, shape (num_envs, numbers)."""
+        """The observations of the states, shape (num_envs, numbers)."""
 
     def rewards_before(self, actions: Any) -> Array | None:
-        """The rewards, where they are of the states before a step; else None."""
+        """The rewards if they depend on the states before a step; else None."""
         return None
 
     @abstractmethod
     def judge(self, actions: Any) -> tuple[Array, Truths]:
-        """The rewards of the states after a step (not read if there are others), and which of them end an episode."""
+        """The rewards of the states after a step (ignored with ``rewards_before``), and whether each state ends its episode."""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observations, dict[str, Any]]:
-        """Begin anew; see Gymnasium. ``options={"reset_mask": mask}`` does so for some of them only."""
+        """Begin new episodes; see Gymnasium. ``options={"reset_mask": mask}`` does so for some environments only."""
         super().reset(seed=seed)
         mask = (options or {}).get("reset_mask")
         which = np.ones(self.num_envs, dtype=np.bool_) if mask is None else checks.as_array("reset_mask", mask)
@@ -128,7 +128,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         return self._seen(), {}
 
     def step(self, actions: Any) -> tuple[Observations, Array, Truths, Truths, dict[str, Any]]:
-        """Act, and make ``substeps`` steps; see Gymnasium."""
+        """Apply the actions, and make ``substeps`` steps; see Gymnasium."""
         if not self._begun:
             raise ArgumentError("step: expected after reset(), which draws the states to begin with")
         actions = checks.as_array("actions", actions)
@@ -164,31 +164,31 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
 
 
 class WorldEnv(gymnasium.Env):  # type: ignore[misc]
-    """One environment by itself, with Gymnasium's interface for one: its states have the bits of those in a vector of one.
+    """A single environment, with Gymnasium's interface for one; its states have the same bits as those of a vector of one.
 
     Args:
-        options: those of the vector environment, ``vector``, except ``num_envs``.
+        options: the arguments of the vector environment, ``vector``, except ``num_envs``.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
-    #: Its kind for many.
+    #: The vector environment of the same kind.
     vector: ClassVar[type[WorldVectorEnv]]
 
     def __init__(self, **options: Any) -> None:
-        # How long an episode is, Gymnasium's wrapper tells.
+        # Gymnasium's wrapper limits the length of an episode.
         self.many = self.vector(1, **{"max_episode_steps": None} | options)
         self.observation_space, self.action_space = self.many.single_observation_space, self.many.single_action_space
         self.render_mode = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observations, dict[str, Any]]:
-        """Begin anew; see Gymnasium."""
+        """Begin a new episode; see Gymnasium."""
         super().reset(seed=seed)
-        self.many.np_random = self.np_random  # which is drawn from, whichever of them is asked
-        observations, told = self.many.reset(options=options)
-        return observations[0], told
+        self.many.np_random = self.np_random  # both draw from the same generator
+        observations, information = self.many.reset(options=options)
+        return observations[0], information
 
     def step(self, action: Any) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
-        """Act; see Gymnasium. After the end of an episode it goes on until ``reset``."""
+        """Apply the action; see Gymnasium. After the end of an episode the motion goes on until ``reset``."""
         self.many._over[:] = False
-        observations, rewards, terminated, truncated, told = self.many.step(checks.as_array("action", action)[np.newaxis])
-        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), told
+        observations, rewards, terminated, truncated, information = self.many.step(checks.as_array("action", action)[np.newaxis])
+        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), information

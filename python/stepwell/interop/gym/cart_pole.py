@@ -17,7 +17,7 @@ from .base import Truths, WorldEnv, WorldVectorEnv
 PUSH = 10.0
 #: Where an episode ends: the place of the cart in metres, and the angle of the pole in rad.
 END, TILT = 2.4, np.radians(12.0)
-#: The most that is seen of speeds, in metres and rad per second; an episode ends long before.
+#: The largest observed velocities, in metres and rad per second; an episode ends long before.
 MAX_SPEED = 100.0
 #: Episodes begin with all four numbers between this and its negative.
 NEAR_REST = 0.05
@@ -44,9 +44,10 @@ def cart_pole(
 class CartPoleVectorEnv(WorldVectorEnv):
     """Carts that balance poles. Task, numbers and rewards are those of ``CartPole-v1``.
 
-    Observed are the place and velocity of the cart, and the angle and angular velocity of the pole; the actions are 0 for a push
-    to the left and 1 for one to the right. The reward is 1 for each step. An episode ends where the cart is more than 2.4 m off,
-    or the pole more than 12 degrees. ``method="standard_euler"`` makes the steps of Gymnasium's environment, up to rounding.
+    An observation has the position and velocity of the cart, and the angle and angular velocity of the pole; the actions are 0
+    for a push to the left and 1 for a push to the right. The reward is 1 for each step. An episode ends when the cart is more
+    than 2.4 m off, or the pole more than 12 degrees. ``method="standard_euler"`` makes the steps of Gymnasium's environment, up
+    to rounding.
 
     Example:
         >>> import gymnasium, stepwell.interop.gym
@@ -75,8 +76,8 @@ class CartPoleVectorEnv(WorldVectorEnv):
         render_mode: None = None,
         dtype: Any = "float64",
     ) -> None:
-        how: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
-        super().__init__(num_envs, **how, render_mode=render_mode, dtype=dtype)
+        settings: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
+        super().__init__(num_envs, **settings, render_mode=render_mode, dtype=dtype)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Carts with poles."""
@@ -104,6 +105,6 @@ class CartPoleVectorEnv(WorldVectorEnv):
 
 
 class CartPoleEnv(WorldEnv):
-    """One of ``CartPoleVectorEnv``, by itself."""
+    """A single environment of ``CartPoleVectorEnv``."""
 
     vector: ClassVar[type[WorldVectorEnv]] = CartPoleVectorEnv

@@ -17,7 +17,7 @@ from .base import Truths, WorldEnv, WorldVectorEnv
 
 #: Gravity, in SI units; masses and lengths of the rods are 1.
 GRAVITY = 9.8
-#: The most that the motor can do, in newton metres, and the most that is seen of angular velocities, in rad per second.
+#: The largest torque of the motor, in newton metres, and the largest observed angular velocity, in rad per second.
 MAX_TORQUE, MAX_SPEED = 1.0, 50.0
 #: The tip is to be lifted above the anchor by this, in metres.
 GOAL = 1.0
@@ -28,9 +28,10 @@ NEAR_REST = 0.1
 class DoubleRodVectorEnv(WorldVectorEnv):
     """Double pendulums with a motor at the joint between the rods, which is to lift the tip. The task is that of ``Acrobot-v1``.
 
-    Each rod has its mass at its lower end. Observed are cosine and sine of the angles of both rods from straight down, and their
-    angular velocities (held to ±50 where they are shown, not where they act); the action is a torque of −1 to 1 on the second rod
-    and its opposite on the first. The reward is −1 for each step until the tip is 1 m above the anchor, which ends the episode.
+    Each rod has its mass at its lower end. An observation has the cosines and sines of the angles of both rods from straight
+    down, and their angular velocities (clipped to ±50 in the observation only); the action is a torque of −1 to 1 on the second
+    rod and its opposite on the first. The reward is −1 for each step until the tip is 1 m above the anchor, which ends the
+    episode.
 
     Example:
         >>> import gymnasium, stepwell.interop.gym
@@ -56,8 +57,8 @@ class DoubleRodVectorEnv(WorldVectorEnv):
         render_mode: None = None,
         dtype: Any = "float64",
     ) -> None:
-        how: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
-        super().__init__(num_envs, **how, render_mode=render_mode, dtype=dtype)
+        settings: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
+        super().__init__(num_envs, **settings, render_mode=render_mode, dtype=dtype)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Two rods that hang from an anchor."""
@@ -105,6 +106,6 @@ class DoubleRodVectorEnv(WorldVectorEnv):
 
 
 class DoubleRodEnv(WorldEnv):
-    """One of ``DoubleRodVectorEnv``, by itself."""
+    """A single environment of ``DoubleRodVectorEnv``."""
 
     vector: ClassVar[type[WorldVectorEnv]] = DoubleRodVectorEnv

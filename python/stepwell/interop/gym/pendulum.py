@@ -16,16 +16,16 @@ from .base import Truths, WorldEnv, WorldVectorEnv
 
 #: Gravity, mass and length of the rod in Gymnasium's environment of this name, in SI units.
 GRAVITY, MASS, LENGTH = 10.0, 1.0, 1.0
-#: The most that the motor can do, and the most that is seen of the angular velocity, which is held to it after each action.
+#: The largest torque of the motor; and the largest angular velocity, to which it is clipped after each action.
 MAX_TORQUE, MAX_SPEED = 2.0, 8.0
 
 
 class PendulumVectorEnv(WorldVectorEnv):
     """Pendulums: a rod on a hinge, with a motor too weak to lift it at once. Task and rewards are those of ``Pendulum-v1``.
 
-    Observed are the cosine and sine of the angle from upright, and the angular velocity; the action is a torque of −2 to 2. The
-    reward is −(θ² + 0.1·θ̇² + 0.001·u²), before the step. ``method="false_euler"`` makes the steps of Gymnasium's environment, up
-    to rounding, except that there the angular velocity is held to ±8 before the angle is stepped.
+    An observation has the cosine and sine of the angle from upright, and the angular velocity; the action is a torque of −2 to 2.
+    The reward is −(θ² + 0.1·θ̇² + 0.001·u²), before the step. ``method="false_euler"`` makes the steps of Gymnasium's environment,
+    up to rounding, except that Gymnasium clips the angular velocity to ±8 before it steps the angle.
 
     Example:
         >>> import gymnasium, stepwell.interop.gym
@@ -51,8 +51,8 @@ class PendulumVectorEnv(WorldVectorEnv):
         render_mode: None = None,
         dtype: Any = "float64",
     ) -> None:
-        how: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
-        super().__init__(num_envs, **how, render_mode=render_mode, dtype=dtype)
+        settings: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
+        super().__init__(num_envs, **settings, render_mode=render_mode, dtype=dtype)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Rods on hinges."""
@@ -61,7 +61,7 @@ class PendulumVectorEnv(WorldVectorEnv):
         return World(Pendulum(np.sqrt(1.5 * GRAVITY / LENGTH)), method, v=v, y=y, dt=dt, force=self._force, dtype=self.dtype)
 
     def draw(self, count: int) -> tuple[Array, Array]:
-        """At any angle."""
+        """Random angles, and angular velocities of at most 1."""
         above, speed = self.np_random.uniform(-np.pi, np.pi, count), self.np_random.uniform(-1.0, 1.0, count)
         return speed, above + np.pi
 
@@ -79,7 +79,7 @@ class PendulumVectorEnv(WorldVectorEnv):
         return np.stack([-cos(y), -sin(y), v], axis=-1)
 
     def rewards_before(self, actions: Any) -> Array:
-        """How far from upright, how fast, and what the motor does."""
+        """Minus the squares of the angle from upright, the angular velocity and the torque, weighted."""
         speed, y = self.states
         turns = np.floor(y / (2.0 * np.pi))
         above = y - 2.0 * np.pi * turns - np.pi
@@ -93,6 +93,6 @@ class PendulumVectorEnv(WorldVectorEnv):
 
 
 class PendulumEnv(WorldEnv):
-    """One of ``PendulumVectorEnv``, by itself."""
+    """A single environment of ``PendulumVectorEnv``."""
 
     vector: ClassVar[type[WorldVectorEnv]] = PendulumVectorEnv

@@ -1,7 +1,7 @@
 """Explains a step: every operation by name, how often it is computed, and the machine code.
 
-``formula`` writes operations as text, ``listing`` makes lines of a tape, ``beside`` of what is made beside the steps,
-``result`` holds and tells what was found.
+``formula`` writes operations as text, ``naming`` names values, ``listing`` makes the lines of a tape, ``beside`` those of the
+computations beside the steps, and ``result`` is the explanation.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from ...runs.engine.counted import written
 from ...runs.engine.linear import matrix_model
 from ...runs.request import Options, Request
 from .beside import lines_beside
-from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape, matrix_of
+from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape
+from .naming import matrix_of
 from .result import Explanation, MachineCode, Packing
 
 if TYPE_CHECKING:
@@ -55,20 +56,20 @@ def explain(
     length of the step do not matter, only which parameters all members share: those are used once a run instead of once a member.
 
     Args:
-        system: the system to step. Arguments that are arrays over its batch differ from member to member.
+        system: the system. Parameters that are arrays over its batch differ from member to member.
         method: its name, or what ``stepwell.method`` returns.
-        members: number of trajectories in the batch, a multiple of the system's batch; if None that of the batch, or one. The
+        members: number of trajectories in the batch, a multiple of the size of the system's batch; if None that size, or one. The
             machine code for many differs from that for one.
-        control: an ``EnergyControl`` or a ``Projection``, as ``integrate`` takes it.
-        fused: with fused multiply-adds, fma(a, b, c) = a·b + c rounded once, as ``integrate`` takes it.
-        attempt: an attempt at an adaptive step, as ``integrate`` makes with ``tolerance=``, with what decides on the next
-            one.
+        control: an ``EnergyControl`` or a ``Projection``, as in ``integrate``.
+        fused: whether to use fused multiply-adds, fma(a, b, c) = a·b + c rounded once, as in ``integrate``.
+        attempt: True for an attempt at an adaptive step, as in ``integrate`` with ``tolerance=``, with the operations that decide
+            on the next one.
         form: ``"direct"``, or ``"matrix"`` for a step by the transition matrix of a linear system: P, and Q for the inputs at
             each node of the method.
-        start: how a method with a choice starts, as ``integrate`` takes it.
-        record: quantities that the core can record, whose computation is listed, too: "energy", and what else the system names
-            in its ``quantities``.
-        dtype: ``"float64"`` or ``"float32"``, as ``integrate`` takes it.
+        start: how a method with a choice starts, as in ``integrate``.
+        record: quantities that the core can record, whose computation is listed, too: "energy", and others in the system's
+            ``quantities``.
+        dtype: ``"float64"`` or ``"float32"``, as in ``integrate``.
 
     Returns:
         An ``Explanation``.
@@ -85,9 +86,9 @@ def explain(
           v' = v − Φ·y
           y' = y + Φ·v'
     """
-    how, system = find_method(method), a_system(system).for_state_shapes()
+    method, system = find_method(method), a_system(system).for_state_shapes()
     if attempt := checks.flag("attempt", attempt):
-        _attempted(system, how, a_control(control), dtype, form)
+        _attempted(system, method, a_control(control), dtype, form)
     own = prod(system.batch)
     names = [record] if isinstance(record, str) else [] if record is None else checks.several("record", record, "quantities")
     if names and not system.quantities:
@@ -104,7 +105,7 @@ def explain(
     if control is not None:
         checks.fits("members: the numbers of a control", 8, batch, "explain fewer")
     options = Options(control=control, fused=fused, form=form, start=start, dtype=dtype)
-    plan = Request.one_step(system, how, options, batch).plan
+    plan = Request.one_step(system, method, options, batch).plan
     explained = _explained(plan, attempt)
     if explained.parts is not None or attempt:
         return explained
@@ -115,7 +116,8 @@ def _attempted(system: System, method: Method, control: AnyControl | None, dtype
     """Raise if there is no attempt at an adaptive step."""
     if checks.is_single(dtype):
         raise UnsupportedError(
-            "attempt: one of float32 is two lists, the stages in float32 and the decision in float64; explain it in float64"
+            "attempt: in float32 an attempt is two lists, the stages in float32 and the decision in float64; explain it in "
+            "float64"
         )
     if method.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
@@ -132,28 +134,31 @@ def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
     what: dict[str, Any] = {"system": plan.system, "method": plan.method, "members": plan.members}
     what |= {"fused": plan.fused, "attempt": attempt, "form": plan.form, "dtype": "float32" if plan.single else "float64"}
     parts = _core.in_parts(model, plan.members, attempts=attempt)
-    told = None if parts else _core.compiled(model, plan.members, attempts=attempt)
-    if told is None:
+    compiled = None if parts else _core.compiled(model, plan.members, attempts=attempt)
+    if compiled is None:
         kind, about, lanes = parts or ("rates", 0, 1)
         sections = line_of_matrices(plan) if plan.form == "matrix" else lines_of_program(plan, attempt)
         return Explanation(**what, sections=sections, level=_core.isa(), lanes=lanes, parts=kind, about=about)
-    sections = lines_of_tape(plan, told["split"], attempt)
+    sections = lines_of_tape(plan, compiled["split"], attempt)
     code = why = None
-    if told["interpreted"] is None:
+    if compiled["interpreted"] is None:
         names = {"vectors": "block_vectors", "turns": "blocks"} | {each: each for each in ("width", "resident", "registers")}
-        packing = None if told["packing"] is None else Packing(**told["packing"])
+        packing = None if compiled["packing"] is None else Packing(**compiled["packing"])
         code = MachineCode(
-            size=told["bytes"], spills=told["spills"], packing=packing, **{name: told[key] for name, key in names.items()}
+            size=compiled["bytes"],
+            spills=compiled["spills"],
+            packing=packing,
+            **{name: compiled[key] for name, key in names.items()},
         )
     else:
-        why = _why(told["interpreted"])
+        why = _why(compiled["interpreted"])
     return Explanation(
         **what,
         sections=sections,
-        level=told["level"],
-        lanes=told["lanes"],
+        level=compiled["level"],
+        lanes=compiled["lanes"],
         written=written(plan, attempt),
-        computed=told["computed"],
+        computed=compiled["computed"],
         hoisted={section.when: sum(sum(line.operations.values()) for line in section.lines) for section in sections[:-1]},
         code=code,
         interpreted_because=why,

@@ -1,4 +1,4 @@
-"""What is made beside the steps of a run, as lines: both ends of what a method carries, and what is recorded."""
+"""The computations beside the steps of a run, as lines: start and finish of a method with a carry, and recorded quantities."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from ... import _core
 from ...reference.traced import Tracer
 from ...runs.engine import Plan
 from .formula import Formula, Notation
-from .listing import Leaf, Section, Writer, indexed, parameters
+from .listing import Leaf, Section, Writer
+from .naming import indexed, parameters
 
 
 def lines_beside(plan: Plan, choice: int, record: Sequence[str]) -> tuple[Section, ...]:
-    """What is made at both ends of the steps of a method that carries something, and what is recorded of a state."""
+    """The sections of the start and the finish of a method with a carry, and of the recorded quantities."""
     sections = []
     if plan.method.carry is not None:
         for which in ("start", "finish"):
@@ -27,7 +28,7 @@ def lines_beside(plan: Plan, choice: int, record: Sequence[str]) -> tuple[Sectio
 
 
 def _lines(plan: Plan, when: str, traced: Callable[[Tracer], list[Any]]) -> Section:
-    """A part that is made now and then, as a section that is not cut."""
+    """The section of a computation that is not split."""
     tape = _core.Tape(single=plan.single)
     tracer = Tracer(plan.system, tape)
     symbols = traced(tracer)
@@ -40,7 +41,7 @@ def _lines(plan: Plan, when: str, traced: Callable[[Tracer], list[Any]]) -> Sect
     of_state = [indexed(name, index) for name, shape in blocks for index in np.ndindex(shape)]
     results = [indexed(makes, index) for index in np.ndindex(system.v_shape if is_end else system.quantities[makes])]
     wanted = symbols[: len(results)]
-    # What is recorded is computed without fused multiply-adds.
+    # Recorded quantities are computed without fused multiply-adds.
     on, wanted = tape.fused(wanted) if plan.fused and is_end else (tape, wanted)
     params = [tape.param(i) for i in range(len(numbers))]
 

@@ -1,4 +1,4 @@
-"""Operations as formulas, with as few parentheses as say exactly what is computed in which order.
+"""Operations as formulas, with as few parentheses as the exact order of operations needs.
 
 A formula is read as in Python: · − √ ≤ are its multiplication, subtraction, square root and comparison, ``=`` compares.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from ...reference.bits import DOUBLE, SINGLE, Precision
 from ...reference.tape.operations import ON_BITS, OPERATIONS
 
-#: How strongly a formula holds together, by what it does last.
+#: How strongly a formula holds together, by its last operation.
 CHOICE, EITHER, BOTH, NOT, COMPARISON, SUM, PRODUCT, SIGN, ATOM = range(9)
 
 
@@ -27,15 +27,15 @@ class Formula(NamedTuple):
 
     @property
     def is_negative(self) -> bool:
-        """Whether it is minus something that is no sum."""
+        """Whether it begins with a sign that belongs to all of it."""
         return self.text.startswith("−") and self.holds in (PRODUCT, SIGN)
 
     def within(self, holds: int) -> str:
-        """In a place where it has to hold together so strongly."""
+        """The text for a place where a formula must hold together this strongly."""
         return self.text if self.holds >= holds else f"({self.text})"
 
     def behind(self, holds: int) -> str:
-        """The same behind an operator, where a sign needs parentheses."""
+        """The text for a place after an operator, where a sign needs parentheses, too."""
         return f"({self.text})" if self.text.startswith("−") else self.within(holds)
 
 
@@ -55,12 +55,12 @@ def shortest(x: float, single: bool) -> str:
 
 
 def bit_pattern(bits: int) -> Formula:
-    """A constant of which the bits count."""
+    """A constant that is bits, not a number."""
     return Formula(hex(bits))
 
 
 def formula(name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | None], all_bits: int = DOUBLE.all_bits) -> Formula:
-    """An operation of these; ``bits`` are those of the operands that are constants, ``all_bits`` those of what is true."""
+    """An operation on these; ``bits`` are those of the operands that are constants, ``all_bits`` those of the truth."""
     if name in ON_BITS:
         if all(each.is_truth or known in (0, all_bits) for each, known in zip(of, bits, strict=True)):
             return _of_truths(name, of, bits, all_bits)
@@ -109,12 +109,12 @@ def formula(name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | N
 
 
 class Notation:
-    """How values are written: here for people, in subclasses in a language.
+    """How values are written: here for people, in subclasses in a programming language.
 
     Attributes:
-        longest: characters of a line, its name not counted, beyond which it becomes several.
+        longest: the most characters of a formula; a longer one is split into several lines.
         called: functions of one number that are written by name in place of their operations.
-        single: whether numbers are those of float32.
+        single: whether numbers are float32.
     """
 
     longest = 72
@@ -125,12 +125,12 @@ class Notation:
 
     @property
     def precision(self) -> Precision:
-        """The numbers of the formulas."""
+        """The precision of the numbers."""
         return SINGLE if self.single else DOUBLE
 
     @property
     def all_bits(self) -> int:
-        """The bits of what is true."""
+        """The bits of the truth."""
         return self.precision.all_bits
 
     def number(self, bits: int) -> Formula:
@@ -138,16 +138,16 @@ class Notation:
         return number(bits, self.single)
 
     def formula(self, name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | None]) -> Formula:
-        """An operation of these; ``bits`` are those of the operands that are constants."""
+        """An operation on these; ``bits`` are those of the operands that are constants."""
         return formula(name, of, extra, bits, self.all_bits)
 
     def named(self, name: str, value: Formula) -> Formula:
-        """A value that has a line of its own, where it is used."""
+        """The formula of a value that has a line of its own: its name."""
         return Formula(name, is_truth=value.is_truth)
 
 
 def _sum(a: Formula, b: Formula, sign: str, other: str) -> Formula:
-    """Both with a sign between them; one of b itself is that of the sum instead, which changes no bit."""
+    """Both with a sign between them; a sign of b is merged with it, which changes no bit."""
     if b.is_negative:
         return Formula(f"{a.within(SUM)} {other} {b.text[1:]}", SUM)
     return Formula(f"{a.within(SUM)} {sign} {b.behind(PRODUCT)}", SUM)
@@ -160,7 +160,7 @@ def _minus(x: Formula) -> Formula:
 
 
 def _of_truths(name: str, of: Sequence[Formula], bits: Sequence[int | None], all_bits: int) -> Formula:
-    """Of truths the bits are all alike."""
+    """An operation on truths, whose bits are all equal."""
     a, b = of
     if name == "exclusive or" and all_bits in bits:
         return Formula(f"not {(b if bits[0] is not None else a).within(COMPARISON)}", NOT, True)

@@ -1,39 +1,31 @@
-"""The operations of a step as lines, with a name and a formula each.
+"""The operations of a step as lines, each with a name and a formula.
 
-A value that is used once is written in the formula that uses it, as long as the line stays short. A value that has a name in the
-text of the method has it here: ``dv1``, ``dy1`` the first increments of a step, ``v2``, ``y2`` the state of the second
-evaluation, ``v'``, ``y'`` the next state. Others are numbered: ``c1`` is computed before the steps, ``s1`` once a step, ``a1`` by
-every member in every step.
+A value that is used once is written in the formula that uses it, as long as the line stays short. A value keeps its name in the
+text of the method: ``dv1``, ``dy1`` are the first increments of a step, ``v2``, ``y2`` the state of the second evaluation,
+``v'``, ``y'`` the next state. Other values are numbered: ``c1`` is computed before the steps, ``s1`` once a step, ``a1`` for each
+member in each step.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from math import prod
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ... import _core
-from ...base.arrays import Shape
-from ...reference import adaptive
-from ...reference.acceptance import Acceptance
-from ...reference.signal import COMPOSED, Held
-from ...reference.tape import increments
-from ...reference.tape.lines import in_order, listed, needed
 from ...reference.tape.operations import OPERATIONS, of_tape
-from ...reference.traced import Tracer
-from ...runs import engine
 from ...runs.engine import Plan
 from ...runs.engine.counted import traced
 from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number
+from .naming import Named, coefficients, increments_last, parameters, states
 
-#: Characters of an increment of its own line; shorter ones stand where they are used.
+#: A formula of a named value that is longer than this has a line of its own; a shorter one is written where it is used.
 SHORT = 12
 
-#: A body: names of operations, their operands and other arguments; and the indices of the results.
+#: A body: the operations, each with its name, the indices of its operands and its extra argument; and the indices of the results.
 Body = tuple[list[tuple[str, list[int], int]], list[int]]
 
 
@@ -41,11 +33,11 @@ class Line(NamedTuple):
     """A value of a step.
 
     Attributes:
-        name: what it is called.
-        formula: what it is, read as in Python, with · − √ ≤ for its multiplication, subtraction, square root and comparison; =
+        name: its name.
+        formula: its formula, read as in Python, with · − √ ≤ for multiplication, subtraction, square root and comparison; =
             compares.
-        operations: how many of each kind it takes, as in ``Explanation.computed``.
-        note: what it is in the method, where its name does not say so.
+        operations: the number of operations of each kind, as in ``Explanation.computed``.
+        note: its meaning in the method, where its name does not say so.
     """
 
     name: str
@@ -55,169 +47,20 @@ class Line(NamedTuple):
 
 
 class Section(NamedTuple):
-    """What is computed equally often.
+    """The values that are computed equally often.
 
     Attributes:
         when: ``"run"``, ``"member"``, ``"step"`` or ``"member step"``: once a run for all members, once a run for each member,
             once a step for all members, in each step for each member.
-        lines: the values, each after what it reads.
+        lines: the values, each after those that it reads.
     """
 
     when: str
     lines: tuple[Line, ...]
 
 
-# ---- names
-
-
-class Named(Tracer):
-    """Traces a step and notes what its values are called, by their numbers on the tape."""
-
-    def __init__(self, system: Any, tape: Any, force: Any = None) -> None:
-        super().__init__(system, tape, force)
-        self.names: dict[int, str] = {}
-        self.called: list[tuple[Any, str]] = []
-        self._taken: set[str] = set()
-        self._length: Any = None
-
-    def scaled(self, h: Any) -> Any:
-        """The system, which records its evaluations."""
-        s, counts = super().scaled(h), Counter[str]()
-
-        def noting(which: str, rate: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
-            def increment(t: Any, v: Any, y: Any) -> Any:
-                counts[which] += 1
-                made = rate(t, v, y)
-                for name, block in (("v", v), ("y", y)):
-                    self._note(f"{name}{counts[which]}", block)
-                self._note(f"d{which}{counts[which]}", made if self._length is None else self._length * made)
-                return made
-
-            return increment
-
-        s.dv, s.dy = noting("v", s.dv), noting("y", s.dy)
-        return s
-
-    def attempt(self, method: Any, order: int = 0, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
-        """The state and the pace after an attempt, whose increments are as long as its step."""
-        _, _, more = self.state()
-        self._length = self.pace(acceptance, more).outlook(self.tape.budget()).step
-        return super().attempt(method, order, acceptance, backward=backward)
-
-    def _note(self, name: str, block: Any) -> None:
-        block = np.asarray(block, dtype=object)
-        if name in self._taken:
-            return
-        for index in np.ndindex(block.shape):
-            if isinstance(block[index], _core.Symbol):
-                called = indexed(name, index)
-                self.names.setdefault(block[index].id, called)
-                self.called.append((block[index], called))
-                self.names.setdefault((-block[index]).id, f"−{called}")
-        self._taken.add(name)
-
-
-def indexed(name: str, index: Shape) -> str:
-    """An element of a block."""
-    return f"{name}[{','.join(map(str, index))}]" if index else name
-
-
-def parameters(plan: Plan) -> tuple[list[str], list[str]]:
-    """What the numbers are called that describe a system, in the core's order, and its sampled inputs."""
-    system = plan.system
-    if plan.form == "matrix":
-        inputs = system.given_inputs()
-        given = matrix_of(plan) | {name: each.signal() for name, each in inputs.items()}
-    else:
-        given = system.all_parameters(plan.batch)
-    return named_numbers(plan, given)
-
-
-def matrix_of(plan: Plan) -> dict[str, Any]:
-    """Matrices of a step, P of shape (n, n, *batch) and Q of shape (nodes, inputs, n, *batch), in shape alone."""
-    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    inputs = len(plan.system.given_inputs())
-    return {"P": np.zeros((n, n, *plan.batch)), "Q": np.zeros((len(plan.method.nodes), inputs, n, *plan.batch))}
-
-
-def named_numbers(plan: Plan, given: Mapping[str, Any]) -> tuple[list[str], list[str]]:
-    """Names of the numbers in what is given, and of the sampled inputs."""
-    numbers: list[str] = []
-    tables: list[str] = []
-    named = indexed if plan.form == "matrix" else plan.system.named
-
-    def add(name: str, value: Any, own: int | None = None) -> None:
-        match value:
-            case list():
-                for i, each in enumerate(value):
-                    add(f"{name}[{i}]", each)
-            case Held():
-                tables.append(named(name, ()))
-            case _ if isinstance(value, COMPOSED):
-                for behind, part in value.parts().items():
-                    add(name + behind, part)
-            case np.ndarray():
-                axes = max(0, value.ndim - len(plan.batch))
-                numbers.extend(named(name, index) for index in np.ndindex(value.shape[:axes]))
-
-    for name, value in given.items():
-        add(name, value)
-    return numbers, tables
-
-
-def states(plan: Plan, attempts: bool, mark: str = "") -> list[str]:
-    """What the numbers of a state are called, with a mark behind the names."""
-    blocks = [(plan.method.carry or "v", plan.system.v_shape), ("y", plan.system.y_shape)]
-    names = [indexed(name + mark, index) for name, shape in blocks for index in np.ndindex(shape)]
-    beside: list[str] = [] if plan.system.control is None else ["work"]
-    if attempts:
-        each = ("longest", "relative", "absolute") if plan.acceptance.own else ("longest",)
-        groups = range(engine.groups_of(plan))
-        beside = [*adaptive.Pace._fields[: engine.PACE_NUMBERS], *(indexed(name, (group,)) for name in each for group in groups)]
-    return names + [name + mark for name in beside]
-
-
-def coefficients(plan: Plan) -> list[str]:
-    """What the coefficients are called that an attempt by a series returns behind the state: ``y_3[0]`` is of order 3."""
-    if not plan.method.has_series or plan.fused:
-        return []
-    blocks = [("v", plan.system.v_shape), ("y", plan.system.y_shape)]
-    orders = range(1, (plan.order or plan.method.order) + 1)
-    return [indexed(f"{name}_{k}", index) for k in orders for name, shape in blocks for index in np.ndindex(shape)]
-
-
-# ---- values on a tape
-
-
-def increments_last(tracer: Named, roots: Sequence[Any], single: bool = False) -> tuple[Any, dict[int, str], dict[int, str]]:
-    """The tape of a step in which increments are multiplied last; names of its values, and which increments they are left of."""
-    lines, places = listed(tracer.tape, [*roots, *(symbol for symbol, _ in tracer.called)])
-    lines, place = increments.negated_sums(lines)
-    places = [place[each] for each in places]
-    order = in_order(lines, places[: len(roots)])
-    kept, moved = needed(lines, places[: len(roots)])
-    work = increments.Rewriting(kept, moved, single)
-    work.run()
-    tape = _core.Tape(single=single)
-    symbols: list[Any] = []
-    for name, of, extra in work.made:
-        symbols.append(of_tape(tape, name, [symbols[each] for each in of], extra))
-    names: dict[int, str] = {}
-    left: dict[int, str] = {}
-    for (_, name), at in zip(tracer.called, places[len(roots) :], strict=True):
-        value = work.values[order[at]] if at in order else None
-        if isinstance(value, increments.Increment):
-            left.setdefault(symbols[value.x].id, f"{name} but for its factor")
-        elif value is not None:
-            names.setdefault(symbols[value].id, name)
-    return tape, names, left
-
-
-# ---- lines
-
-
 class Leaf(NamedTuple):
-    """A value that is there before: its text, its symbol or None, and how often it changes, the rarest first."""
+    """A value that exists before a section: its text, its symbol or None, and a rank by how often it changes, 0 for never."""
 
     text: Formula
     symbol: Any
@@ -225,7 +68,7 @@ class Leaf(NamedTuple):
 
 
 class _Value(NamedTuple):
-    """A value that has been met."""
+    """A value of a section."""
 
     text: Formula
     symbol: Any
@@ -236,7 +79,7 @@ class _Value(NamedTuple):
 
 
 class Writer:
-    """Writes sections, one after the other, and knows what values are called."""
+    """Writes sections, one after the other, and names their values."""
 
     def __init__(
         self,
@@ -253,17 +96,17 @@ class Writer:
         self._used: set[str] = set()
 
     def symbol(self, name: str, of: Sequence[Any], extra: int) -> Any:
-        """An operation on the tape, which has a name there; None if the tape has none."""
+        """The symbol of an operation, by which its name is known; None if an operand has no symbol."""
         if any(each is None for each in of):
             return None
         return self.notation.called[name](of[0]) if name in self.notation.called else of_tape(self.tape, name, of, extra)
 
     def source(self, name: str, extra: int) -> Any:
-        """What a tape has without an operation."""
+        """The symbol of a value without operands."""
         return of_tape(self.tape, name, (), extra)
 
     def called(self, symbol: Any) -> str:
-        """The name of a value in the method's text if it is free, which it then no longer is; else ""."""
+        """The name of a value in the method's text, which is then taken; "" if it has none or the name is taken already."""
         known = "" if symbol is None else self.names.get(symbol.id, "")
         if not known or known.startswith("−") or known in self._used:
             return ""
@@ -271,7 +114,7 @@ class Writer:
         return known
 
     def unused(self, letter: str) -> str:
-        """The next name by a letter."""
+        """The next name that begins with a letter."""
         self._numbers[letter] += 1
         return f"{letter}{self._numbers[letter]}"
 
@@ -284,7 +127,16 @@ class Writer:
         letter: str,
         results: Sequence[str] | None = None,
     ) -> tuple[Section, list[Leaf]]:
-        """A body as a section, with its results, which are named by ``results`` if given and not "", and else by the letter."""
+        """A body as a section, and its results as leaves.
+
+        Args:
+            when: how often it is computed, as in ``Section``.
+            body: the operations and the places of the results.
+            leaf: the leaf of an operation without operands, by its name and extra argument.
+            rank: how often the results change.
+            letter: the beginning of names.
+            results: the names of the results; "" for those that get the next name by the letter, as all do for None.
+        """
         operations, places = body
         reads = Counter(place for _, of, _ in operations for place in of)
         wanted = {place: name or None for place, name in zip(places, results or [""] * len(places), strict=True)}
@@ -293,8 +145,8 @@ class Writer:
 
         def name_of(place: int, value: _Value) -> tuple[str, str]:
             known = "" if value.symbol is None else self.names.get(value.symbol.id, "")
-            if (given := wanted.get(place)) is not None:
-                return given, known if known.lstrip("−").startswith("d") else ""
+            if (name := wanted.get(place)) is not None:
+                return name, known if known.lstrip("−").startswith("d") else ""
             if known and not known.startswith("−") and known not in self._used:
                 return known, ""
             note = known if known.startswith("−") else "" if value.symbol is None else self.notes.get(value.symbol.id, "")
@@ -307,39 +159,39 @@ class Writer:
             lines.append(Line(name, value.text.text, dict(value.operations), note))
             values[place] = _Value(self.notation.named(name, value.text), value.symbol, value.rank)
 
-        def made(name: str, of: list[int], given: int) -> _Value:
+        def operation(name: str, of: list[int], extra: int) -> _Value:
             parts = [values[place] for place in of]
-            symbol = self.symbol(name, [each.symbol for each in parts], given)
-            if name.startswith("multiply") or name == "subtract multiply":  # what changes least stands first
+            symbol = self.symbol(name, [each.symbol for each in parts], extra)
+            if name.startswith("multiply") or name == "subtract multiply":  # the factor that changes least comes first
                 parts[:2] = sorted(parts[:2], key=lambda each: (each.rank, each.text.holds != PRODUCT))
-            elif name == "add" and all(each.text.holds == ATOM for each in parts):  # and here last
+            elif name == "add" and all(each.text.holds == ATOM for each in parts):  # the summand that changes least comes last
                 parts.sort(key=lambda each: -each.rank)
             elif name == "add" and (parts[0].text.holds != ATOM or parts[0].rank < 4):  # but v + (…), as methods are written
                 parts.sort(key=lambda each: each.text.holds != SUM)
             if name == "sample" and self.tables:
-                text = Formula(f"{self.tables[given]}({parts[0].text.text})")
+                text = Formula(f"{self.tables[extra]}({parts[0].text.text})")
             else:
-                text = self.notation.formula(name, [each.text for each in parts], given, [each.bits for each in parts])
+                text = self.notation.formula(name, [each.text for each in parts], extra, [each.bits for each in parts])
             count = sum((Counter(each.operations) for each in parts), Counter[str]())
             if name in OPERATIONS and (counted := OPERATIONS[name].counted):
                 count[counted] += 1
             return _Value(text, symbol, max(each.rank for each in parts), None, count, True)
 
-        for place, (name, of, given) in enumerate(operations):
+        for place, (name, of, extra) in enumerate(operations):
             if name == "constant":
-                values.append(_Value(self.notation.number(given), self.source(name, given), 0, given))
+                values.append(_Value(self.notation.number(extra), self.source(name, extra), 0, extra))
                 continue
             if not of:
-                text, symbol, rank_of_leaf = leaf(name, given)
+                text, symbol, rank_of_leaf = leaf(name, extra)
                 values.append(_Value(text, symbol, rank_of_leaf))
                 continue
-            value = made(name, of, given)
+            value = operation(name, of, extra)
             while len(value.text.text) > self.notation.longest:
                 waiting = [each for each in of if values[each].waits]
                 if not waiting:
                     break
                 write(max(waiting, key=lambda each: len(values[each].text.text)))
-                value = made(name, of, given)
+                value = operation(name, of, extra)
             values.append(value)
             known = "" if value.symbol is None else self.names.get(value.symbol.id, "")
             is_alias = name == "copy" and results is None
@@ -348,14 +200,14 @@ class Writer:
         out = []
         for place in places:
             value = values[place]
-            if results is not None and operations[place][0] in ("state", "constant"):  # it stays as it is
+            if results is not None and operations[place][0] in ("state", "constant"):  # a line without an operation
                 lines.append(Line(str(wanted[place]), value.text.text, {}))
             out.append(Leaf(value.text, value.symbol, rank if value.rank else 0))
         return Section(when, tuple(lines)), out
 
 
 def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Section, ...]:
-    """The sections of a step that is one tape, cut as the core did."""
+    """The sections of a step that is one tape, split as in the core."""
     tape = _core.Tape(single=plan.single)
     tracer = Named(plan.system, tape)
     roots = traced(tracer, plan, attempts)
@@ -374,7 +226,7 @@ def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Se
             return Leaf(Formula("max_steps"), tape.budget(), rank)
         return Leaf(Formula(numbers[i]), params[i], rank)
 
-    def given(i: int) -> Leaf:
+    def uniform(i: int) -> Leaf:
         kind, which = split["given"][i]
         if kind == "step":
             return Leaf(Formula("h"), tape.step(), 1)
@@ -383,10 +235,10 @@ def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Se
         return Leaf(Formula("lanes" if kind == "lanes" else f"{tables[which]}.{kind}"), None, 1)
 
     def before(name: str, i: int) -> Leaf:
-        return given(i) if name == "uniform" else parameter(split["params"][i], 2)
+        return uniform(i) if name == "uniform" else parameter(split["params"][i], 2)
 
     def in_step(name: str, i: int) -> Leaf:
-        return given(i) if name == "uniform" else Leaf(Formula("t"), tape.time(), 3)
+        return uniform(i) if name == "uniform" else Leaf(Formula("t"), tape.time(), 3)
 
     writer = Writer(tape, names, Notation(plan.single), notes=notes)
     run, uniforms = writer.section("run", split["run"], before, 1, "c")
@@ -416,12 +268,12 @@ def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Se
 
 
 def line_of_matrices(plan: Plan) -> tuple[Section, ...]:
-    """A step by matrices that are too large for one tape: s is v and then y, x the inputs at each node of the method."""
+    """A step by matrices that are too large for one tape: s is v followed by y, x the inputs at each node of the method."""
     return (Section("member step", (Line("s'", "P·s + Q·x" if plan.system.given_inputs() else "P·s", {}),)),)
 
 
 def lines_of_program(plan: Plan, attempts: bool) -> tuple[Section, ...]:
-    """A method as what it does to blocks."""
+    """The operations of a method on blocks."""
     entries, results = _core.program(plan.method.name, attempts=attempts)
     carry = plan.method.carry or "v"
     called = dict(zip(results, [f"{carry}'", "y'", "error_v", "error_y", "coarse_v", "coarse_y"], strict=False))

@@ -24,10 +24,10 @@ WHEN = {
     "member step": "in each step, for each member",
 }
 
-#: What is made beside the steps of a method that carries something.
+#: The computations beside the steps of a method with a carry.
 BESIDE = {"start": "at the start of a run, {carry} from v", "finish": "where a state is kept, v from {carry}"}
 
-#: What makes the rates of a step that is no single tape.
+#: How the rates of a step are computed that is no single tape.
 PARTS = {
     "rates": "the rates are a tape of their own, {lanes} at a time",
     "matrix": "its products of matrices are made by a loop that was compiled beforehand, one member after the other",
@@ -46,8 +46,8 @@ class MachineCode(ValueEquality):
         turns: iterations for a tile, the members that are stepped together.
         resident: whether the state stays in registers over all steps of an iteration; else it is loaded and stored in each step.
         registers: vector registers of the CPU.
-        spills: the most values that are kept in memory at once because there are not enough registers.
-        packing: of a single member, whether its equal operations are made by one vector; None if that was not considered.
+        spills: the most values that are in memory at once because there are not enough registers.
+        packing: for a single member, whether one vector makes several of its equal operations; None if that was not considered.
     """
 
     size: int
@@ -62,16 +62,16 @@ class MachineCode(ValueEquality):
 
 @dataclass(frozen=True)
 class Packing(ValueEquality):
-    """Whether equal operations of a single member are made by one vector, and why. Cycles are those of a model of the CPU.
+    """Whether one vector makes several equal operations of a single member, and why. Cycles are those of a model of the CPU.
 
     Attributes:
-        used: whether they are: if that saves 4 % of the cycles.
-        cycles: of a step with the best packing; None if none was found, or if a step is a chain already.
-        single_cycles: of a step number by number.
-        chain_cycles: of the longest chain of operations that wait for each other; no packing is faster.
+        used: whether operations are packed into vectors, which they are if that saves 4 % of the cycles.
+        cycles: cycles of a step with the best packing; None if none was found, or if the step is a chain already.
+        single_cycles: cycles of a step number by number.
+        chain_cycles: cycles of the longest chain of operations that wait for each other; no packing is faster.
         operations: operations of a step.
         vectors: vectors that take their place, ``moves`` among them.
-        moves: how many of them only move numbers between lanes.
+        moves: how many of these vectors only move numbers between lanes.
     """
 
     used: bool
@@ -113,25 +113,25 @@ class Explanation(ValueEquality):
         attempt: whether it is an attempt at an adaptive step.
         dtype: ``"float64"`` or ``"float32"``, of its numbers.
         form: ``"direct"`` or ``"matrix"``.
-        sections: the values, by how often they are computed. Of a step that is too long for one tape, what the method does to
-            blocks.
+        sections: the values, by how often they are computed. For a step that is too long for one tape, the operations of the
+            method on blocks.
         level: the CPU level in use.
-        lanes: how many members go together.
-        written: operations of a step, by kind, as the method and the system are written down. What does not change from step to
-            step is not counted, for it is computed before; changes of sign are not either. Empty if the step is too long for one
-            tape. Counted on the reference, which runs a method as it is written; the core counts less on its own tape, where a
-            sum or product of whole blocks that a method asks for twice was made one already.
-        computed: operations of a step, by kind, that each member makes: without what was found equal or needless. ``fused``
-            counts fused multiply-adds.
-        hoisted: how many operations are made once a run, once for each member, and once a step for all members, instead of by
+        lanes: how many members are stepped together.
+        written: operations of a step, by kind, as the method and the system are written down. Operations on values that do not
+            change from step to step are not counted, since they are done before; nor are changes of sign. Empty if the step is
+            too long for one tape. They are counted on the reference, which runs a method as it is written; the core counts less
+            on its own tape, where equal sums or products of whole blocks are merged already.
+        computed: operations of a step, by kind, that each member makes: without those that are equal to others or needless.
+            ``fused`` counts fused multiply-adds.
+        hoisted: how many operations are made once a run, once for each member, and once a step for all members, instead of for
             each member in each step: ``"run"``, ``"member"``, ``"step"``.
         code: the machine code, or None.
         interpreted_because: why there is none, in words, or None. Runs too short to be worth machine code are interpreted anyway.
-        parts: of a step that is too long for one tape: ``"rates"`` if its rates are tapes of their own, ``"hand"`` if they are a
+        parts: for a step that is too long for one tape: ``"rates"`` if its rates are tapes of their own, ``"hand"`` if they are a
             loop that was compiled beforehand, ``"matrix"`` if it is products of large matrices. None if it is one tape.
-        about: about how many operations such a step has; 0 if it is one tape, of which they are counted.
-        beside: what is made beside the steps, ``when``: of a method that carries something, ``"start"``, which makes that from v
-            at the start of a run, and ``"finish"``, which makes v from it where a state is kept; and what was asked for by
+        about: about how many operations such a step has; 0 if it is one tape, whose operations are counted.
+        beside: the computations beside the steps, by ``when``: for a method with a carry, ``"start"``, which computes the carry
+            from v at the start of a run, and ``"finish"``, which computes v from it where a state is saved; and the quantities of
             ``record=``, such as ``"record energy"``. A sampled input is written as a function, a(t).
 
     Example:
@@ -167,7 +167,7 @@ class Explanation(ValueEquality):
 
     @property
     def listing(self) -> str:
-        """The values alone, a line each."""
+        """Only the values, a line for each."""
         return self._listed(self.sections)
 
     def _listed(self, sections: Sequence[Section]) -> str:
@@ -183,7 +183,7 @@ class Explanation(ValueEquality):
 
     @property
     def title(self) -> str:
-        """What is explained, in a line."""
+        """The method, the system and the number of members, in a line."""
         what = "an attempt at a step" if self.attempt else "a step"
         fused = ", with fused multiply-adds" if self.fused else ""
         fused += ", by its transition matrix" if self.form == "matrix" else ""
@@ -192,7 +192,7 @@ class Explanation(ValueEquality):
 
     @property
     def machine(self) -> str:
-        """What the step becomes, in words."""
+        """How the step is executed, in words."""
         if self.parts is not None:
             rates = PARTS[self.parts].format(lanes=_members(self.lanes))
             if self.parts == "matrix":
@@ -208,7 +208,7 @@ class Explanation(ValueEquality):
             f"vectors of {code.width} numbers, {code.vectors} in a turn of the loop" if code.width > 1 else "number by number"
         )
         place = "in registers over all steps" if code.resident else "in the cache, read and written in each step"
-        kept = f"{code.spills} value{'s' * (code.spills != 1)} beside them" if code.spills else "which suffice"
+        spilled = f"{code.spills} value{'s' * (code.spills != 1)} beside them" if code.spills else "which suffice"
         packed = ""
         if code.packing is not None:
             packed = f" {code.packing}"
@@ -216,11 +216,11 @@ class Explanation(ValueEquality):
                 vectors = f"{code.packing.vectors} vectors of one to four numbers of the member"
         return (
             f"Machine code for {self.level}, {code.size} bytes: {vectors}, {_members(self.lanes)} in a tile; the state is "
-            f"{place}; {code.registers} vector registers, {kept}.{packed}"
+            f"{place}; {code.registers} vector registers, {spilled}.{packed}"
         )
 
     def _when(self, section: Section) -> str:
-        """How often, in words; of one member all are the same."""
+        """How often a section is computed, in words; for one member without the members."""
         if section.when in BESIDE:
             return BESIDE[section.when].format(carry=self.method.carry)
         if section.when.startswith("record "):
@@ -248,7 +248,7 @@ class Explanation(ValueEquality):
         return f"Operations that are made before: {'; '.join(counts) if counts else 'none'}."
 
     def words(self) -> list[str]:
-        """What names in the listing mean that are no arguments."""
+        """The meanings of names in the listing that are no arguments."""
         text = [f"{line.name} {line.formula}" for section in (*self.sections, *self.beside) for line in section.lines]
         known = {
             "h": "the step dt",
@@ -269,14 +269,14 @@ class Explanation(ValueEquality):
         return [f"Here {'; '.join(shown)}."] if shown else []
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it as numbers and texts."""
+        """The explanation as numbers and texts."""
         sections, beside = (
             [{"when": s.when, "lines": [line._asdict() for line in s.lines]} for s in each]
             for each in (self.sections, self.beside)
         )
-        held = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
         code = None if self.code is None else asdict(self.code)
-        return held | {
+        return values | {
             "system": repr(self.system),
             "method": self.method.name,
             "sections": sections,
@@ -289,7 +289,7 @@ class Explanation(ValueEquality):
         write_json(self.as_dict(), path)
 
     def _repr_html_(self) -> str:
-        """The same as tables."""
+        """The explanation as tables, for notebooks."""
         rows = []
         for section in (*self.sections, *self.beside):
             if section.lines:

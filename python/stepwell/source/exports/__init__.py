@@ -1,7 +1,7 @@
 """A step as source code of another language, for use in an engine.
 
-``tapes`` traces a step and splits it, ``names`` makes names that a language accepts, ``written`` writes both in a ``language``,
-of which there is a file each; ``result`` holds the text.
+``tapes`` traces a step and splits it, ``names`` makes names that every language accepts, ``written`` writes both in a
+``language``, each of which has a file; ``result`` is the exported text.
 """
 
 from __future__ import annotations
@@ -57,45 +57,44 @@ def export(
     name: str | None = None,
     dtype: Any = "float64",
 ) -> ExportedStep:
-    """A step of a system by a method as source code: one file without dependencies.
+    """Export a step of a system by a method as source code: one file without dependencies.
 
-    The file has a structure of the parameters, which may be changed there, a structure of the state, and functions: preparation
-    from the parameters, the state at the start, one step. Compiled and run it gives the numbers of ``integrate``,
-    to the last bit.
+    The file has a structure of the parameters, which users may change, a structure of the state, and functions: preparation from
+    the parameters, the state at the start, one step. Compiled and run it gives the numbers of ``integrate``, to the last bit.
 
     Args:
-        system: what to step, one trajectory.
+        system: the system; one trajectory of it.
         method: its name, or what ``stepwell.method`` returns.
         language: ``"c"`` (C99), ``"javascript"`` (a module), ``"python"`` (without NumPy) or ``"rust"``.
-        dt: the initial value of the step in the file, in units of time; it may be changed there, as the parameters may.
+        dt: the initial value of the step in the file, in units of time; users may change it there, like the parameters.
         t0: the time of step 0, likewise.
         v: velocities of the example at the head of the file, shape (*block); zero if None. A control without a target keeps the
             energy of v and y.
         y: coordinates of the example, likewise; 1, 2, 3, … if None.
-        member: which trajectory of a batch, by its index, or a tuple of one index for each axis of the batch.
+        member: which trajectory of a batch, by its index, or by a tuple of one index for each axis of the batch.
         start: how a method with a choice starts; see ``method(…).starts``.
         control: the control of the energy, as in ``integrate``.
-        force: True for a step with an argument ``force``, which is added to v̇ in every stage and may be another in each step, as
-            that of ``World``; an array of the shape of v is that of the example at the head of the file, and gives its shape
-            in the batch. A method that carries something other than v needs it in its start and finish, too.
-        fused: with fused multiply-adds, as ``integrate(fused=True)``. JavaScript has none, Python has them from 3.13 on.
-        name: the name of functions and types, or its beginning; from the system and the method if None.
-        dtype: ``"float64"`` or ``"float32"``, as ``integrate`` takes it. In float32 numbers are those of C's ``float`` and Rust's
-            ``f32``; JavaScript rounds each operation by ``Math.fround``, and Python needs NumPy.
+        force: True for a step with an argument ``force``, which is added to v̇ in every stage and may differ from step to step, as
+            in ``World``. An array of the shape of v, or of v with the batch, is the force of the example at the head of the file.
+            A method that carries something other than v needs the force in its start and finish, too.
+        fused: whether to use fused multiply-adds, as in ``integrate``. JavaScript has none, Python has them from 3.13 on.
+        name: the name of functions and types, or its beginning; made from the system and the method if None.
+        dtype: ``"float64"`` or ``"float32"``, as in ``integrate``. In float32 the numbers are C's ``float`` and Rust's ``f32``;
+            JavaScript rounds each operation by ``Math.fround``, and Python needs NumPy.
 
     Returns:
         An ``ExportedStep``: ``.source`` is its text, ``.save(path)`` writes it.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system, if the language has no fused multiply-add, or if the step has
-            too many operations to be written out one by one.
+        UnsupportedError: if the method cannot step the system, if the language has no fused multiply-add, or if the step has too
+            many operations.
 
     Example:
         >>> sw.export(sw.Oscillator(omega=2.0), "rk4", "c", dt=1 / 60).save("step.c").name
         'step.c'
     """
-    how, system = find_method(method), a_system(system)
+    method, system = find_method(method), a_system(system)
     kind = LANGUAGES[checks.known("language", language, tuple(LANGUAGES))]
     fused, single = checks.flag("fused", fused), checks.is_single(dtype)
     if fused and kind.fma is None:
@@ -104,10 +103,10 @@ def export(
         raise UnsupportedError(
             f"fused: {kind.title} has no fused multiply-add of float32; export without, or to another language"
         )
-    called = prefix(f"{snake(system.kind_name)}_{how.name}" if name is None else name)
+    called = prefix(f"{snake(system.kind_name)}_{method.name}" if name is None else name)
     push = None if force is False else 0.0 if force is True else force
     options = Options(v=v, y=y, dt=dt, t0=t0, control=control, force=push, fused=fused, dtype=dtype, start=start)
-    request = Request.one_step(system, how, options)
+    request = Request.one_step(system, method, options)
     system, plan, index = request.system, request.plan, _member(member, request.plan.batch)
     if single:
         float32.check_written(system, "an exported step")
@@ -118,7 +117,7 @@ def export(
     written = Written(traced, writer)
     text = writer.file(written, writer.remark(head(written, writer, *_example(request, index))))
     of = "float32" if single else "float64"
-    return ExportedStep(text, called, kind.title, kind.endings, system, how, index, fused, traced.count, of)
+    return ExportedStep(text, called, kind.title, kind.endings, system, method, index, fused, traced.count, of)
 
 
 def _member(member: Any, batch: Shape) -> Shape:
@@ -131,17 +130,17 @@ def _member(member: Any, batch: Shape) -> Shape:
                 f"member={last[0] if len(last) == 1 else last}; one step is exported, with the parameters of one"
             )
         return (0,) * len(batch)
-    given = member if isinstance(member, (tuple, list)) else (member,)
-    if len(given) != len(batch):
-        raise ShapeError(f"member: expected {len(batch)} indices for the batch of shape {batch}, got {len(given)}")
-    for each, n in zip(given, batch, strict=True):
+    indices = member if isinstance(member, (tuple, list)) else (member,)
+    if len(indices) != len(batch):
+        raise ShapeError(f"member: expected {len(batch)} indices for the batch of shape {batch}, got {len(indices)}")
+    for each, n in zip(indices, batch, strict=True):
         if n == 0:
             raise ShapeError(f"member: there is none in a batch of shape {batch}")
         checks.count("member", each, 0, n - 1)
-    return tuple(checks.count("member", each, 0, n - 1) for each, n in zip(given, batch, strict=True))
+    return tuple(checks.count("member", each, 0, n - 1) for each, n in zip(indices, batch, strict=True))
 
 
 def _example(request: Request, index: Shape) -> tuple[list[float], list[float]]:
-    """Velocities and coordinates with which the example begins."""
+    """The velocities and coordinates at the start of the example."""
     v, y = ([float(each) for each in checks.member(block, index).reshape(-1)] for block in (request.v, request.y))
     return v, y

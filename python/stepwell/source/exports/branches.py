@@ -1,9 +1,7 @@
-"""What a step computes only if something holds, such as a contact: values that only one side of a choice reads.
+"""Branches of an exported step: values that only one side of a choice reads, such as the forces of a contact.
 
-A tape has no branches: it computes both sides of a choice.
-In a file the expensive side stands in an ``if``. A choice by
-``p and q`` is one by q within one by p, so that q is computed where p holds. What is computed has the same bits, and what is not
-computed was not taken.
+A tape has no branches: it computes both sides of a choice. In a file the expensive side is in an ``if``. A choice by ``p and q``
+becomes a choice by q within one by p, so that q is only computed where p holds. All values that are used have the same bits.
 """
 
 from __future__ import annotations
@@ -15,16 +13,16 @@ from typing import NamedTuple
 
 from ...reference.tape.operations import COMPARISONS, ON_BITS, OPERATIONS
 
-#: Cycles that a branch costs where it was predicted wrongly: a side that takes fewer is computed always.
+#: The cycles that a mispredicted branch costs: a side that takes fewer is always computed.
 WORTH = 16
 
-#: Cycles of functions, about, and of constants.
+#: About the cycles of functions, and of constants.
 CYCLES = {"sine": 20, "cosine": 20, "logarithm": 30, "constant": 0}
 
-#: Operations on bits that truths have, too.
+#: Operations on bits that are operations on truths, too.
 ON_TRUTHS = ("and", "or", "exclusive or")
 
-#: Names, operands and other arguments.
+#: The name, the operands and the extra argument of each operation.
 Operations = Sequence[tuple[str, tuple[int, ...], int]]
 
 #: Conditions, each with the side on which a value is read, the outermost first.
@@ -32,11 +30,11 @@ Path = tuple[tuple[int, bool], ...]
 
 
 class Node(NamedTuple):
-    """An operation: its name, its operands, and its other argument."""
+    """An operation: its name, its operands, and its extra argument."""
 
     name: str
     of: tuple[int, ...]
-    given: int
+    extra: int
 
 
 @dataclass(eq=False)
@@ -44,10 +42,10 @@ class Branch:
     """An ``if``.
 
     Attributes:
-        condition: of whose truth.
-        sides: what is computed if it holds, and if not.
+        condition: the number of the condition.
+        sides: the values and branches that are computed if it holds, and if not.
         sets: the choices that it makes.
-        keeps: values of a side that are read behind the branch.
+        keeps: values of a side that are read after the branch.
     """
 
     condition: int
@@ -63,12 +61,12 @@ class Branched:
     """The operations of a function, arranged in branches.
 
     Attributes:
-        operations: all operations, of which the first ``nodes`` are some.
-        order: the numbers of those that are needed, each after its operands.
-        nodes: the operations, by their numbers; those that were split off choices have numbers of their own.
+        operations: all operations of the file.
+        order: the numbers of the operations that the function needs, each after its operands.
+        nodes: these operations, by their numbers; those that were split off from choices have numbers of their own.
         items: values and branches in the order in which they are computed.
-        expensive: of each choice that a branch makes, whether its sides are computed within it.
-        same: of a choice within another one the outer one, of which it is a side: one variable serves both.
+        expensive: for each choice that a branch makes, whether its sides are computed within the branch.
+        same: for a choice that is a side of another one, the outer one: one variable serves both.
     """
 
     def __init__(self, operations: Operations, roots: Iterable[int], leaves: Iterable[int], all_bits: int) -> None:
@@ -77,8 +75,8 @@ class Branched:
         self.nodes: dict[int, Node] = {}
         self.order: list[int] = []
         self._paths: dict[int, Path] = {}
-        self._joint: set[int] = set()  # choices with two expensive sides, by one condition even if it is made of several
-        self._cheap: set[Path] = set()  # sides that are computed always
+        self._joint: set[int] = set()  # choices with two expensive sides, whose condition is not split
+        self._cheap: set[Path] = set()  # sides that are always computed
         self._kinds: dict[int, str] = {}
         self._take()
         self._split()
@@ -86,7 +84,7 @@ class Branched:
         self._split()
         self.expensive = {line: expensive for line in self.order if any(expensive := self._are_dear(line))}
         self.same: dict[int, int] = {}
-        #: What is there without an operation; it is read where it is needed.
+        #: Values without operands, which are read where they are needed.
         self._done = self._leaves | {line for line in self.order if not self.nodes[line].of}
         self.items = self._arranged((), self.order)
         self._keep()
@@ -94,12 +92,12 @@ class Branched:
 
     @property
     def is_straight(self) -> bool:
-        """Whether there is no branch that can be written."""
-        kept = [each for branch in branches(self.items) for each in branch.keeps]
-        return not self.expensive or any(self.kind(each) == "bits" for each in kept)
+        """Whether the function has no branches, or none that can be written."""
+        read_later = [each for branch in branches(self.items) for each in branch.keeps]
+        return not self.expensive or any(self.kind(each) == "bits" for each in read_later)
 
     def kind(self, line: int) -> str:
-        """Of a value: "truth", "bits" or "number"; "any" of a constant that may be each."""
+        """The kind of a value: "truth", "bits" or "number"; "any" for a constant that may be each."""
         if line not in self._kinds:
             node = self.nodes[line] if line in self.nodes else self.operations[line]
             self._kinds[line] = kind_of(node, self.kind, self.constant, self.all_bits)
@@ -111,7 +109,7 @@ class Branched:
         return bits if name == "constant" else None
 
     def _take(self) -> None:
-        """Take the operations that are needed."""
+        """Collect the operations that the roots need."""
         waiting = list(self._roots)
         while waiting:
             line = waiting.pop()
@@ -123,7 +121,7 @@ class Branched:
     # ---- which values are read on one side alone
 
     def _find_dear_paths(self) -> None:
-        """Find paths of which each side costs what a branch does, or more."""
+        """Find the paths of all values, such that each side costs at least as much as a branch."""
         while True:
             self._find_paths()
             costs: dict[Path, int] = defaultdict(int)
@@ -140,24 +138,24 @@ class Branched:
                 self._cheap.clear()
 
     def _find_paths(self) -> None:
-        """On which sides of which conditions each value is read: what is common to all that read it."""
-        found: dict[int, Path] = dict.fromkeys(self._roots, ())
+        """Find the path of each value: the sides of conditions that all its readers have in common."""
+        paths: dict[int, Path] = dict.fromkeys(self._roots, ())
         self._paths.clear()
         for line in reversed(self.order):
-            if line not in found:
+            if line not in paths:
                 continue  # nothing reads it
-            path = self._paths[line] = found[line]
+            path = self._paths[line] = paths[line]
             for of, side in self._reads(line):
                 longer = path
                 for each in side:
                     if (*longer, each) in self._cheap:
                         break
                     longer = (*longer, each)
-                found[of] = _common(found[of], longer) if of in found else longer
+                paths[of] = _common(paths[of], longer) if of in paths else longer
         self.order = [line for line in self.order if line in self._paths]
 
     def _reads(self, line: int) -> list[tuple[int, Path]]:
-        """The operands of an operation, and on which sides of which conditions it reads them."""
+        """The operands of an operation, each with the sides of the conditions on which it reads them."""
         if (sides := self._sides(line)) is None:
             return [(each, ()) for each in self.nodes[line].of]
         condition, *values = sides
@@ -165,7 +163,7 @@ class Branched:
         return [(condition, ()), *read]
 
     def _side(self, line: int, side: bool) -> Path:
-        """A side of a choice: by ``p and q`` what holds is p, and then q, and likewise what does not hold by ``p or q``."""
+        """A side of a choice as a path: p and then q for the side where ``p and q`` holds, likewise where ``p or q`` does not."""
         condition = self._sides(line)[0]  # type: ignore[index]
         return ((condition, side),) if line in self._joint else self._parts(condition, side)
 
@@ -174,12 +172,12 @@ class Branched:
         if condition in self._leaves or name not in ("and", "or") or not all(self.kind(each) == "truth" for each in of):
             return ((condition, side),)
         if name != ("and" if side else "or"):
-            return ((condition, side),) if side else ()  # where not all of several hold is the usual case: it is computed always
+            return ((condition, side),) if side else ()  # usually not all of several hold: that side is always computed
         parts = [self._parts(each, side) for each in sorted(of)]
         return tuple(part for each in parts for part in each) if all(parts) else ()
 
     def _sides(self, line: int) -> tuple[int, int | None, int | None] | None:
-        """Of a choice its condition, and its values if that holds and if not; None is the truth of the condition itself."""
+        """The condition of a choice, and its values if it holds and if not; None stands for the truth of the condition."""
         node = self.nodes[line]
         if self.kind(line) not in ("truth", "number") or (node.name != "choose" and self.kind(line) != "truth"):
             return None
@@ -192,18 +190,18 @@ class Branched:
         return None
 
     def _are_dear(self, line: int) -> tuple[bool, bool]:
-        """Whether the sides of a choice are computed there alone."""
+        """Whether each side of a choice is computed on that side only."""
         if (sides := self._sides(line)) is None:
             return False, False
         path = self._paths[line]
-        found = []
+        dear = []
         for of, side in zip(sides[1:], (True, False), strict=True):
             begin = (*path, *self._side(line, side)[:1])
-            found.append(len(begin) > len(path) and of in self._paths and self._paths[of][: len(begin)] == begin)
-        return found[0], found[1]
+            dear.append(len(begin) > len(path) and of in self._paths and self._paths[of][: len(begin)] == begin)
+        return dear[0], dear[1]
 
     def _split(self) -> None:
-        """Make each choice that a branch will make one by one condition, or several of which one is within the other."""
+        """Replace each choice that a branch makes by choices within each other, each by a single condition."""
         while True:
             self._find_dear_paths()
             order: list[int] = []
@@ -218,7 +216,7 @@ class Branched:
             self._kinds.clear()
 
     def _in_parts(self, line: int, side: bool) -> list[int]:
-        """Make a choice one of several, of which that side is computed in the innermost; returns the others, in order."""
+        """Replace a choice by choices within each other, the innermost with that side; returns the new operations, in order."""
         _, *values = self._sides(line)  # type: ignore[misc]
         new: list[int] = []
 
@@ -230,15 +228,15 @@ class Branched:
         truths = 0, self.all_bits
         a, b = (add(Node("constant", (), truths[i])) if of is None else of for of, i in zip(values, (True, False), strict=True))
         *outer, (last, _) = self._side(line, side)
-        made = Node("choose", (last, a, b), 0)
+        choice = Node("choose", (last, a, b), 0)
         for condition, _ in reversed(outer):
-            inner = add(made)
-            made = Node("choose", (condition, inner, b) if side else (condition, a, inner), 0)
-        self.nodes[line] = made
+            inner = add(choice)
+            choice = Node("choose", (condition, inner, b) if side else (condition, a, inner), 0)
+        self.nodes[line] = choice
         return new
 
     def _simplify(self) -> None:
-        """A choice by a condition that is known where it is read is one of its sides."""
+        """Replace choices whose condition is known where they are read by one of their sides."""
         instead: dict[int, int] = {}
         for line in self.order:
             node, known = self.nodes[line], dict(self._paths[line])
@@ -247,7 +245,7 @@ class Branched:
                 instead[line] = node.of[1 if truth else 2]
 
     def _truth(self, condition: int, known: dict[int, bool]) -> bool | None:
-        """Whether a condition holds, if that follows from others."""
+        """Whether a condition holds, if that follows from known ones; else None."""
         if condition in known:
             return known[condition]
         name, of, _ = self.nodes[condition] if condition in self.nodes else self.operations[condition]
@@ -258,7 +256,7 @@ class Branched:
         return decisive if decisive in truths else None if None in truths else not decisive
 
     def _share(self) -> None:
-        """Find choices within a choice of which they are a side, and whose other side is also the other's."""
+        """Find choices that are a side of another choice and whose cheap side is also that of the other."""
         readers: dict[int, set[int]] = defaultdict(set)
         for line in self.order:
             for of in self.nodes[line].of:
@@ -277,7 +275,7 @@ class Branched:
     # ---- in which order
 
     def _arranged(self, path: Path, lines: Sequence[int]) -> list[Item]:
-        """These values, of which those on this path are computed here, and others in branches."""
+        """These values in order: those on this path by themselves, others in branches."""
         here = [line for line in lines if self._paths[line] == path and line not in self._done]
         items: list[Item] = []
         for line in here:
@@ -302,32 +300,32 @@ class Branched:
         return items
 
     def _ahead(self, line: int) -> list[int]:
-        """Values outside of a choice's sides that have to be computed before it, in order."""
+        """The values outside of the sides of a choice that must be computed before it, in order."""
         path = self._paths[line]
-        found: set[int] = set()
+        ahead: set[int] = set()
         waiting = list(self.nodes[line].of)
         while waiting:
             each = waiting.pop()
-            if each not in self._done and each not in found:
-                found.add(each)
+            if each not in self._done and each not in ahead:
+                ahead.add(each)
                 waiting += self.nodes[each].of
-        return [each for each in self.order if each in found and self._paths[each] == path]
+        return [each for each in self.order if each in ahead and self._paths[each] == path]
 
     def _of_side(self, path: Path, condition: int, side: bool, group: Sequence[int]) -> list[Item]:
         inner = (*path, (condition, side))
-        found: set[int] = set()
+        inside: set[int] = set()
         waiting = [self.nodes[line].of[2 - side] for line in group if self.expensive[line][not side]]
         while waiting:
             each = waiting.pop()
-            if each not in self._done and each not in found and self._paths[each][: len(inner)] == inner:
-                found.add(each)
+            if each not in self._done and each not in inside and self._paths[each][: len(inner)] == inner:
+                inside.add(each)
                 waiting += self.nodes[each].of
-        return self._arranged(inner, [each for each in self.order if each in found])
+        return self._arranged(inner, [each for each in self.order if each in inside])
 
     # ---- what is read behind a branch
 
     def _keep(self) -> None:
-        """Note what a branch computes that something behind it reads."""
+        """Record for each branch the values of its sides that are read after it."""
         places: dict[int, tuple[Branch, ...]] = {}
 
         def note(items: Sequence[Item], within: tuple[Branch, ...]) -> None:
@@ -354,11 +352,11 @@ def _cycles(name: str) -> int:
 def kind_of(
     node: tuple[str, tuple[int, ...], int], kind: Callable[[int], str], constant: Callable[[int], int | None], all_bits: int
 ) -> str:
-    """Of an operation: "truth", "bits" or "number"; "any" of a constant that may be each."""
-    name, of, given = node
+    """The kind of an operation: "truth", "bits" or "number"; "any" for a constant that may be each."""
+    name, of, extra = node
     kinds = {kind(each) for each in of}
     if name == "constant":
-        return "any" if given in (0, all_bits) else "number"
+        return "any" if extra in (0, all_bits) else "number"
     if name in COMPARISONS:
         return "truth"
     if name in ON_TRUTHS:
@@ -383,8 +381,8 @@ def _common(a: Path, b: Path) -> Path:
 
 def branches(items: Sequence[Item]) -> list[Branch]:
     """All branches among these items, and those within them."""
-    found: list[Branch] = []
+    every: list[Branch] = []
     for item in items:
         if isinstance(item, Branch):
-            found += [item, *(inner for side in item.sides for inner in branches(side))]
-    return found
+            every += [item, *(inner for side in item.sides for inner in branches(side))]
+    return every

@@ -14,8 +14,8 @@ from .written import Written
 TYPES = {"number": "double", "truth": "int", "bits": "uint64_t", "wide": "double", "index": "int"}
 SINGLE_TYPES = TYPES | {"number": "float", "bits": "uint32_t"}
 
-#: Values of FLT_EVAL_METHOD (C23, TS 18661-3) under which doubles, and floats, are computed in their own precision: 16, 32 and 64
-#: widen what is narrower than _Float16, float and double, and 1 widens floats to double.
+#: Values of FLT_EVAL_METHOD (C23, TS 18661-3) for which doubles, and floats, are computed in their own precision: 16, 32 and 64
+#: widen types narrower than _Float16, float and double, and 1 widens floats to double.
 OWN_PRECISION = {"double": (0, 1, 16, 32, 64), "float": (0, 16, 32)}
 
 BEGIN = """
@@ -86,8 +86,8 @@ static double PREFIX_sample(const double *samples, int count, double start, doub
 }"""
 
 
-def _on_bits(name: str, arguments: str, made: str) -> str:
-    return f"static inline uint64_t PREFIX_{name}({arguments}) {{ return {made}; }}"
+def _on_bits(name: str, arguments: str, expression: str) -> str:
+    return f"static inline uint64_t PREFIX_{name}({arguments}) {{ return {expression}; }}"
 
 
 TWO, SHIFT = "uint64_t a, uint64_t b", "uint64_t a, int n"
@@ -108,7 +108,7 @@ HELPERS = {
 
 
 def _narrow(text: str) -> str:
-    """The same function of numbers of 32 bits."""
+    """The function for numbers of 32 bits."""
     for wide, single in (("double", "float"), ("uint64_t", "uint32_t"), ("UINT64_C", "UINT32_C"), ("<< 63", "<< 31")):
         text = text.replace(wide, single)
     return text
@@ -178,11 +178,11 @@ int main(void) {
     }
 
     def literal(self, x: float) -> str:
-        """A finite number: the shortest text that is read as it."""
+        """A finite number: the shortest text that is read as this number."""
         return super().literal(x) + "f" * self.single
 
     def helper(self, name: str) -> str:
-        """With the prefix, so that several files may be compiled together."""
+        """The name of a function, with the prefix, so that several files may be compiled together."""
         return f"{self.prefix}_{name}"
 
     def file(self, w: Written, head: list[str]) -> str:
@@ -205,9 +205,9 @@ int main(void) {
         p, number = self.prefix, self.types["number"]
         lines = ["// What a step is described by.", "typedef struct {"]
         lines += [f"    {self.type_of(each)} {each.name}{_size(each)};{self._about(each)}" for each in w.parameters]
-        made = [f"    {self.types[each.kind]} {each.name.removeprefix(self.me)};" for each in w.made]
-        made += [f"    {number} {w.array}[{w.made_size}];"] * bool(w.made_size)
-        lines += ["", f"    // Made of these by {p}_prepare.", *made] if made else []
+        hoisted = [f"    {self.types[each.kind]} {each.name.removeprefix(self.me)};" for each in w.hoisted]
+        hoisted += [f"    {number} {w.array}[{w.hoisted_size}];"] * bool(w.hoisted_size)
+        lines += ["", f"    // Made of these by {p}_prepare.", *hoisted] if hoisted else []
         lines += [f"}} {p};", "", "// A state.", "typedef struct {"]
         lines += [f"    {number} {name}[{n}];" for name, _, n in w.blocks]
         lines += [f"    {number} tally; // what the control has added up"] * bool(w.evaluations)

@@ -1,4 +1,4 @@
-"""Functions of one number, recognised by their operations, so that a file can call them by name."""
+"""Functions of one number, which are recognised by their operations so that a file can call them by name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...reference import log, trig
 from ...reference.tape.operations import COMMUTE
 from ..explanation.listing import Body
 
-#: Their names in a file.
+#: The functions by their names in a file.
 FUNCTIONS: dict[str, Callable[[Any], Any]] = {"sine": trig.sin, "cosine": trig.cos, "logarithm": log.log}
 
 Operation = tuple[str, tuple[int, ...], int]
@@ -19,23 +19,23 @@ Operation = tuple[str, tuple[int, ...], int]
 
 @cache
 def operations_of(function: str, single: bool = False) -> Body:
-    """The operations of a function of one number, which is the state 0; of float32 if ``single``."""
+    """The operations of a function of one number, which is state 0; in float32 if ``single``."""
     tape = _core.Tape(single=single)
     return tape.operations([FUNCTIONS[function](tape.state(0))])
 
 
 def argument(function: str, operations: Sequence[Operation], line: int, single: bool = False) -> int | None:
-    """The argument if this line is a value of the function, else None."""
+    """The number of the argument if this line is a value of the function, else None."""
     pattern, (root,) = operations_of(function, single)
     matched: dict[int, int] = {}
 
     def fits(place: int, line: int) -> bool:
         if place in matched:
             return matched[place] == line
-        name, of, given = pattern[place]
+        name, of, extra = pattern[place]
         if name != "state":
-            its_name, its_operands, its_given = operations[line]
-            if (name, len(of), given) != (its_name, len(its_operands), its_given):
+            its_name, its_operands, its_extra = operations[line]
+            if (name, len(of), extra) != (its_name, len(its_operands), its_extra):
                 return False
             before = dict(matched)
             if not all(map(fits, of, its_operands)):
@@ -52,7 +52,7 @@ def argument(function: str, operations: Sequence[Operation], line: int, single: 
 
 
 def named(operations: list[Operation], single: bool = False) -> None:
-    """Replace functions by calls; operations that are then unused are left where they are."""
+    """Replace functions by calls. The operations that are then unused stay in the list."""
     roots = {function: operations_of(function, single) for function in FUNCTIONS}
     kinds = {function: body[0][body[1][0]][0] for function, body in roots.items()}
     for line in range(len(operations) - 1, -1, -1):

@@ -1,4 +1,4 @@
-"""The comment at the head of a file: what it is, how to call it, an example."""
+"""The comment at the head of a file: a description, its usage, an example."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from .lines import indented
 from .skeleton import Skeleton
 from .written import Written
 
-#: Steps of the example.
+#: The number of steps of the example.
 STEPS = 1000
 
-#: Characters of the system's repr.
+#: The most characters of the system's repr.
 MAX_SYSTEM = 400
 
-#: The first line of the example, by which it is found in the comment.
+#: The first line of the example in the comment.
 EXAMPLE = "Example:"
 
 

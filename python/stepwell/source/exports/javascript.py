@@ -60,8 +60,8 @@ function sample(samples, start, interval, t) {
 }"""
 
 
-def _on_bits(name: str, arguments: str, made: str) -> str:
-    return f"function {name}({arguments}) {{\n  return {made};\n}}"
+def _on_bits(name: str, arguments: str, expression: str) -> str:
+    return f"function {name}({arguments}) {{\n  return {expression};\n}}"
 
 
 #: Operations whose result is rounded.
@@ -147,12 +147,12 @@ console.log(s.$shown[0]);"""
     }
 
     def literal(self, x: float) -> str:
-        """A finite number: the shortest text that is read as it, by a language whose numbers are all float64."""
+        """A finite number: the shortest text that is read as this number; all numbers of the language are float64."""
         return repr(float(x)).removesuffix(".0")
 
-    def formula(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
-        """An operation of these, in float32 rounded at once."""
-        exact = super().formula(name, of, given, bits)
+    def formula(self, name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | None]) -> Formula:
+        """An operation on these; in float32 its result is rounded at once."""
+        exact = super().formula(name, of, extra, bits)
         return Formula(f"fround({exact.text})") if self.single and name in ROUNDED else exact
 
     def file(self, w: Written, head: list[str]) -> str:
@@ -163,7 +163,7 @@ console.log(s.$shown[0]);"""
 
     def _create(self, w: Written) -> list[str]:
         lines = self._set(w, "this.$name = ", ";", remarks=True)
-        lines += [f"this.{w.array} = new {self.array_type}({w.made_size});"] * bool(w.made_size)
+        lines += [f"this.{w.array} = new {self.array_type}({w.hoisted_size});"] * bool(w.hoisted_size)
         lines += [
             "for (const name of Object.keys(given)) {",
             "  if (!Object.prototype.hasOwnProperty.call(this, name)) throw new RangeError(`there is no parameter ${name}`);",

@@ -1,7 +1,7 @@
-"""Operations as a language writes them: the part that all languages share.
+"""Operations in a programming language: the part that all languages share.
 
 A value is a number, a truth, or bits (a 64-bit integer). Functions in the file convert numbers to bits and bits to numbers. Bits
-are never kept as a number, since not every language would preserve the bits of a NaN.
+are never stored as a number, since not every language would preserve the bits of a NaN.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from .functions import FUNCTIONS
 from .names import Field, Names
 from .program import Assignment, Table
 
-#: Comparisons whose sign is another one than in a formula.
+#: Comparisons whose sign differs from that in a formula.
 SIGNS = {"at most": "<=", "equal": "=="}
 
-#: Values that are named after a rate evaluation: the state at which it is made, and the increments.
+#: Names with the number of a rate evaluation: those of its state and of its increments.
 EVALUATION = re.compile(r"−?d?[vy](\d+)")
 
-#: The shift that moves the last bit of a number to its sign, by as many places: it sets the sign of a sine.
+#: The shift that moves the last bit of a number to its sign, with the number of places; it sets the sign of a sine.
 LAST_BIT = re.compile(r"\w*shift_up\(\w*bits_of\(((?:\w|\.|->)+)\), (\d+)\)")
 
 
@@ -37,9 +37,9 @@ class Language(Notation):
         helpers: the text of each function that a file may need.
         types: the types of values, by "number", "truth" and "bits", where a language has types; and "wide", of t0.
         of_single: the attributes that differ in float32.
-        truths: how false and true are written.
-        words: how "not", "and" and "or" are written.
-        writes: how operations are written that are no sums, products, comparisons or operations on bits; {} is the operand.
+        truths: false and true in the language.
+        words: "not", "and" and "or" in the language.
+        writes: the texts of operations that are no sums, products, comparisons or operations on bits; {} is the operand.
         me: the prefix of a field and a parameter.
         samples: how a table of samples is passed to a function; {name} is the table, {count} its length.
         kinds: the kind of each value with a name of its own, by that name: "number", "truth" or "bits".
@@ -69,7 +69,7 @@ class Language(Notation):
         self.prefix, self.fields = prefix, fields
         self.names = Names()
         self.kinds: dict[str, str] = {}
-        self.before = False  # whether values are computed before the steps and kept in fields
+        self.before = False  # whether values are computed before the steps and stored in fields
 
     # ---- values
 
@@ -82,15 +82,15 @@ class Language(Notation):
         return Formula(f"−{text}", SIGN) if bits >> self.precision.sign_place else Formula(text)
 
     def literal(self, x: float) -> str:
-        """A finite number: the shortest text that is read as it."""
+        """A finite number: the shortest text that is read as this number."""
         return plain.shortest(x, self.single)
 
     def whole(self, bits: int) -> str:
-        """Bits."""
+        """A constant that is bits."""
         return self.bits_literal.format(hex(bits))
 
     def named(self, name: str, value: Formula) -> Formula:
-        """A value that has a name of its own, where it is used."""
+        """The formula of a value that has a name of its own: that name in the file."""
         word = self.me + self.fields(name, f"made {name}") if self.before else self.names(name)
         self.kinds[word] = "truth" if value.is_truth else "bits" if value.is_bits else "number"
         return Formula(word, is_truth=value.is_truth, is_bits=value.is_bits)
@@ -100,17 +100,17 @@ class Language(Notation):
         return f"{self.helper(helper)}({', '.join(of)})"
 
     def helper(self, name: str) -> str:
-        """The name of such a function."""
+        """The name of a function in the file."""
         return name
 
     def as_number(self, value: Formula) -> Formula:
-        """The number of these bits."""
+        """The value as a number, if it is bits or a truth."""
         if value.is_truth:
             value = self.as_bits(value, None)
         return Formula(self.call("number_of", value.text)) if value.is_bits else value
 
     def as_bits(self, value: Formula, known: int | None) -> Formula:
-        """The bits of a number; ``known`` are those of a constant."""
+        """The value as bits; ``known`` are those of a constant."""
         if known is not None:
             return Formula(self.whole(known), is_bits=True)
         if value.is_bits:
@@ -120,7 +120,7 @@ class Language(Notation):
     # ---- operations
 
     def formula(self, name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | None]) -> Formula:
-        """An operation of these; ``bits`` are those of the operands that are constants."""
+        """An operation on these; ``bits`` are those of the operands that are constants."""
         if name in ON_BITS:
             return self._on_bits(name, of, extra, bits)
         if name == "choose":
@@ -151,7 +151,7 @@ class Language(Notation):
                 raise UnsupportedError(f"language: there is nothing in {self.title} for the operation {name!r} of this step")
 
     def quotient(self, a: Formula, b: Formula, divisor: int | None) -> Formula:
-        """A quotient; ``divisor`` are the bits of one that is a constant."""
+        """A quotient; ``divisor`` are the bits of the divisor if it is a constant."""
         return plain.formula("divide", (a, b), 0, (None, divisor))
 
     def _choice(self, of: Sequence[Formula], bits: Sequence[int | None]) -> Formula:
@@ -169,7 +169,7 @@ class Language(Notation):
         return Formula(self.choice(truth, a, b), CHOICE, a.is_truth, a.is_bits)
 
     def _sample(self, table: Table, t: str) -> Formula:
-        """The sample of a table that holds at a time; of a table of times, when that sample is."""
+        """The sample of a table that holds at time ``t``; for a table of times, the time of that sample."""
         samples = self.samples.format(name=self.table_name(f"{table.name}_samples"), count=len(table.values))
         start, interval = self.me + table.start, self.me + table.interval
         number = self.call("sample", samples, start, interval, t)
@@ -180,7 +180,7 @@ class Language(Notation):
         return self.helper(name)
 
     def choice(self, truth: Formula, a: Formula, b: Formula) -> str:
-        """One of two values."""
+        """The expression that chooses one of two values."""
         return f"{truth.within(EITHER)} ? {a.within(EITHER)} : {b.within(EITHER)}"
 
     def _on_bits(self, name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | None]) -> Formula:
@@ -217,7 +217,7 @@ class Language(Notation):
     # ---- texts
 
     def assignment(self, line: Line, role: str = "new") -> Assignment:
-        """A line of a section."""
+        """The assignment of a line of a section."""
         word = self.me + self.fields(line.name, f"made {line.name}") if self.before else self.names(line.name)
         evaluation = EVALUATION.match(line.note or line.name)
         return Assignment(
@@ -230,7 +230,7 @@ class Language(Notation):
         )
 
     def text(self, formula: str) -> str:
-        """A formula with the language's signs."""
+        """A formula with the operators of the language."""
         return formula.replace("·", " * ").replace("/", " / ").replace("−", "-")
 
     def signed(self, x: float) -> str:
@@ -238,9 +238,9 @@ class Language(Notation):
         return self.text(self.number(self.precision.pattern(x)).text)
 
     def value(self, field: Field) -> str:
-        """The number of a field that is one number."""
+        """The text of the number of a field without a shape."""
         return repr(float(field.values[0])) if field.wide and self.single else self.signed(field.values[0])
 
     def type_of(self, field: Field) -> str:
-        """The type of its numbers."""
+        """The type of the numbers of a field."""
         return self.types["wide" if field.wide else "number"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-#: Characters of a line of numbers.
+#: The most characters of a line of numbers.
 WIDTH = 100
 
 
@@ -27,6 +27,6 @@ def listed(begin: str, items: Sequence[str], end: str, indent: str = "") -> list
 
 
 def printable(line: str) -> str:
-    """A text that does not end a comment or join lines."""
+    """A text without characters that would end a comment or join lines."""
     line = "".join(letter if letter.isprintable() else " " for letter in line)
     return line.replace("*/", "* /").replace("??", "? ?").rstrip("\\ ")

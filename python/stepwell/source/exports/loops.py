@@ -1,8 +1,8 @@
 """A long step as loops over equal operations, on arrays.
 
-Operations of the same kind whose operands stand in the same arrays, and which may be computed one after the other, are one loop:
-the forces of all springs, then their sums by particles. The operations are those of the tape, each rounded by itself, so the bits
-are those of straight lines. Where operands do not follow each other at equal distances, a table says where they are.
+A loop makes operations of the same kind whose operands are in the same arrays and that do not depend on each other: the forces of
+all springs, for example, then their sums by particles. The operations are those of the tape, each rounded by itself, so the bits
+are those of straight lines. Where operands do not follow each other at equal distances, a table has their places.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from .language import Language
 from .program import Loop
 from .tapes import Operations
 
-#: Where a number is: an array, or what is one for all, and its place there.
+#: The array of a number and its index there; or a value that is the same for all, and −1.
 Place = tuple[str, int]
 
-#: The arrays of what is computed in a function, and of what is computed before the steps.
+#: The arrays of the values that are computed in a function, and before the steps.
 WORK, MADE = "w", "made"
 
 
 class NoLoopError(Exception):
-    """An operation that is not written as a loop."""
+    """An operation cannot be written as a loop."""
 
 
 class Looped(NamedTuple):
     """The values of a function.
 
     Attributes:
-        loops: what is computed, in order.
-        size: the length of the array in which it is.
-        places: where the values are that were asked for.
+        loops: the loops that compute them, in order.
+        size: the length of the array of their results.
+        places: the places of the roots.
     """
 
     loops: list[Loop]
@@ -58,7 +58,7 @@ class Writer:
         return bits if name == "constant" else None
 
     def looped(self, lines: Sequence[int], roots: Sequence[int], source: Callable[[int], Place], *, keep: bool) -> Looped:
-        """These operations, each after its operands; if ``keep``, each has a place of its own in the array of what is made."""
+        """These operations, each after its operands; with ``keep`` each has a place of its own in the array before the steps."""
         depth: dict[int, int] = {}
         groups: dict[tuple[object, ...], list[int]] = defaultdict(list)
         array = MADE if keep else WORK
@@ -67,11 +67,11 @@ class Writer:
             return (array,) if line in depth else self.all[line] if self._constant(line) is not None else source(line)[:1]
 
         for line in lines:
-            name, of, given = self.all[line]
+            name, of, extra = self.all[line]
             if self._kinds[line] == "bits":
                 raise NoLoopError
             depth[line] = 1 + max(depth.get(each, 0) for each in of)
-            groups[depth[line], name, given, *map(space, of)].append(line)
+            groups[depth[line], name, extra, *map(space, of)].append(line)
         ordered = sorted(groups.values(), key=lambda group: (depth[group[0]], group[0]))
         begins, size = self._begins(ordered, roots, keep)
         place = {line: (array, begin + i) for group, begin in zip(ordered, begins, strict=True) for i, line in enumerate(group)}
@@ -86,7 +86,7 @@ class Writer:
         return Looped(loops, size, [where(each) for each in roots])
 
     def _begins(self, groups: Sequence[Sequence[int]], roots: Sequence[int], keep: bool) -> tuple[list[int], int]:
-        """Where in the array the values of each group begin, and its length: a place is free again after the last reading."""
+        """The first index of each group in the array, and the length of the array; places are reused after their last reading."""
         last = {line: i for i, group in enumerate(groups) for each in group for line in self.all[each][1]}
         last |= dict.fromkeys(roots, len(groups))
         taken: list[tuple[int, int, int]] = []  # begin, end, and the group that reads it last
@@ -104,7 +104,7 @@ class Writer:
 
     def _text(self, group: Sequence[int], where: Callable[[int], Place]) -> str:
         """The formula of a group's operation."""
-        name, of, given = self.all[group[0]]
+        name, of, extra = self.all[group[0]]
         bits = [self._constant(each) for each in of]
         operands = []
         for i, known in enumerate(bits):
@@ -117,13 +117,13 @@ class Writer:
                 operands.append(Formula(f"{text} != {self.language.literal(0.0)}", COMPARISON, is_truth=True))
             else:
                 operands.append(Formula(text))
-        value = self.language.formula(name, operands, given, bits)
+        value = self.language.formula(name, operands, extra, bits)
         if value.is_truth:
             value = Formula(self.language.choice(value, *(Formula(self.language.literal(x)) for x in (1.0, 0.0))))
         return self.language.text(value.text)
 
     def at(self, array: str, places: Sequence[int]) -> str:
-        """Element i of an array, for each i; what is one for all is no array."""
+        """The expression of the element of an array in iteration i, from its place in each; a value for all is itself."""
         if min(places) < 0:
             return array
         step = places[1] - places[0] if len(places) > 1 else 0

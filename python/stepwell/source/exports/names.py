@@ -11,7 +11,7 @@ from ...base import checks
 from ...base.arrays import Shape
 from ...errors import ArgumentError, DTypeError
 
-#: Words that a name may not be: the languages' own, names that C's headers give to something else, and those that a file uses.
+#: Words that cannot be names: keywords of the languages, names of C's headers, and those that a file uses.
 WORDS = """
 abstract and alignas alignof arguments as asm assert async auto await become bool boolean box break byte case catch char class
 const constexpr continue crate debugger def default del delete do double dyn elif else enum eval except export extends extern
@@ -26,7 +26,7 @@ abs acos asin atan ceil cos errno exp f floor fma fmod i inf isnan log m math me
 stdout stderr strlen struct tan time u64
 """
 
-#: Names of types that a file uses, in languages whose types begin with a capital: others must not hide them.
+#: Names of types that a file uses, in languages whose types begin with a capital; other names must not hide them.
 TYPES = """
 Array ArrayBuffer BigInt BigInt64Array BigUint64Array Box Boolean Clone Copy Debug Default Error Float64Array Function Infinity
 Math NaN Number Object Option Range RangeError Result Self String Symbol TypeError ImportError ValueError Vec None True False
@@ -48,7 +48,7 @@ LETTERS = {
 }
 LETTERS |= {"β": "beta", "γ": "gamma", "κ": "kappa", "ν": "nu", "π": "pi", "ρ": "rho", "σ": "sigma", "τ": "tau", "θ": "theta"}
 
-#: The longest prefix; compilers need not tell longer names apart.
+#: The longest prefix; compilers need not distinguish longer names.
 MAX_PREFIX = 60
 
 ELEMENT = re.compile(r"(.*)\[(\d+(?:,\d+)*)\]")
@@ -73,7 +73,7 @@ class Names:
 
 
 def plain(name: str) -> str:
-    """Letters of English, digits and underscores."""
+    """A name as English letters, digits and underscores."""
     if name.endswith("'") or "'[" in name:
         name = "next_" + name.replace("'", "", 1)
     name = re.sub(r"[\[,.]", "_", re.sub(r"\[(\d+)\]\.", r"\1_", name)).replace("]", "")
@@ -114,14 +114,14 @@ def prefix(name: object) -> str:
 
 
 class Field(NamedTuple):
-    """Numbers of the structure that holds parameters, and what is made of them before the steps.
+    """A parameter in the structure of a file.
 
     Attributes:
-        name: in the file.
-        about: what it is.
-        values: its numbers by default, in the order of C.
-        shape: of an array; () of a number.
-        wide: whether it is of float64 in any case.
+        name: its name in the file.
+        about: its description.
+        values: its default numbers, in C order.
+        shape: the shape of an array; () for a number.
+        wide: whether it is float64 even in a file of float32.
     """
 
     name: str
@@ -132,7 +132,7 @@ class Field(NamedTuple):
 
 
 def fields(numbers: list[tuple[str, float]], used: set[int], names: Names) -> tuple[list[Field], dict[int, tuple[str, Shape]]]:
-    """Parameters that are used as fields, those of one array together; and of each parameter its field and its place there."""
+    """The fields of the parameters that are used, one for all elements of an array; and the field and place of each parameter."""
     matches = [ELEMENT.fullmatch(name) for name, _ in numbers]
     # If x[1].amplitude exists, x[0] is not an element of an array.
     alone = {name.partition("[")[0] for name, _ in numbers if "]." in name} | {name for name, _ in numbers if "[" not in name}
@@ -160,7 +160,7 @@ def fields(numbers: list[tuple[str, float]], used: set[int], names: Names) -> tu
 
 
 def indices(shape: Shape) -> list[Shape]:
-    """Every place of an array, in the order of C."""
+    """Every index of an array, in C order."""
     places: list[Shape] = [()]
     for size in shape:
         places = [(*place, i) for place in places for i in range(size)]

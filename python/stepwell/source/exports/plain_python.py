@@ -61,8 +61,8 @@ SINGLE = '''def single(x):
     return [single(each) for each in x] if isinstance(x, (list, tuple)) else float32(x)'''
 
 
-def _on_bits(name: str, arguments: str, made: str) -> str:
-    return f"def {name}({arguments}):\n    return {made}"
+def _on_bits(name: str, arguments: str, expression: str) -> str:
+    return f"def {name}({arguments}):\n    return {expression}"
 
 
 HELPERS = {
@@ -87,7 +87,7 @@ HEADS = {
     "work": "def work(self, s)",
 }
 
-#: NumPy warns of infinities, which are no errors here.
+#: NumPy warns of infinities, but here they are no errors.
 COMPUTES = {name: f'@numpy.errstate(all="ignore")\n{HEADS[name]}' for name in ("prepare", "start", "step", "finish")}
 
 
@@ -159,13 +159,13 @@ print(s.$shown[0])"""
         return f"float32({float(x)!r})" if self.single else super().literal(x)
 
     def quotient(self, a: Formula, b: Formula, divisor: int | None) -> Formula:
-        """A quotient; by a constant that is not zero Python's own."""
+        """A quotient; by a constant other than zero it is Python's own."""
         if self.single or (divisor is not None and divisor & (2**63 - 1)):
             return plain.formula("divide", (a, b), 0, (None, divisor))
         return Formula(self.call("quotient", a.text, b.text))
 
     def choice(self, truth: Formula, a: Formula, b: Formula) -> str:
-        """One of two values."""
+        """The expression that chooses one of two values."""
         return f"{a.within(EITHER)} if {truth.within(EITHER)} else {b.within(CHOICE)}"
 
     def file(self, w: Written, head: list[str]) -> str:
@@ -203,7 +203,7 @@ print(s.$shown[0])"""
 
     def _create(self, w: Written) -> list[str]:
         lines = self._set(w, "self.$name = ", "", remarks=True)
-        lines += [f"self.{w.array} = [{self.literal(0.0)}] * {w.made_size}"] * bool(w.made_size)
+        lines += [f"self.{w.array} = [{self.literal(0.0)}] * {w.hoisted_size}"] * bool(w.hoisted_size)
         lines += [
             "for name, value in given.items():",
             "    if name not in vars(self):",

@@ -1,4 +1,4 @@
-"""What a file computes, as the languages share it: values, branches, loops, functions, and tables of samples."""
+"""The contents of a file that all languages share: values, branches, loops, functions, and tables of samples."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ class Assignment(NamedTuple):
     """A value and its formula.
 
     Attributes:
-        name: as it is used.
+        name: its name in the file.
         kind: "number", "truth" or "bits".
         text: its formula.
         note: its meaning in the method, if the name does not say it.
         evaluation: the rate evaluation to which it belongs, counted from 1; 0 if that is not known.
-        role: "new"; "variable" if it is set again in a branch, without a text if in both; "set" there.
+        role: "new" for a value; "variable" for the declaration of one that branches set, without a text if both sides do; "set"
+            for its assignments there.
     """
 
     name: str
@@ -30,7 +31,7 @@ class Assignment(NamedTuple):
 
 
 class Conditional(NamedTuple):
-    """What is computed if a condition holds, and if not."""
+    """The statements if a condition holds, and those if it does not."""
 
     condition: str
     then: list[Statement]
@@ -38,9 +39,9 @@ class Conditional(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """So many equal operations: element i of the target array becomes the value of a text.
+    """Equal operations, repeated ``times``: element i of the target array becomes the value of a text.
 
-    Of the state, ``@y[i]`` is an element before the step, ``#y[i]`` one after it.
+    ``@y[i]`` is an element of the state before the step, ``#y[i]`` one after it.
     """
 
     times: int
@@ -63,7 +64,7 @@ class Function(NamedTuple):
     """The contents of a function.
 
     Attributes:
-        reads: the numbers of the state that it needs.
+        reads: the numbers of the state and of a force that it needs.
         needs_time: whether it needs the time.
         of_time: the values that depend on the time alone.
         lines: the values that depend on the state.
@@ -80,9 +81,9 @@ class Function(NamedTuple):
 
 
 class Table(NamedTuple):
-    """The samples of an input: their name, the field of the time of the first, and the field of the interval to the next.
+    """The samples of an input, with the field of the time of the first one, and the field of the interval between samples.
 
-    If it is one of ``times``, it has the numbers of the samples, from which their times follow.
+    A table of ``times`` has the numbers of the samples, from which their times follow.
     """
 
     name: str

@@ -27,7 +27,7 @@ class ExportedStep(ValueEquality):
         method: the method.
         member: which trajectory of the system's batch.
         fused: whether it uses fused multiply-adds.
-        operations: how many operations are written out, including those before the steps.
+        operations: the number of operations of a step, including those before the steps.
         dtype: ``"float64"`` or ``"float32"``, of its numbers.
 
     Example:
@@ -53,7 +53,7 @@ class ExportedStep(ValueEquality):
         """Write the file.
 
         Args:
-            path: the file; its ending must be one of the language.
+            path: the file; its ending must be one of ``endings``.
 
         Returns:
             The path.
@@ -66,9 +66,9 @@ class ExportedStep(ValueEquality):
         return place
 
     def as_dict(self) -> dict[str, Any]:
-        """Its attributes as numbers and texts."""
-        held = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return held | {"system": repr(self.system), "method": self.method.name}
+        """The attributes as numbers and texts."""
+        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return values | {"system": repr(self.system), "method": self.method.name}
 
     def __str__(self) -> str:
         return self.source

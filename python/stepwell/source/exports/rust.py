@@ -29,8 +29,8 @@ fn sample(samples: &[f64], start: f64, interval: f64, t: f64) -> f64 {
 }"""
 
 
-def _on_bits(name: str, arguments: str, made: str) -> str:
-    return f"#[inline(always)]\nfn {name}({arguments}) -> u64 {{\n    {made}\n}}"
+def _on_bits(name: str, arguments: str, expression: str) -> str:
+    return f"#[inline(always)]\nfn {name}({arguments}) -> u64 {{\n    {expression}\n}}"
 
 
 TWO, SHIFT = "a: u64, b: u64", "a: u64, n: u32"
@@ -51,7 +51,7 @@ HELPERS = {
 
 
 def _narrow(text: str) -> str:
-    """The same function of numbers of 32 bits."""
+    """The function for numbers of 32 bits."""
     return text.replace("f64", "f32").replace("u64", "u32").replace("<< 63", "<< 31")
 
 
@@ -118,7 +118,7 @@ fn main() {
     }
 
     def choice(self, truth: Formula, a: Formula, b: Formula) -> str:
-        """One of two values."""
+        """The expression that chooses one of two values."""
         return f"if {truth.text} {{ {a.text} }} else {{ {b.text} }}"
 
     def table_name(self, name: str) -> str:
@@ -139,16 +139,16 @@ fn main() {
 
     def _structures(self, w: Written) -> list[str]:
         p, number = camel(self.prefix), self.types["number"]
-        made = [(each.name.removeprefix(self.me), self.types[each.kind]) for each in w.made]
-        capitals = any(name != name.lower() for name in [*(each.name for each in w.parameters), *(name for name, _ in made)])
+        hoisted = [(each.name.removeprefix(self.me), self.types[each.kind]) for each in w.hoisted]
+        capitals = any(name != name.lower() for name in [*(each.name for each in w.parameters), *(name for name, _ in hoisted)])
         lines = ["/// What a step is described by."]
         lines.append("#[allow(dead_code, non_snake_case)]" if capitals else "#[allow(dead_code)]")
         lines += ["#[derive(Clone, Debug)]", f"pub struct {p} {{"]
         for each in w.parameters:
             lines += [f"    /// {each.about}."] if each.about != each.name else []
             lines.append(f"    pub {each.name}: {_type(self.type_of(each), each.shape)},")
-        made += [(w.array, f"[{number}; {w.made_size}]")] * bool(w.made_size)
-        lines += ["", "    // Made of these by `prepare`.", *(f"    {name}: {of}," for name, of in made)] if made else []
+        hoisted += [(w.array, f"[{number}; {w.hoisted_size}]")] * bool(w.hoisted_size)
+        lines += ["", "    // Made of these by `prepare`.", *(f"    {name}: {of}," for name, of in hoisted)] if hoisted else []
         lines += ["}", "", "/// A state.", "#[allow(dead_code)]", "#[derive(Clone, Debug)]", f"pub struct {p}State {{"]
         lines += [f"    pub {name}: [{number}; {n}]," for name, _, n in w.blocks]
         lines += ["    /// What the control has added up.", f"    pub tally: {number},"] * bool(w.evaluations)
@@ -157,8 +157,8 @@ fn main() {
     def _create(self, w: Written) -> list[str]:
         lines = self._set(w, "$name: ", ",", remarks=False)
         zero = {"number": "0.0", "truth": "false", "bits": "0"}
-        lines += [f"{each.name.removeprefix(self.me)}: {zero[each.kind]}," for each in w.made]
-        lines += [f"{w.array}: [0.0; {w.made_size}],"] * bool(w.made_size)
+        lines += [f"{each.name.removeprefix(self.me)}: {zero[each.kind]}," for each in w.hoisted]
+        lines += [f"{w.array}: [0.0; {w.hoisted_size}],"] * bool(w.hoisted_size)
         inside = ["let mut m = Self {", *indented(lines), "};", "m.prepare();", "m"]
         return self._function("With the parameters with which it was exported.", "pub fn new() -> Self", inside)
 
@@ -175,7 +175,7 @@ fn main() {
 
 
 def _type(text: str, shape: Shape) -> str:
-    """The type of an array of numbers of that type."""
+    """The type of an array of this shape."""
     for n in reversed(shape):
         text = f"[{text}; {n}]"
     return text

@@ -1,7 +1,7 @@
-"""A file in its order: what all languages share. A language fills in its syntax, mostly as texts with ``$words``.
+"""The order of a file, which all languages share. A language fills in its syntax, mostly as texts with ``$words``.
 
-Of the words, ``$prefix`` is the beginning of names, ``$type`` the type of the parameters, ``$number`` the type of numbers,
-``$slot`` the first block of a state. A function is called with ``$force`` behind its arguments if it has one.
+``$prefix`` is the beginning of names, ``$type`` the type of the parameters, ``$number`` the type of numbers, ``$slot`` the first
+block of a state. A call has ``$force`` after its arguments if the function reads a force.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .names import Field, Names, camel
 from .program import FORCE, Assignment, Conditional, Function, Loop, Statement
 from .written import Written
 
-#: What the functions of a file do.
+#: The comments of the functions of a file.
 ABOUT = {
     "prepare": "What does not change from step to step. To be called after a change of a parameter.",
     "start": "The state at step 0, of velocities and coordinates.",
@@ -34,7 +34,7 @@ ABOUT = {
 
 
 def filled(text: str, words: Mapping[str, object]) -> str:
-    """A text with these words in place of their names."""
+    """A template with these words filled in."""
     return Template(text).substitute(words)
 
 
@@ -47,30 +47,30 @@ class Skeleton(Language, ABC):
         doc: the beginning of a comment that says what a function does.
         gap: what stands between a statement and a comment behind it.
         end: the end of a statement.
-        step_in: by how much the inside of a block is indented.
+        step_in: the indentation of a block.
         time: the expression for the time of the present step.
         state: the prefix of a field of the state.
-        declaration: a value that gets a name.
-        variable: a value that is set again in a branch: with a first value, and without.
-        branch: the lines around both sides of a branch; the last is left out if empty.
+        declaration: the declaration of a value.
+        variable: the declaration of a variable that a branch sets: with a first value, and without.
+        branch: the lines around both sides of a branch; the last is omitted if empty.
         loop: a line for each i from 0 on.
         work_array: the array in which loops compute.
         table: the first line of a table of numbers.
         table_end: its last line.
         array: the first line of an array in the example.
-        rounding: a number of an argument in the precision of the file; a list of them is rounded by ``single`` in the file.
+        rounding: the expression that rounds a number to the precision of the file; ``single`` in the file rounds a list.
         heads: the first line of each function, without the brace.
-        about_function: what a function of one number does.
-        force: the argument of a function for a force from outside.
-        passed_force: the same in a call.
-        carried: the lines before a method's carry is computed.
+        about_function: the comment of a function of one number.
+        force: the parameter of a function for a force from outside.
+        passed_force: the argument for it in a call.
+        carried: the lines before the computation of a method's carry.
         returned: the last statement of "start" and of "finish", if there is one.
-        velocities: the statement that makes the velocities that "finish" computes, if there is one.
+        velocities: the statement that declares the velocities that "finish" computes, if there is one.
         work: the statement that computes the energy which the control has given.
-        order: the functions of a file.
-        usage: how to make a step.
-        calls: how "finish" and "work" are called.
-        example: a program that makes some steps and prints a number of the state; at ``$arrays`` stand its arrays.
+        order: the functions of a file in their order.
+        usage: the description of how to make a step.
+        calls: the calls of "finish" and "work".
+        program: an example that makes some steps and prints a number of the state; its arrays take the place of ``$arrays``.
     """
 
     endings: ClassVar[tuple[str, ...]]
@@ -110,7 +110,7 @@ class Skeleton(Language, ABC):
         return [f"{self.comment} {printable(line)}".rstrip() for line in lines]
 
     def usage_of(self, w: Written) -> list[str]:
-        """How to compile and call a file."""
+        """The description of how to compile and call a file."""
         lines = [*self.usage]
         if w.carries:
             lines.append(f"{self.calls['finish']} finds the velocities; in the state $slot stands in their place.")
@@ -164,7 +164,7 @@ class Skeleton(Language, ABC):
 
     @abstractmethod
     def _initial(self, w: Written) -> list[str]:
-        """Statements that make the state at step 0; what a method carries is computed behind them."""
+        """Statements that set the state at step 0; the carry of a method is computed after them."""
 
     def _functions(self, w: Written) -> list[list[str]]:
         written = {
@@ -179,7 +179,7 @@ class Skeleton(Language, ABC):
         return [written[name](w) for name in self.order if name not in absent]
 
     def _function(self, about: str, head: str, lines: Iterable[str]) -> list[str]:
-        """A function: what it does, its first line, its body."""
+        """A function: its comment, its first line, its body."""
         return [f"{self.doc} {about}", *f"{head} {{".splitlines(), *indented(lines, self.step_in), "}"]
 
     def _with_head(self, w: Written, name: str, lines: Iterable[str]) -> list[str]:
@@ -197,7 +197,7 @@ class Skeleton(Language, ABC):
         if self.rounding != "$text":
             names = [self.me + each.name for each in w.parameters if not each.wide]
             lines += [f"{name} = single({name}){self.end}" for name in names]
-        lines += [f"{each.name} = {each.text}{self.end}" for each in w.made]
+        lines += [f"{each.name} = {each.text}{self.end}" for each in w.hoisted]
         lines += [line for each in w.loops for line in self._statement(each)]
         return self._with_head(w, "prepare", lines)
 
@@ -217,9 +217,9 @@ class Skeleton(Language, ABC):
 
     def _finish(self, w: Written) -> list[str]:
         of = {name: f"{self.state}{name}" for name in (w.slot, "y")}
-        made = [filled(self.velocities, self._words(w))] * bool(self.velocities)
+        declaration = [filled(self.velocities, self._words(w))] * bool(self.velocities)
         body = self._body(w.functions["finish"], of, {"v": "velocities"}, "The velocities.")
-        return self._with_head(w, "finish", [*made, *body, *self._returned(w, "finish")])
+        return self._with_head(w, "finish", [*declaration, *body, *self._returned(w, "finish")])
 
     def _work(self, w: Written) -> list[str]:
         return self._with_head(w, "work", [filled(self.work, self._words(w))])
@@ -230,7 +230,7 @@ class Skeleton(Language, ABC):
     # ---- numbers of the file
 
     def _tables(self, w: Written) -> list[str]:
-        """The tables of samples, and those of places in arrays."""
+        """The tables of samples, and of places in arrays."""
         tables = []
         for each in w.tables:
             begin = self._table(f"{each.name}_samples", "number", len(each.values))
@@ -245,7 +245,7 @@ class Skeleton(Language, ABC):
         return filled(self.table, {"name": self.table_name(name), "of": self.types.get(kind, ""), "count": count})
 
     def _set(self, w: Written, begin: str, end: str, *, remarks: bool) -> list[str]:
-        """Statements that set the parameters; ``begin`` stands before the number of each, with its ``$name``."""
+        """Statements that set the parameters, each with ``begin``, in which ``$name`` is its name, its numbers, and ``end``."""
         lines: list[str] = []
         for each in w.parameters:
             assigned = filled(begin, {"name": each.name})
@@ -256,7 +256,7 @@ class Skeleton(Language, ABC):
         return lines
 
     def _about(self, field: Field) -> str:
-        """A comment behind a parameter, if its name does not say all."""
+        """A comment after a parameter, if its name does not say all."""
         return f"{self.gap}{self.comment} {field.about}" * (field.about != field.name)
 
     def _nested(self, begin: str, values: Sequence[float], shape: Shape, end: str, indent: str = "") -> list[str]:
@@ -272,7 +272,7 @@ class Skeleton(Language, ABC):
     # ---- functions that a file needs
 
     def _helpers(self, text: str) -> list[str]:
-        """The functions that this text of a file needs, in their order; each may need those before it."""
+        """The helper functions that this text of a file needs, in order; each may need those before it."""
         needed: list[str] = []
         for name in reversed([*self.helpers, *FUNCTIONS]):
             if re.search(rf"\b{self.helper(name)}\b", text):
@@ -282,7 +282,7 @@ class Skeleton(Language, ABC):
         return needed
 
     def _of_one_number(self, name: str) -> str:
-        """A function of one number, from its operations."""
+        """The text of a function of one number, from its operations."""
         operations, (root,) = operations_of(name, self.single)
         self.names = Names(("x",))
         body = [*operations, ("copy", [root], 0)], [len(operations)]
@@ -302,7 +302,10 @@ class Skeleton(Language, ABC):
     def _body(
         self, f: Function, read: Mapping[str, str], write: Mapping[str, str], after: str = "The state after the step."
     ) -> list[str]:
-        """The body of a function, not indented; ``read`` and ``write`` say where each block is, ``after`` what is written."""
+        """The body of a function, not indented.
+
+        ``read`` and ``write`` have the array of each block before and after; ``after`` is the comment before the results.
+        """
 
         def place(block: str, index: int, of: Mapping[str, str]) -> str:
             return of[block] if index < 0 else f"{of[block]}[{index}]"
@@ -345,7 +348,7 @@ class Skeleton(Language, ABC):
         return re.sub(r"#(\w+)(?=[\[ ])", lambda match: write.get(match[1], match[0]), line)
 
     def _statement(self, each: Statement) -> list[str]:
-        """Lines of what is computed."""
+        """The lines of a statement."""
         if isinstance(each, Loop):
             line = f"{each.target} = {each.text}{self.end}"
             return [line if each.times == 1 else filled(self.loop, {"count": each.times, "line": line})]

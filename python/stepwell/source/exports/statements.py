@@ -14,14 +14,14 @@ from .program import Assignment, Conditional, Statement
 
 
 class Copy(NamedTuple):
-    """A variable that gets a value.
+    """The assignment of a value to a variable.
 
     Attributes:
-        name: what it is called.
+        name: the name of the variable.
         kind: "number" or "truth".
-        value: the operation; None is zero, or the truth that stands beside.
-        reader: the choice that the variable is; −1 if it is none.
-        truth: a truth that is known.
+        value: the number of the value; None for zero, or for ``truth``.
+        reader: the choice whose variable it is; −1 if it is that of no choice.
+        truth: the truth to assign if ``value`` is None.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Statements:
         self._known = {line: leaf(*of) for line, of in leaves.items()}
         whole = branches(branched.items)
         self._tested = {each.condition for each in whole}
-        self._kept = {line for each in whole for line in each.keeps}
+        self._read_later = {line for each in whole for line in each.keeps}
         self._readers: dict[int, set[int]] = defaultdict(set)
         for line in branched.order:
             for of in branched.nodes[line].of:
@@ -71,7 +71,7 @@ class Statements:
         self.lines = self._written(branched.items, last)
 
     def _of_tape(self, roots: Sequence[int]) -> dict[int, Any]:
-        """The symbols of values, by which they have the names of the method's text."""
+        """The symbols of values, by which their names in the method's text are known."""
         operations, symbols = self._branched.operations, {line: leaf.symbol for line, leaf in self._known.items()}
         waiting = list(roots)
         needed: set[int] = set()
@@ -81,17 +81,17 @@ class Statements:
                 needed.add(line)
                 waiting += operations[line][1]
         for line in sorted(needed):
-            name, of, given = operations[line]
+            name, of, extra = operations[line]
             if of:
-                symbols[line] = self._writer.symbol(name, [symbols[each] for each in of], given)
+                symbols[line] = self._writer.symbol(name, [symbols[each] for each in of], extra)
             else:
-                symbols[line] = self._writer.source(name, given)
+                symbols[line] = self._writer.source(name, extra)
         return symbols
 
     # ---- statements
 
     def _written(self, items: Sequence[Item], last: Sequence[Copy]) -> list[Statement]:
-        """These values and branches, and then what variables get."""
+        """The statements of these values and branches, and then of the last copies."""
         out: list[Statement] = []
         run: list[int] = []
         for item in items:
@@ -103,7 +103,7 @@ class Statements:
         return out + self._straight(run, last)
 
     def _before(self, branch: Branch, out: list[Statement]) -> list[Copy]:
-        """What the variables of a branch are if it sets none, and is not to be computed."""
+        """The declarations of the variables that a branch sets, and their values if the branch does not set them."""
         copies = []
         for line in branch.sets:
             if line in self._branched.same:
@@ -140,7 +140,7 @@ class Statements:
         return Conditional(self._language.text(self._known[branch.condition].text.text), *sides)
 
     def _name(self, line: int) -> str:
-        """What a variable is called."""
+        """The name of a value; a choice that is a side of another one has the name of that."""
         while line in self._branched.same:
             line = self._branched.same[line]
         if line not in self._names:
@@ -148,7 +148,7 @@ class Statements:
         return self._names[line]
 
     def _role(self, name: str) -> str:
-        """Whether a line makes a value, or makes or sets a variable."""
+        """The role of an assignment to this name, as in ``Assignment``."""
         if name not in self._variables:
             return "new"
         role = "set" if name in self._declared else "variable"
@@ -160,7 +160,7 @@ class Statements:
         return Leaf(self._language.named(self._name(line), Formula("", is_truth=is_truth)), self._symbols.get(line), 4)
 
     def _literal(self, of: Copy) -> Leaf | None:
-        """A truth that is known."""
+        """The leaf of a copy of a known truth; None for other copies."""
         bits = None if of.value is None else self._branched.constant(of.value)
         if of.value is not None and bits is None:
             return None
@@ -168,7 +168,7 @@ class Statements:
         return Leaf(Formula(self._language.truths[truth], is_truth=True), None, 0)
 
     def _straight(self, run: Sequence[int], copies: Sequence[Copy]) -> list[Statement]:
-        """Values one after the other, and then what variables get."""
+        """The statements of values without branches, and then of the copies."""
         branched = self._branched
         body: list[tuple[str, list[int], int]] = []
         places: dict[int, int] = {}
@@ -180,8 +180,8 @@ class Statements:
                     known.append(self._known[line])
                     body.append(("known", [], len(known) - 1))
                 else:
-                    name, of, given = branched.nodes[line]
-                    body.append((name, [place(each) for each in of], given))
+                    name, of, extra = branched.nodes[line]
+                    body.append((name, [place(each) for each in of], extra))
                 places[line] = len(body) - 1
             return places[line]
 
@@ -189,7 +189,7 @@ class Statements:
         named: dict[int, str] = {}
         for line in run:
             place(line)
-            if line in self._kept:
+            if line in self._read_later:
                 self._variables.add(self._name(line))
             if line in self._names:
                 named[line] = self._names[line]
@@ -210,8 +210,8 @@ class Statements:
             body.append(("copy" if each.kind == "number" else "same", [at], 0))
             results.append((len(body) - 1, each.name))
 
-        def leaf(name: str, given: int) -> Leaf:
-            return known[given] if name == "known" else self._leaf(name, given)
+        def leaf(name: str, index: int) -> Leaf:
+            return known[index] if name == "known" else self._leaf(name, index)
 
         section, leaves = self._writer.section(
             "member step", (body, [at for at, _ in results]), leaf, 4, "a", [of for _, of in results]

@@ -16,19 +16,20 @@ from ...model.parameters import aligned
 from ...reference.signal import Held
 from ...reference.tape.operations import COMPARISONS, ON_BITS
 from ...runs import engine
-from ..explanation.listing import Body, Named, increments_last, indexed, parameters
+from ..explanation.listing import Body
+from ..explanation.naming import Named, increments_last, indexed, parameters
 from .functions import named
 
 #: The most operations that are written out one by one; a longer text is too long for compilers and for people.
 MAX_OPERATIONS = 20_000
 
-#: The most that are written as loops: a few arrays of some megabytes.
+#: The most operations that are written as loops: a few arrays of some megabytes.
 MAX_IN_LOOPS = 400_000
 
-#: How often a value changes: never, once a run, once a step by the time alone, with the state.
+#: How often a value changes: never, once a run, once a step with the time, with the state.
 NEVER, RUN, STEP, STATE = range(4)
 
-#: Operations whose value is bits or a truth and not a number, so that it cannot be part of a state or a field.
+#: Operations whose value is bits or a truth and not a number, so that it cannot be a number of a state or a field.
 NO_NUMBER = (*COMPARISONS, *ON_BITS)
 
 
@@ -60,12 +61,11 @@ class Table(NamedTuple):
 
 
 class Operations:
-    """Operations of several functions in one list, each once.
-
-    From some parameter on they are the force, which may change with every step.
+    """The operations of several functions in one list, each once.
 
     Attributes:
-        all: name, operands and other arguments of each; operands come before the operations that use them.
+        first_of_force: the first parameter that is a number of the force, which may change with every step; None without one.
+        all: the name, the operands and the extra argument of each; operands come before the operations that use them.
         rank: how often the value of each changes.
     """
 
@@ -76,12 +76,12 @@ class Operations:
         self._places: dict[tuple[str, tuple[int, ...], int], int] = {}
 
     def add(self, operations: Sequence[tuple[str, Sequence[int], int]], roots: Sequence[int]) -> list[int]:
-        """Add operations; returns the numbers of the roots here."""
+        """Add operations, and return the numbers of the roots in ``all``."""
         place: list[int] = []
-        for name, of, given in operations:
-            if name == "parameter" and self.first_of_force is not None and given >= self.first_of_force:
+        for name, of, extra in operations:
+            if name == "parameter" and self.first_of_force is not None and extra >= self.first_of_force:
                 name = "force"
-            key = name, tuple(place[each] for each in of), given
+            key = name, tuple(place[each] for each in of), extra
             if key not in self._places:
                 self._places[key] = len(self.all)
                 self.all.append(key)
@@ -99,55 +99,55 @@ class Operations:
         return [place[each] for each in roots]
 
     def needed(self, roots: Sequence[int], stop: Callable[[int], bool]) -> list[int]:
-        """The operations of which these values are computed, in order, back to and including those at which to stop."""
-        found: set[int] = set()
+        """The operations that these values depend on, in order, down to and including those for which ``stop`` is true."""
+        needed: set[int] = set()
         waiting = list(roots)
         while waiting:
             line = waiting.pop()
-            if line not in found:
-                found.add(line)
+            if line not in needed:
+                needed.add(line)
                 if not stop(line):
                     waiting += self.all[line][1]
-        return sorted(found)
+        return sorted(needed)
 
-    def kept(self, parts: Sequence[Part]) -> list[int]:
-        """Values that are computed before the steps and read in them."""
+    def hoisted(self, parts: Sequence[Part]) -> list[int]:
+        """The values that are computed before the steps and read in them."""
         roots = [each for part in parts for each in part.roots]
         above = [each for each in self.needed(roots, lambda line: self.rank[line] <= RUN) if self.rank[each] > RUN]
         read = {each for line in above for each in self.all[line][1]} | set(roots)
         return sorted(each for each in read if self.rank[each] == RUN and self.all[each][1])
 
     def body(self, roots: Sequence[int], leaves: dict[int, tuple[str, int]], *, separate: bool) -> Body:
-        """The body that computes these values from given leaves, by line.
+        """The body that computes these values from leaves, which are by line.
 
-        If ``separate``, each value has a place of its own, which holds a number.
+        If ``separate``, each value has a place of its own and is a number.
         """
         needed = self.needed(roots, leaves.__contains__)
         place = {line: i for i, line in enumerate(needed)}
-        made: list[tuple[str, list[int], int]] = []
+        operations: list[tuple[str, list[int], int]] = []
         for line in needed:
-            name, of, given = self.all[line]
+            name, of, extra = self.all[line]
             leaf = leaves.get(line)
-            made.append((leaf[0], [], leaf[1]) if leaf else (name, [place[each] for each in of], given))
+            operations.append((leaf[0], [], leaf[1]) if leaf else (name, [place[each] for each in of], extra))
         places: list[int] = []
         for root in roots:
             at = place[root]
-            if separate and (at in places or not made[at][1] or made[at][0] in NO_NUMBER):
-                made.append(("copy", [at], 0))
-                at = len(made) - 1
+            if separate and (at in places or not operations[at][1] or operations[at][0] in NO_NUMBER):
+                operations.append(("copy", [at], 0))
+                at = len(operations) - 1
             places.append(at)
-        return made, places
+        return operations, places
 
 
 class Traced:
     """A step by a method, for one member of a batch.
 
     Attributes:
-        operations: those of all its functions.
+        operations: the operations of all its functions.
         parts: its functions, by name: "step", and "start" and "finish" for a method that carries something other than v.
-        numbers: name and value of each parameter, in the tape's order.
+        numbers: the name and the value of each parameter, in the tape's order.
         tables: the sampled inputs.
-        force: the numbers of a force from outside; none without one.
+        force: the numbers of a force from outside; empty without one.
         count: the number of arithmetic operations of a step, including those before the steps.
     """
 
@@ -169,7 +169,7 @@ class Traced:
         self.count = sum(bool(of) for _, of, _ in self.operations.all)
         if self.count > MAX_IN_LOOPS:
             raise too_long(plan, str(self.count))
-        if not plan.fused:  # else their products would be fused with the sums around them
+        if not plan.fused:  # with fused multiply-adds, products of a function may be fused with sums around it
             named(self.operations.all, plan.single)
 
         def own(values: Any, before: int = 0) -> Any:
@@ -181,10 +181,10 @@ class Traced:
         numbers = [float(kind(own(value))) for value in of_step.numbers]
         self.numbers = list(zip(names, numbers, strict=False))
         self.force = numbers[len(names) :]
-        held: list[Held] = of_step.tables
+        samples: list[Held] = of_step.tables
         self.tables = [
             Table(name, [float(each) for each in own(table.values, 1)], float(table.interval), float(table.start))
-            for name, table in zip(tables, held, strict=True)
+            for name, table in zip(tables, samples, strict=True)
         ]
 
     def _part(self, which: str) -> tuple[Part, Named]:
@@ -194,7 +194,7 @@ class Traced:
         symbols = (
             tracer.step(method, plan.choice) if which == "step" else tracer.slot(method, which, plan.choice)[: prod(v_shape)]
         )
-        told, roots = _fused(tape, symbols) if plan.fused else tape.operations(symbols)
+        operations, roots = _fused(tape, symbols) if plan.fused else tape.operations(symbols)
         names = tracer.names
         if plan.fused:
             tape, names, _ = increments_last(tracer, symbols, plan.single)
@@ -206,7 +206,7 @@ class Traced:
             results += elements("y'", plan.system.y_shape)
             if plan.system.control is not None:
                 inputs, results = [*inputs, TALLY], [*results, f"{TALLY}'"]
-        return Part(tape, names, self.operations.add(told, roots), inputs, results), tracer
+        return Part(tape, names, self.operations.add(operations, roots), inputs, results), tracer
 
 
 #: The sum that a control or a projection accumulates.
@@ -214,7 +214,7 @@ TALLY = "tally"
 
 
 def elements(name: str, shape: Shape) -> list[str]:
-    """The names of a block's numbers, in the order of C."""
+    """The names of a block's numbers, in C order."""
     return [indexed(name, index) for index in np.ndindex(shape)]
 
 
@@ -224,7 +224,7 @@ def _fused(tape: Any, symbols: list[Any]) -> Any:
 
 
 def too_long(plan: engine.Plan, count: str, most: int = MAX_IN_LOOPS) -> UnsupportedError:
-    """The error for a step that is not written out."""
+    """The error for a step that is too long to export."""
     return UnsupportedError(
         f"system: a step of {checks.short(plan.system)} by {plan.method.name} has {count} operations, and at most "
         f"{most} are written{' out one by one' * (most < MAX_IN_LOOPS)}; export a smaller system"

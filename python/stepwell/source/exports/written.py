@@ -1,4 +1,4 @@
-"""The contents of a file in its language, not yet in its order: fields, values computed before the steps, functions."""
+"""The contents of a file in a language, before they are put in order: fields, values computed before the steps, functions."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from .program import FORCE, Assignment, Function, Loop, Place, Statement, Table,
 from .statements import Statements
 from .tapes import MAX_OPERATIONS, STATE, STEP, TALLY, Operations, Part, Traced, elements, too_long
 
-#: Names in use in a function: its arguments and the time.
+#: Names that are taken in a function: its arguments and the time.
 LOCALS = ("m", "s", "t", "self", "coordinates", "velocities", FORCE)
 
-#: Names that fields may not have, because something else of the object has them.
+#: Names that fields cannot have, since other members of the object have them.
 MEMBERS = ("defaults", "finish", "new", "prepare", "start", "step", "work", "constructor", "prototype")
 
 
@@ -34,13 +34,13 @@ class Written:
 
     Attributes:
         parameters: the fields that users may change, dt and t0 first.
-        made: values computed from them before the steps.
+        hoisted: values computed from them before the steps.
         functions: "step", and "start" and "finish" for a method that carries something other than v.
         tables: the sampled inputs.
         slot: the name of the first block of a state.
-        n_v: the number of numbers in it.
-        n_y: the number of numbers in the second.
-        evaluations: how many times a step adds to the sum of a control; 0 without one.
+        n_v: the length of the first block.
+        n_y: the length of the second block.
+        evaluations: how many times a step adds to the sum of a control; 0 without a control.
     """
 
     def __init__(self, traced: Traced, language: Language) -> None:
@@ -51,7 +51,7 @@ class Written:
         self.evaluations = 0 if control is None else pushes(control, plan.method.evaluations)
         names = language.fields
         operations = traced.operations
-        used = {given for name, _, given in operations.all if name == "parameter"}
+        used = {extra for name, _, extra in operations.all if name == "parameter"}
         self.parameters = [
             Field(names("dt"), "the step", [plan.dt]),
             Field(names("t0"), "the time of step 0", [plan.t0], wide=True),
@@ -77,19 +77,18 @@ class Written:
             start, interval = (each.name for each in of_time[called])
             self.tables.append(Table(tables(table.name), table.name, values, start, interval, part == "times"))
         language.tables = self.tables
-        kept = operations.kept(list(traced.parts.values()))
+        hoisted = operations.hoisted(list(traced.parts.values()))
         #: Values computed before the steps by loops, the array that holds them, its length, and tables of places.
         self.loops: list[Loop] = []
-        self.array, self.made_size = language.fields(MADE, "made by loops"), 0
+        self.array, self.hoisted_size = language.fields(MADE, "made by loops"), 0
         self.places: dict[str, tuple[int, ...]] = {}
         if traced.count > MAX_OPERATIONS:
             self.parameters = [each._replace(shape=each.shape and (prod(each.shape),)) for each in self.parameters]
-            self.made: list[Assignment] = []
-            self.functions = self._looped(operations, kept)
+            self.hoisted: list[Assignment] = []
+            self.functions = self._looped(operations, hoisted)
             return
-        made, known = self._prepared(operations, kept)
-        self.made = made
-        self.functions = {name: self._function(part, operations, kept, known) for name, part in traced.parts.items()}
+        self.hoisted, known = self._prepared(operations, hoisted)
+        self.functions = {name: self._function(part, operations, hoisted, known) for name, part in traced.parts.items()}
 
     @property
     def carries(self) -> bool:
@@ -103,7 +102,7 @@ class Written:
         return [each for each in both if each[2]]
 
     def forced(self, function: str) -> bool:
-        """Whether a function has a force from outside for an argument: a step has if there is one, others if they read it."""
+        """Whether a function has an argument for a force from outside: the step if there is one, others if they read it."""
         return function in self._forced or (function == "step" and bool(self.traced.force))
 
     @cached_property
@@ -122,7 +121,7 @@ class Written:
 
     @property
     def shown(self) -> str:
-        """The block of which an example prints the first number."""
+        """The block whose first number the example prints."""
         return "y" if self.n_y else self.slot
 
     # ---- leaves
@@ -137,8 +136,8 @@ class Written:
 
     # ---- parts
 
-    def _prepared(self, operations: Operations, kept: list[int]) -> tuple[list[Assignment], list[Leaf]]:
-        """The values computed before the steps, and how each is read in them."""
+    def _prepared(self, operations: Operations, hoisted: list[int]) -> tuple[list[Assignment], list[Leaf]]:
+        """The assignments of the values that are computed before the steps, and the leaves by which the steps read them."""
         tape, names = next((part.tape, dict(part.names)) for part in self.traced.parts.values())
         numbers = [name for name, _ in self.traced.numbers]
         for i, name in enumerate(numbers):
@@ -147,48 +146,48 @@ class Written:
         self.language.before = True
         writer = Writer(tape, names, self.language)
 
-        def leaf(name: str, given: int) -> Leaf:
-            return self._length(tape) if name == "step" else self._parameter(tape, given)
+        def leaf(name: str, index: int) -> Leaf:
+            return self._length(tape) if name == "step" else self._parameter(tape, index)
 
-        section, known = writer.section("run", operations.body(kept, {}, separate=False), leaf, 1, "c")
-        made = [self._assignment(line) for line in section.lines]
+        section, known = writer.section("run", operations.body(hoisted, {}, separate=False), leaf, 1, "c")
+        assignments = [self._assignment(line) for line in section.lines]
         self.language.before = False
-        return made, known
+        return assignments, known
 
-    def _looped(self, operations: Operations, kept: list[int]) -> dict[str, Function]:
+    def _looped(self, operations: Operations, hoisted: list[int]) -> dict[str, Function]:
         """The functions as loops."""
         language = self.language
         shapes = {each.name: each.shape for each in self.parameters}
         loops = LoopWriter(operations, language)
-        kept_places: dict[int, LoopPlace] = {}
+        hoisted_places: dict[int, LoopPlace] = {}
 
         def before(line: int) -> LoopPlace:
-            name, _, given = operations.all[line]
+            name, _, extra = operations.all[line]
             if name == "step":
                 return f"{language.me}{language.fields('dt')}", -1
-            field, place = self._where[given]
+            field, place = self._where[extra]
             at = int(np.ravel_multi_index(place, self._shapes[field])) if shapes[field] else -1
             return f"{language.me}{field}", at
 
         def source(part: Part, line: int) -> LoopPlace:
-            name, _, given = operations.all[line]
-            if line in kept_places:
-                return kept_places[line]
+            name, _, extra = operations.all[line]
+            if line in hoisted_places:
+                return hoisted_places[line]
             if name == "constant":
-                return language.text(language.number(given).text), -1
+                return language.text(language.number(extra).text), -1
             if name == "time":
                 return "t", -1
             if name == "force":
-                return f"@{FORCE}", given - len(self.traced.numbers)
+                return f"@{FORCE}", extra - len(self.traced.numbers)
             if name != "state":
                 return before(line)
-            block = part.inputs[given].partition("[")[0]
-            return f"@{block}", -1 if block == TALLY else given if given < self.n_v else given - self.n_v
+            block = part.inputs[extra].partition("[")[0]
+            return f"@{block}", -1 if block == TALLY else extra if extra < self.n_v else extra - self.n_v
 
-        inner = [line for line in operations.needed(kept, lambda line: False) if operations.all[line][1]]
+        inner = [line for line in operations.needed(hoisted, lambda line: False) if operations.all[line][1]]
         try:
-            first = loops.looped(inner, kept, before, keep=True)
-            kept_places |= dict(zip(kept, [(f"{language.me}{self.array}", at) for _, at in first.places], strict=True))
+            first = loops.looped(inner, hoisted, before, keep=True)
+            hoisted_places |= dict(zip(hoisted, [(f"{language.me}{self.array}", at) for _, at in first.places], strict=True))
             self.loops = [
                 each._replace(
                     target=language.me + each.target.replace(MADE, self.array, 1),
@@ -196,9 +195,9 @@ class Written:
                 )
                 for each in first.loops
             ]
-            self.made_size = first.size
+            self.hoisted_size = first.size
             functions = {
-                name: self._loops(part, operations, loops, kept_places, partial(source, part))
+                name: self._loops(part, operations, loops, hoisted_places, partial(source, part))
                 for name, part in self.traced.parts.items()
             }
         except NoLoopError:
@@ -211,16 +210,16 @@ class Written:
         part: Part,
         operations: Operations,
         loops: LoopWriter,
-        kept_places: dict[int, LoopPlace],
+        hoisted_places: dict[int, LoopPlace],
         source: Callable[[int], LoopPlace],
     ) -> Function:
         needed = [
             line
-            for line in operations.needed(part.roots, kept_places.__contains__)
-            if operations.all[line][1] and line not in kept_places
+            for line in operations.needed(part.roots, hoisted_places.__contains__)
+            if operations.all[line][1] and line not in hoisted_places
         ]
         body = loops.looped(needed, part.roots, source, keep=False)
-        # What stays as it was is read before anything is written.
+        # Results that are no computed values, such as a number of the state, are read before anything is written.
         own = [i for i, (array, _) in enumerate(body.places) if array != WORK]
         aside = [(WORK, body.size + k) for k in range(len(own))]
         values = list(body.places)
@@ -234,7 +233,7 @@ class Written:
         needs_time = any(re.search(r"\bt\b", text) for text in texts(lines))
         return Function([], needs_time, [], list(lines), [], body.size + len(own))
 
-    def _function(self, part: Part, operations: Operations, kept: list[int], known: list[Leaf]) -> Function:
+    def _function(self, part: Part, operations: Operations, hoisted: list[int], known: list[Leaf]) -> Function:
         language, tape = self.language, part.tape
         language.names = Names(LOCALS)
         reads: dict[int, Place] = {}
@@ -252,36 +251,36 @@ class Written:
 
         entries: list[Leaf] = []
 
-        def leaf(name: str, given: int) -> Leaf:
+        def leaf(name: str, index: int) -> Leaf:
             leaf_names.add(name)
             match name:
-                case "made":  # names are by numbers on a tape, here that of the step
-                    return known[given] if tape is self.traced.parts["step"].tape else known[given]._replace(symbol=None)
+                case "made":  # a symbol names a value on the tape of the step only
+                    return known[index] if tape is self.traced.parts["step"].tape else known[index]._replace(symbol=None)
                 case "entry":
-                    return entries[given]
+                    return entries[index]
                 case "step":
                     return self._length(tape)
                 case "parameter":
-                    return self._parameter(tape, given)
+                    return self._parameter(tape, index)
                 case "time":
                     return Leaf(Formula("t"), tape.time(), 3)
                 case "force":
-                    at = given - len(self.traced.numbers)
+                    at = index - len(self.traced.numbers)
                     called = elements(FORCE, self.traced.plan.system.v_shape)[at]
                     reads[len(part.inputs) + at] = Place(FORCE, at, language.names(called, f"given {called}"))
-                    return Leaf(Formula(reads[len(part.inputs) + at].name), tape.param(given), 4)
+                    return Leaf(Formula(reads[len(part.inputs) + at].name), tape.param(index), 4)
                 case _:
-                    return state(given)
+                    return state(index)
 
-        made = {line: ("made", i) for i, line in enumerate(kept)}
+        leaves_before = {line: ("made", i) for i, line in enumerate(hoisted)}
         rank = operations.rank
         needed = operations.needed(part.roots, lambda line: rank[line] <= STEP)
         read = {each for line in needed if rank[line] == STATE for each in operations.all[line][1]} | set(part.roots)
         of_time = sorted(each for each in read if rank[each] == STEP and operations.all[each][1])
         writer = Writer(tape, part.names, language)
-        before, entries = writer.section("step", operations.body(of_time, made, separate=False), leaf, 3, "s")
+        before, entries = writer.section("step", operations.body(of_time, leaves_before, separate=False), leaf, 3, "s")
         of_time_lines = [self._assignment(line) for line in before.lines]
-        leaves = made | {line: ("entry", i) for i, line in enumerate(of_time)}
+        leaves = leaves_before | {line: ("entry", i) for i, line in enumerate(of_time)}
         branched = Branched(operations.all, part.roots, leaves, language.all_bits)
         lines: list[Statement]
         if branched.is_straight:

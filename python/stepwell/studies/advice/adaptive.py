@@ -48,9 +48,9 @@ class AdaptiveTrials:
         assert scene.exact is not None
         self.grid, self.allowed, self.most = motion.grid, allowed, most
         #: What a run costs is what it costs to know the state at these times.
-        self.asked = motion.grid.asked if motion.grid.framed else np.array([motion.grid.end])
+        self.output_times = motion.grid.output_times if motion.grid.framed else np.array([motion.grid.end])
         self.marks = motion.marks[1:]
-        self.scene = replace(scene, exact=looked_up(scene.exact, np.union1d(self.asked, self.marks)))
+        self.scene = replace(scene, exact=looked_up(scene.exact, np.union1d(self.output_times, self.marks)))
         self._runs: dict[tuple[str, float], Trial] = {}
         self._trials: dict[tuple[str, float], Trial] = {}
         self._confirmed: dict[tuple[str, float], Trial] = {}
@@ -94,7 +94,7 @@ class AdaptiveTrials:
         ends = np.concatenate([[0.0], marks, self.marks[-1:]])
         around = [np.linspace(ends[i], ends[i + 2], REFINED_SAMPLES + 1) for i in np.argsort(error)[-REFINED_MARKS:]]
         closer, _ = self._errors(method, tolerance, np.unique(np.concatenate(around)))
-        shown, _ = self._errors(method, tolerance, self.grid.asked)
+        shown, _ = self._errors(method, tolerance, self.grid.output_times)
         return trial._replace(error=max(trial.error, *(float(each.max()) for each in (error, closer, shown))))
 
     def _errors(self, method: Method, tolerance: float, at: Array, share: float = 1.0) -> tuple[Array, Run]:
@@ -105,7 +105,7 @@ class AdaptiveTrials:
         """The run that is judged, with its error at the output times."""
         key = (method.name, tolerance)
         if key not in self._runs:
-            errors, run = self._errors(method, tolerance, self.asked, share)
+            errors, run = self._errors(method, tolerance, self.output_times, share)
             assert run.paces is not None
             steps = int(run.paces.evaluations) // method.attempt_evaluations
             stopped = bool(run.status)
@@ -126,7 +126,7 @@ class AdaptiveTrials:
         """The most steps that are tried in a frame, those for its state included."""
         key = (method.name, tolerance)
         if key not in self._worst:
-            number = len(self.asked)
+            number = len(self.output_times)
             start = Leg(0, {"v": self.scene.v, "y": self.scene.y, "tolerance": tolerance}, 0)
             ends = np.unique(np.linspace(0, number, min(number, MAX_PIECES) + 1).astype(int))[1:].tolist()
             legs = [start, *self._legs(method, start, ends)]
@@ -141,7 +141,7 @@ class AdaptiveTrials:
     def _legs(self, method: Method, leg: Leg, ends: Iterable[int]) -> Iterator[Leg]:
         """From where a leg ended to the end of one frame after the other, or of several at once."""
         for end in ends:
-            run = quietly(self.scene.system, method, at=self.asked[leg.end : end], max_steps=10**9, **leg.on)
+            run = quietly(self.scene.system, method, at=self.output_times[leg.end : end], max_steps=10**9, **leg.on)
             assert run.paces is not None
             leg = Leg(end, {"resume": run}, int(run.paces.evaluations) // method.attempt_evaluations)
             yield leg

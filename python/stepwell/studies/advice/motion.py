@@ -77,7 +77,7 @@ class Grid(NamedTuple):
         return self.spans * k
 
     @property
-    def asked(self) -> Array:
+    def output_times(self) -> Array:
         """Output times of a run with a tolerance: the ends of frames, or a few equidistant times."""
         if self.framed:
             return self.span * np.arange(1.0, self.spans + 1)

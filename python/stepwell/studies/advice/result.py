@@ -102,7 +102,7 @@ class Advice:
     @property
     def asked(self) -> Array:
         """Output times of the runs with a tolerance: the ends of frames, or ten equidistant times, in units of time."""
-        return grid_of(self.scene.horizon, self.frame).asked
+        return grid_of(self.scene.horizon, self.frame).output_times
 
     def run(self, row: Row | None = None) -> Run:
         """The run of a row, in full.

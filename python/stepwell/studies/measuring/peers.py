@@ -198,13 +198,13 @@ class ByHeyoka(ValueEquality):
         series.time = 0.0
         series.state[:] = np.concatenate([np.ravel(scene.v), np.ravel(scene.y)])
         begin = time.perf_counter()
-        found = series.propagate_grid(np.concatenate([[0.0], times]))
+        solved = series.propagate_grid(np.concatenate([[0.0], times]))
         seconds = time.perf_counter() - begin
         try:
             each = engine.evaluations(method("taylor"), scene.system, order=series.order, paced=True)
         except UnsupportedError:
             each = None
-        return Solved(*_blocks(scene, found[-1][1:]), None if each is None else int(found[3]) * each, seconds)
+        return Solved(*_blocks(scene, solved[-1][1:]), None if each is None else int(solved[3]) * each, seconds)
 
 
 #: REBOUND's integrators that are offered, and whether a setting is a tolerance.

@@ -119,7 +119,7 @@ class Grid:
 
     def values(self, chunk: Chunk) -> dict[str, Any]:
         """The arguments of the members of a chunk, shape (*own axes, members); ``dt`` is one number."""
-        found: dict[str, Any] = {}
+        arguments: dict[str, Any] = {}
         for axis in self.axes:
             own = axis.values.shape[: axis.own]
             order = sorted(range(len(axis.dims)), key=lambda i: self.dims.index(axis.dims[i]))
@@ -129,18 +129,18 @@ class Grid:
             values = values[slices]
             widths = [chunk.shape[i] if i in there else 1 for i in range(len(self.dims))]
             values = np.broadcast_to(values.reshape(*own, *widths), (*own, *chunk.shape)).reshape(*own, chunk.members)
-            found[axis.argument] = float(values[0]) if axis.argument == "dt" else np.ascontiguousarray(values)
-        return found
+            arguments[axis.argument] = float(values[0]) if axis.argument == "dt" else np.ascontiguousarray(values)
+        return arguments
 
     def place(self, member: int) -> str:
         """Where a member is, in words: the values that the dimensions have there."""
         index = dict(zip(self.dims, np.unravel_index(member, self.shape), strict=True))
-        told = []
+        places = []
         for axis in self.axes:
             if axis.own == 0:
                 value = axis.values[tuple(index[dim] for dim in axis.dims)]
-                told.append(f"{axis.argument} = {value:.6g}")
-        return ", ".join(told) or f"member {member}"
+                places.append(f"{axis.argument} = {value:.6g}")
+        return ", ".join(places) or f"member {member}"
 
 
 def grid(axes: Any) -> Grid:

@@ -222,9 +222,9 @@ def sweep(
             f"the outcome one by name="
         )
     where = store_of(store)
-    kept = Memory(layout, shape) if where is None else where[0](where[1], layout, shape)
-    _compute(task, grid, workers, kept, checks.flag("progress", progress))
-    dataset: xarray.Dataset = kept.finish()
+    results = Memory(layout, shape) if where is None else where[0](where[1], layout, shape)
+    _compute(task, grid, workers, results, checks.flag("progress", progress))
+    dataset: xarray.Dataset = results.finish()
     return dataset
 
 
@@ -321,14 +321,14 @@ def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | 
     return min(most, largest, max(MIN_MEMBERS, -(-grid.members // parts)))
 
 
-def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progress: bool) -> None:
+def _compute(task: Task, grid: Grid, engine: Engine, results: Memory | Zarr, progress: bool) -> None:
     """Compute every chunk that is not finished, and keep what is found."""
     done, tally = 0, _Tally(grid, task)
 
     def unfinished() -> Iterator[Chunk]:  # one after the other, for there may be more than memory has room for
         nonlocal done
-        for chunk in grid.chunks(kept.chunk_shape):
-            if kept.finished(chunk):
+        for chunk in grid.chunks(results.chunk_shape):
+            if results.finished(chunk):
                 done += chunk.members
             else:
                 yield chunk
@@ -343,7 +343,7 @@ def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progre
         chunks = engine.compute(task, grid, unfinished())
         try:
             for chunk, each in chunks:
-                kept.write(chunk, each.results)
+                results.write(chunk, each.results)
                 tally.add(chunk, each)
                 done += chunk.members
                 if report is not None:

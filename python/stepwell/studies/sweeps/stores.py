@@ -147,9 +147,9 @@ class Zarr:
         try:
             yield
         except OSError as error:
-            kept = "there was nothing to keep" if self.group is None else "the chunks that are done are kept"
+            state = "there was nothing to keep" if self.group is None else "the chunks that are done are kept"
             raise ArgumentError(
-                f"store: {checks.short(str(self.path), checks.PATH)} cannot be written: {error.strerror or error}; {kept}: "
+                f"store: {checks.short(str(self.path), checks.PATH)} cannot be written: {error.strerror or error}; {state}: "
                 f"make room and call again, or give another path"
             ) from error
         finally:

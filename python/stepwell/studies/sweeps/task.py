@@ -91,8 +91,8 @@ class Task(NamedTuple):
     def between(self) -> int | None:
         """Interval of the states that are saved for reductions; None for the last alone."""
         observed = self.observe if any(each.observes for each in self.reductions) else 0
-        kept = (self.every or 0) if self.kinds(History) else 0
-        return gcd(observed, kept) or None
+        history = (self.every or 0) if self.kinds(History) else 0
+        return gcd(observed, history) or None
 
     def numbers(self, system: System) -> float:
         """How many numbers a member takes while it is computed, without the states of a piece."""

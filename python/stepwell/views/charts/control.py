@@ -95,8 +95,8 @@ class ControlSweep(Drawn, Table, ValueEquality):
         for name in dict.fromkeys(line.method.name for line in self.lines if line.kind == LENGTH_KINDS[1] and self.exact):
             pairs = [[self.line(name, kind, count) for kind in LENGTH_KINDS] for count in self.evaluations]
             by_method[name] = tuple(
-                bool(np.median([*held.state_error[~held.diverged], np.inf][:-1] or [np.inf]) < reset.state_error[0])
-                for held, reset in pairs
+                bool(np.median([*limited.state_error[~limited.diverged], np.inf][:-1] or [np.inf]) < reset.state_error[0])
+                for limited, reset in pairs
             )
         return by_method
 

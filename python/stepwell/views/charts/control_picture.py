@@ -72,8 +72,8 @@ def finding(chart: ControlSweep) -> str:
             before = float(chart.line(line.method, "none", count).energy_error[0])
         except UnknownNameError:
             continue
-        held = line.energy_error[np.isfinite(line.energy_error)]
-        after = float(np.median(held)) if held.size else np.inf
+        errors = line.energy_error[np.isfinite(line.energy_error)]
+        after = float(np.median(errors)) if errors.size else np.inf
         factors.append(before / max(after, LEAST_DRAWN))
     if not factors:
         return "energy and state under control"
@@ -105,12 +105,12 @@ def _before_and_after(axes: Axes, chart: ControlSweep, what: str, name: str, *, 
         for line in chart.lines:
             if line.method == method:
                 kinds.setdefault(line.kind, []).append(line)
-        held = np.concatenate([getattr(line, what) for line in kinds.get("limited", [])] or [np.empty(0)])
-        held = np.maximum(held[np.isfinite(held)], low)
+        limited = np.concatenate([getattr(line, what) for line in kinds.get("limited", [])] or [np.empty(0)])
+        limited = np.maximum(limited[np.isfinite(limited)], low)
         before = [float(getattr(line, what)[0]) for line in kinds.get("none", [])]
-        if held.size:
-            axes.plot([held.min(), held.max()], [row, row], color=colour, linewidth=2.0, zorder=2)
-            after = float(np.median(held))
+        if limited.size:
+            axes.plot([limited.min(), limited.max()], [row, row], color=colour, linewidth=2.0, zorder=2)
+            after = float(np.median(limited))
             axes.plot([after], [row], color=colour, marker="o", markersize=12, zorder=4)
             for each in before:
                 if np.isfinite(each):

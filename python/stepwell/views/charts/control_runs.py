@@ -111,18 +111,18 @@ class Runs:
         steps = max(1, round(evaluations / engine.evaluations(method, self.system)))
         dt = self.horizon / steps
         relative = np.array([np.nan])
-        held: controls.AnyControl | None = None
+        control: controls.AnyControl | None = None
         if kind in controls.FORMS:
-            relative, held = gains, controls.EnergyControl(form=kind, relative=gains)
+            relative, control = gains, controls.EnergyControl(form=kind, relative=gains)
         elif kind == LENGTH_KINDS[0]:
-            relative, held = gains, controls.LengthControl(gains)
+            relative, control = gains, controls.LengthControl(gains)
         elif kind != "none":
-            held = controls.Projection(kind)
+            control = controls.Projection(kind)
         shape = (*self.system.v_shape, len(relative))
         v, y = (np.broadcast_to(block[..., np.newaxis], shape) for block in (self.v, self.y))
         with np.errstate(all="ignore"):
             # That much gain is too much is what the chart shows.
-            run = quietly(self.system, method, v=v, y=y, dt=dt, steps=steps, every=max(1, steps // SAVED_STATES), control=held)
+            run = quietly(self.system, method, v=v, y=y, dt=dt, steps=steps, every=max(1, steps // SAVED_STATES), control=control)
             energy = np.abs(run.energy - self.energy).max(axis=0) / self.kinetic
             largest = np.abs(run.y).max(axis=tuple(range(run.y.ndim - 1)))
             rods = "length_error" in self.system.quantities

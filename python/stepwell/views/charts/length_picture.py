@@ -71,8 +71,8 @@ def _column(panels: Any, chart: ControlSweep, evaluations: int, strip: float) ->
         axes.add_patch(Rectangle((0.0, 1.0), 1.0, STRIP, **grey))
         for row, name in enumerate(methods):
             kinds = {line.kind: chart.line(name, line.kind, evaluations) for line in chart.lines if line.method.name == name}
-            if (held := kinds.get("control")) is not None:
-                _curve(axes, chart, held, getattr(held, what), row, len(methods))
+            if (controlled := kinds.get("control")) is not None:
+                _curve(axes, chart, controlled, getattr(controlled, what), row, len(methods))
             reset = kinds.get("length")
             if reset is not None and what != "length_error" and np.isfinite(getattr(reset, what)[0]):
                 axes.axhline(max(getattr(reset, what)[0], LEAST_DRAWN), **(_look(chart, reset.method) | RESETTING))

@@ -165,12 +165,12 @@ def _line(body: RigidBody, method: Method, phi: float, gains: Array) -> Settled:
 
     once = run(1, record="norm_error")
     reset = run(1, control=Projection("norm"), every=1)
-    held = run(STEPS, control=NormControl(gains), every=STEPS - 1)
+    controlled = run(STEPS, control=NormControl(gains), every=STEPS - 1)
     with np.errstate(all="ignore"):
-        square = (held.y[-2:] ** 2).sum(axis=1)
+        square = (controlled.y[-2:] ** 2).sum(axis=1)
         settled = np.abs(square[1] - square[0]) < SETTLED
         error = np.where(settled, square[1] - 1.0, np.nan)
-        turned = np.where(settled, _angle(held.y[-2], held.y[-1]) / phi - 1.0, np.nan)
+        turned = np.where(settled, _angle(controlled.y[-2], controlled.y[-1]) / phi - 1.0, np.nan)
     without = float(_angle(reset.y[0], reset.y[1])) / phi - 1.0
     return Settled(method, gains, error, turned, float(once.recorded["norm_error"][-1]), without)
 

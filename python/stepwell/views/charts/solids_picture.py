@@ -179,8 +179,8 @@ def _path(axes: Axes, screen: Screen, path: Array, colour: str | None, *, long: 
     flat, front = screen.flat(path), path @ screen.near >= 0.0
     for side, dashes in ((front, "-"), (~front, (0, (2, 2)))):
         # The point after a side's last belongs to it, too, so that there is no gap.
-        kept = side | np.append(False, side[:-1])
-        line = np.where(kept[:, np.newaxis], flat, np.nan)
+        shown = side | np.append(False, side[:-1])
+        line = np.where(shown[:, np.newaxis], flat, np.nan)
         if colour is None:
             axes.plot(*line.T, **(EXACT | {"color": EXACT["color"] if side is front else "#ececec"}))
         else:

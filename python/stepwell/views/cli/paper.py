@@ -41,7 +41,7 @@ def command(args: argparse.Namespace) -> None:
             "The document, section by section",
             ("section", "statement", "right instead", "found here", ""),
             [
-                (entry.section, entry.says, plain(entry.corrected), run.found, "✓" if run.holds else "✗ not reproduced")
+                (entry.section, entry.says, plain(entry.corrected), run.numbers, "✓" if run.holds else "✗ not reproduced")
                 for entry, run in zip(chosen, runs, strict=True)
             ],
             written.notes(),

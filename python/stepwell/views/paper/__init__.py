@@ -28,11 +28,11 @@ class Finding(NamedTuple):
 
     Attributes:
         holds: whether stepwell gives what the entry says; where the document is wrong, what the entry says instead.
-        found: the numbers, in a few words.
+        numbers: the numbers that show it, in a few words.
     """
 
     holds: bool
-    found: str
+    numbers: str
 
 
 class Entry(NamedTuple):

@@ -56,12 +56,14 @@ def _largest(**options: Any) -> float:
 
 def _draw_control(path: Path) -> object:
     scene = energy_control(pair="printed", form="printed")
-    free, held = (quiet_run(scene, "standard_euler", steps=100_000, every=10, **options).y for options in ({"control": None}, {}))
+    free, controlled = (
+        quiet_run(scene, "standard_euler", steps=100_000, every=10, **options).y for options in ({"control": None}, {})
+    )
     return paths(
         path,
         "Energy control keeps three bodies together",
         "Standard Euler, 100 000 steps of 0.01 (Appendix D): the printed force, energy and control, C = 0.3",
-        [("without control: they leave", free), ("with control: they stay", held)],
+        [("without control: they leave", free), ("with control: they stay", controlled)],
         8.0,
     )
 
@@ -76,8 +78,8 @@ def _draw_control(path: Path) -> object:
 )
 def energy_controlled() -> Finding:
     """The largest coordinate without and with control."""
-    free, held = _largest(control=None), _largest()
-    return Finding(free > 20 and held < 3.6, f"largest coordinate {free:.1f} without control, {held:.2f} with it")
+    free, controlled = _largest(control=None), _largest()
+    return Finding(free > 20 and controlled < 3.6, f"largest coordinate {free:.1f} without control, {controlled:.2f} with it")
 
 
 @section_d(
@@ -102,8 +104,8 @@ def control_term() -> Finding:
     scene = energy_control(pair="printed", form="printed")
     control = EnergyControl(0.3, "printed", target=-2.0)
     free = quiet_run(scene, "standard_euler", steps=1, control=None)
-    held = quiet_run(scene, "standard_euler", steps=1, control=control)
+    controlled = quiet_run(scene, "standard_euler", steps=1, control=control)
     energy = float(scene.system.energy(scene.v, scene.y))
     wanted = free.v[-1] - scene.dt * 0.3 * (energy + 2.0) * scene.v
-    off = float(np.abs(held.v[-1] - wanted).max())
+    off = float(np.abs(controlled.v[-1] - wanted).max())
     return Finding(off < 1e-15, "one step by the formula and by the control: the same, to rounding")

@@ -139,7 +139,7 @@ def two_dampings() -> Finding:
 )
 def inputs() -> Finding:
     """A held input moves the oscillator as a constant does while it lasts."""
-    held = Oscillator(x=Sampled([1.0, 1.0], 100.0))
-    one, other = (float(quietly(each, "rk4", v=0.0, y=0.0, dt=0.01, steps=300).y[-1]) for each in (held, Oscillator(x=1.0)))
+    sampled = Oscillator(x=Sampled([1.0, 1.0], 100.0))
+    one, other = (float(quietly(each, "rk4", v=0.0, y=0.0, dt=0.01, steps=300).y[-1]) for each in (sampled, Oscillator(x=1.0)))
     exact = 1.0 - math.cos(3.0)
     return Finding(one == other and abs(one - exact) < 1e-9, f"y(3) = {one:.9f}, exactly 1 − cos 3 = {exact:.9f}")

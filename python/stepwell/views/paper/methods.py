@@ -69,7 +69,7 @@ def standard_euler() -> Finding:
 def standard_euler_equation() -> Finding:
     """The equation."""
     result = characteristic("standard_euler", np.ones_like, lambda phi: 1 + phi**2, "p = 1, q = 1 + Φ²")
-    return Finding(result.holds and stability_limit(Oscillator(), "standard_euler") == 0, result.found)
+    return Finding(result.holds and stability_limit(Oscillator(), "standard_euler") == 0, result.numbers)
 
 
 figure(section_5, "standard_euler", "The samples grow.", "unstable")
@@ -360,7 +360,7 @@ def semi_false_heun_equation() -> Finding:
     )
     limit = float(stability_limit(Oscillator(), "semi_false_heun"))
     return Finding(
-        result.holds and abs(limit - math.sqrt(2 * math.sqrt(5) - 2)) < 1e-9, f"{result.found}; stable for Φ < {limit:.6g}"
+        result.holds and abs(limit - math.sqrt(2 * math.sqrt(5) - 2)) < 1e-9, f"{result.numbers}; stable for Φ < {limit:.6g}"
     )
 
 
