@@ -22,7 +22,7 @@ from stepwell.runs import engine
 from stepwell.runs.engine import direct, linear
 from stepwell.runs.engine.adaptive import evaluated_attempt
 from stepwell.runs.engine.plan import per_step
-from stepwell.source.explanation import listing
+from stepwell.source.explanation import listing, naming
 from support.cases import ADAPTIVE, SOME, SYSTEMS, drawn, fits, has_branches
 from support.explain import evaluate, leaves
 from support.snapshots import Snapshots
@@ -111,7 +111,7 @@ def test_the_criteria_are_those_of_the_tape(method: sw.Method) -> None:
 
 
 def state(explained: sw.Explanation, plan: engine.Plan, known: dict[str, Any], mark: str = "'") -> list[Any]:
-    return [np.broadcast_to(known[name], MEMBERS) for name in listing.states(plan, explained.attempt, mark)]
+    return [np.broadcast_to(known[name], MEMBERS) for name in naming.states(plan, explained.attempt, mark)]
 
 
 def assert_listing_is_a_step(system: sw.System, method: sw.Method, v: Any, y: Any, *, fused: bool) -> None:
@@ -120,7 +120,7 @@ def assert_listing_is_a_step(system: sw.System, method: sw.Method, v: Any, y: An
     assert explained.parts is None
     known, tables = leaves(plan)
     rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), np.zeros(MEMBERS)]
-    known |= dict(zip(listing.states(plan, False), rows, strict=False))
+    known |= dict(zip(naming.states(plan, False), rows, strict=False))
     after = state(explained, plan, evaluate(explained, known, tables))
     out = engine.advance(plan, v, y, carried=True)
     wanted = [out.slot, out.y[-1]]
@@ -192,7 +192,7 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool, some: int | 
         explained = sw.explain(system, method, attempt=True, fused=fused)
         known, tables = leaves(plan)
         rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), *pace.numbers]
-        known |= dict(zip(listing.states(plan, True), rows, strict=True)) | {"max_steps": 9.0}
+        known |= dict(zip(naming.states(plan, True), rows, strict=True)) | {"max_steps": 9.0}
         after = state(explained, plan, evaluate(explained, known, tables))
         if fused:
             following, v1, y1 = evaluated_attempt(plan, 9)(pace, 9, v, y)
@@ -245,7 +245,7 @@ def test_every_listing_of_both_ends_and_of_what_is_recorded(name: str, fused: bo
             explained = sw.explain(system, method, start=start, fused=fused, record=list(system.quantities))
             assert len(explained.beside) == 2 * bool(method.carry) + len(system.quantities)
             known, _ = leaves(plan)
-            tables = listing.parameters(plan)[1]
+            tables = naming.parameters(plan)[1]
             tracer = Tracer(system, _core.Tape())
             tracer.scaled(H)
             tables = dict(zip(tables, tracer.tables, strict=True))
@@ -254,11 +254,11 @@ def test_every_listing_of_both_ends_and_of_what_is_recorded(name: str, fused: bo
                 slot = method.carry if section.when == "finish" else "v"
                 rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS)]
                 blocks = ((slot, system.v_shape), ("y", system.y_shape))
-                labels = [listing.indexed(str(n), i) for n, shape in blocks for i in np.ndindex(shape)]
+                labels = [naming.indexed(str(n), i) for n, shape in blocks for i in np.ndindex(shape)]
                 values = known | dict(zip(labels, rows, strict=True)) | {name: table.sample for name, table in tables.items()}
                 makes = {"start": method.carry, "finish": "v"}.get(section.when, section.when.removeprefix("record "))
                 shape = system.quantities.get(str(makes), system.v_shape)
-                results = [listing.indexed(str(makes), i) for i in np.ndindex(shape)]
+                results = [naming.indexed(str(makes), i) for i in np.ndindex(shape)]
                 if section.when.startswith("record"):
                     wanted = np.asarray(s.record(section.when.removeprefix("record "), v, y)).reshape(-1, MEMBERS)
                 elif fused:
@@ -288,7 +288,7 @@ def test_every_listing_of_a_transition_matrix_is_a_step(name: str, method: sw.Me
     plan = engine.Plan(system, method, (MEMBERS,), H, t0=T, form="matrix")
     given = system.given_inputs()
     p, q = linear.transition(plan), linear.pulses(plan, given)
-    names, tables = listing.parameters(plan)
+    names, tables = naming.parameters(plan)
     tracer = Tracer(system, _core.Tape())
     tracer.symbols([each.signal() for each in given.values()], (MEMBERS,))
     numbers = [*p.reshape(-1, MEMBERS), *q.reshape(-1, MEMBERS), *tracer.numbers]
@@ -304,7 +304,7 @@ def test_every_listing_of_a_transition_matrix_is_a_step(name: str, method: sw.Me
     known |= {f"{name_of}.first": float(first) for name_of, first in zip(tables, ends, strict=False)}
     known |= {"lanes": 1.0, "sample": lambda at: every[np.broadcast_to(at, MEMBERS).astype(int), np.arange(MEMBERS)]}
     rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS)]
-    known |= dict(zip(listing.states(plan, False), rows, strict=True))
+    known |= dict(zip(naming.states(plan, False), rows, strict=True))
     after = state(explained, plan, evaluate(explained, known, samples))
     out = engine.advance(plan, v, y, carried=True)
     assert_computes(after, out.slot, out.y[-1])

@@ -14,7 +14,7 @@ from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference.bits import SINGLE
 from stepwell.reference.tape.fma import fma
 from stepwell.runs import engine
-from stepwell.source.explanation import listing
+from stepwell.source.explanation import naming
 from stepwell.source.explanation.formula import number
 from stepwell.views import cli
 from support import explain
@@ -60,10 +60,10 @@ def after(step: sw.Explanation, plan: engine.Plan, v: Any, y: Any) -> list[Any]:
     """The next state by the listing."""
     known, tables = leaves(plan)
     rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), np.zeros(MEMBERS)]
-    known |= dict(zip(listing.states(plan, False), rows, strict=False))
+    known |= dict(zip(naming.states(plan, False), rows, strict=False))
     known = {name: value if callable(value) else np.asarray(value, F) for name, value in known.items()}
     values = evaluate(step, known, tables)
-    return [np.broadcast_to(values[name], MEMBERS) for name in listing.states(plan, False, "'")]
+    return [np.broadcast_to(values[name], MEMBERS) for name in naming.states(plan, False, "'")]
 
 
 @pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])

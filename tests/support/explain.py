@@ -12,7 +12,7 @@ from stepwell import _core
 from stepwell.reference.tape.fma import fma
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from stepwell.source.explanation import listing
+from stepwell.source.explanation import naming
 
 from support.tracing import MEMBERS, H, T
 
@@ -119,7 +119,7 @@ def evaluate(explained: sw.Explanation, known: dict[str, Any], tables: dict[str,
 
 def leaves(plan: engine.Plan) -> tuple[dict[str, Any], dict[str, Any]]:
     """What stands behind the names of parameters, and samples by the name of their table; a row of each for every member."""
-    names, tables = listing.parameters(plan)
+    names, tables = naming.parameters(plan)
     tracer = Tracer(plan.system, _core.Tape())
     tracer.scaled(H)
     known = dict(zip(names, tracer.numbers, strict=True)) | {"h": H, "t": T}

@@ -1,8 +1,8 @@
 """Advice: the cheapest method and step that are accurate enough for a scene, and how far they are from instability.
 
-``motion`` holds the reference solution, ``trials`` and ``adaptive`` run the scene with fixed and with adaptive steps,
+``motion`` has the reference solution, ``trials`` and ``adaptive`` run the scene with fixed and with adaptive steps, and
 ``candidates`` gives both the same interface for ``search``, which finds the fewest steps that are accurate enough. ``costs``
-measures steps, ``predict`` uses eigenvalues, ``outcome`` makes rows of what was found, and ``result`` presents them.
+measures steps, ``predict`` uses eigenvalues, ``outcome`` makes rows of the results, and ``result`` presents them.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ DTYPES: tuple[Dtypes, ...] = ("float64", "float32", "both")
 #: A larger budget in seconds is refused: the age of the universe is half of it.
 MOST_SECONDS = 1e18
 
-#: A step in float32 takes about this share of the time of one in float64, so its runs count so much in the work of a search.
+#: A step in float32 takes about this fraction of the time of a step in float64, and counts accordingly in the work of a search.
 SINGLE_WORK = 0.5
 
 #: The longest frame, in horizons: a run must reach its end.
@@ -56,10 +56,10 @@ MAX_FRAMES = 1_000_000
 #: The most numbers of a state: with more, no useful run would be short enough to be tried.
 MAX_NUMBERS = 100_000
 
-#: Errors for which advice would name what is good enough by luck: this, a tenth of it and so on.
+#: Errors for which a search may find steps that are good enough by luck: this, a tenth of it and so on.
 LARGEST_HINTED = 0.1
 
-#: A scene by its name, made once: some take long to compute their true motion.
+#: A scene by its name, created once, since some take long to compute their true motion.
 _named = cache(find_scene)
 
 
@@ -164,7 +164,8 @@ def advise(
     spent = Spending(known.grid, adaptive, times)
     broken = [each for each in candidates if each.name in fewest and not spent.fits(each, fewest[each.name].k, budget)]
     if budget is not None and any(each.by == "tolerance" for each in broken):
-        # What is cheap on average but not in its worst frame must not exclude what costs more on average, and the same in all.
+        # A candidate that is cheap on average but not in its worst frame must not exclude one that costs more on average but the
+        # same in all frames.
         rest = [each for each in candidates if each not in broken]
         useful = max(2.0 * budget, min(spent.longest(each, fewest[each.name].k) for each in broken))
         again, _ = search.run(rest, {each.name: spent.steps(each, useful) for each in rest})
@@ -191,7 +192,7 @@ def advise(
 
 
 def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
-    """Why the method cannot step the scene with its control, or None; found by trying a step."""
+    """Why the method cannot step the scene with its control, or None; determined by trying a step."""
     if candidate.by == "tolerance" and scene.control is not None:
         return "adaptive steps are tried for scenes without a control only"
     if candidate.by == "tolerance" and scene.system.contacts:
@@ -218,7 +219,7 @@ def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
     except UnsupportedError as error:
         return str(error).removeprefix(f"{candidate.method.name} ").removeprefix("dtype: ")
     except ArgumentError as error:
-        # Such a scene was made, so nothing is wrong with it but numbers that float32 does not have.
+        # The scene exists in float64, so only numbers that float32 does not have can be wrong.
         if candidate.dtype == "float64":
             raise
         return str(error)
@@ -228,10 +229,10 @@ def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
 def _hints(
     known: Motion, trials: Trials, candidates: Sequence[Candidate], prices: Mapping[str, float], tolerance: float, most: float
 ) -> dict[str, set[int]]:
-    """What searches for larger errors find in short runs, by the candidate's name.
+    """The results of searches for larger errors, in short runs only, by the candidate's name.
 
-    Where errors do not fall with the step, what is good enough by luck lies between what a search for a small error tries. Advice
-    for a larger error would name it, though it is good enough for both.
+    Where errors do not fall with the step, steps that are good enough by luck may lie between those that a search for a small
+    error tries. Advice for a larger error would then name a step that is good enough for the small one, too.
     """
     hints: dict[str, set[int]] = {}
     allowed = LARGEST_HINTED
@@ -246,8 +247,8 @@ def _hints(
 
 
 def _times(scene: Scene, candidates: Sequence[Candidate]) -> tuple[dict[str, float], float]:
-    """Nanoseconds per step, by the candidate's name, and by which share they may differ without a meaning."""
-    # What is advised in float32 is shown beside float64, so all are measured in that, too.
+    """Nanoseconds per step, by the candidate's name, and the relative difference that means nothing."""
+    # An advised method in float32 is compared with the same one in float64, so all are measured in float64, too.
     both = list({each.method.name: each.method for each in candidates if each.by == "step"}.values())
     steps = step_times(scene, both, [each.method for each in candidates if each.dtype == "float32"])
     tried = tried_times(scene, [each.method for each in candidates if each.by == "tolerance"])
@@ -257,10 +258,10 @@ def _times(scene: Scene, candidates: Sequence[Candidate]) -> tuple[dict[str, flo
 
 
 def by_cost_and_error(candidates: Sequence[Kind], costs: Sequence[float], errors: Sequence[float], noise: float) -> list[Kind]:
-    """Candidates in the order of their costs; of those that cost the same but for the noise, the smaller error first.
+    """Candidates in the order of their costs; among those whose costs are equal up to the noise, the smaller error comes first.
 
-    The first group is the cheapest and all that cost at most that share more; the next begins with the cheapest of the others.
-    Errors that are equal in two digits are taken to be equal: those of one motion in two ways differ by roundings.
+    The first group is the cheapest and all that cost at most that fraction more; the next begins with the cheapest of the others.
+    Errors that agree in two digits count as equal: those of one motion computed in two ways differ by roundings.
     """
     errors = [float(f"{error:.1e}") for error in errors]
     order = sorted(range(len(candidates)), key=lambda i: (costs[i], errors[i]))
@@ -274,5 +275,5 @@ def by_cost_and_error(candidates: Sequence[Kind], costs: Sequence[float], errors
 
 
 def _judged(candidate: Candidate, trial: Trial) -> float:
-    """The error that orders equal costs: at least that of the float64 run, for a lucky rounding proves nothing."""
+    """The error that orders equal costs: at least that of the float64 run, since a lucky rounding proves nothing."""
     return max(trial.error, candidate.in_float64(trial)) if isinstance(candidate, Single) else trial.error

@@ -1,7 +1,7 @@
-"""Trial runs of a scene with adaptive steps: how wrong a method is with a tolerance, and how many steps it tries.
+"""Trial runs of a scene with adaptive steps: the error of a method with a tolerance, and the steps that it attempts.
 
-Steps depend on the output times only where a state within a step shows that it missed something, so the error is measured at many
-times, and at those of the run that an advice shows.
+Steps depend on the output times only where a state within a step shows that the step missed something. So the error is measured
+at many times, and at those of the run that an advice shows.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from ...runs.result import Run
 from .motion import Motion, looked_up
 from .trials import Trial
 
-#: The error of a run is measured at so many of the marks at first, at all of them to confirm it, and then at so many times around
-#: each of the so many worst.
+#: The error of a run is first measured at FIRST_SAMPLES of the marks. To confirm it, it is measured at all of them, and then at
+#: REFINED_SAMPLES times around each of the REFINED_MARKS worst.
 FIRST_SAMPLES, REFINED_SAMPLES, REFINED_MARKS = 128, 32, 4
 
-#: Each such time costs a step. Of large systems, where a run may make few evaluations, there are fewer: these steps may make at
-#: most this share of them.
+#: Each such time costs a step. In large systems, where a run may make few evaluations, there are fewer times: their steps make at
+#: most this fraction of the evaluations.
 CONFIRMING_SHARE = 1 / 8
 
-#: Steps are counted for each frame. Of more frames than this, they are counted for so many pieces first, and then frame by frame
-#: in the so many pieces with the most steps.
+#: Steps are counted for each frame. If there are more frames than MAX_PIECES, they are first counted for as many pieces, and then
+#: frame by frame in the WORST_PIECES pieces with the most steps.
 MAX_PIECES, WORST_PIECES = 2000, 20
 
 
@@ -38,8 +38,8 @@ class AdaptiveTrials:
     """Runs of one scene with a tolerance, each made once.
 
     Args:
-        motion: what runs are compared with.
-        allowed: the largest allowed state error; of a larger one only the fact that it is larger matters.
+        motion: the true motion, with which runs are compared.
+        allowed: the largest allowed state error; larger errors need not be known exactly.
         most: the most function evaluations of a run.
     """
 
@@ -47,7 +47,7 @@ class AdaptiveTrials:
         scene = motion.scene
         assert scene.exact is not None
         self.grid, self.allowed, self.most = motion.grid, allowed, most
-        #: What a run costs is what it costs to know the state at these times.
+        #: The cost of a run includes that of the states at these times.
         self.output_times = motion.grid.output_times if motion.grid.framed else np.array([motion.grid.end])
         self.marks = motion.marks[1:]
         self.scene = replace(scene, exact=looked_up(scene.exact, np.union1d(self.output_times, self.marks)))
@@ -59,7 +59,7 @@ class AdaptiveTrials:
         self.runs, self.work = 0, 0.0
 
     def look(self, method: Method, tolerance: float, share: float = 1.0) -> Trial:
-        """The run, at some of the marks; if it is made for this, with this share of the most function evaluations."""
+        """The run with its error at some of the marks; a new run may make this fraction of the most function evaluations."""
         key = (method.name, tolerance)
         if key not in self._trials:
             trial = self._run(method, tolerance, share)
@@ -70,7 +70,7 @@ class AdaptiveTrials:
         return self._trials[key]
 
     def confirm(self, method: Method, tolerance: float) -> Trial:
-        """The run, at all marks and around the worst of them."""
+        """The run with its error at all marks and around the worst of them."""
         key = (method.name, tolerance)
         if key not in self._confirmed:
             trial = self.look(method, tolerance)
@@ -80,14 +80,14 @@ class AdaptiveTrials:
         return self._confirmed[key]
 
     def measured(self, method: Method, tolerance: float) -> Trial:
-        """The same of a run that need not be good enough: of such ``look`` knows the error at the output times only."""
+        """As ``confirm``, for a run that need not be good enough: ``look`` knows its error at the output times only."""
         trial = self.confirm(method, tolerance)
         if self.allowed < trial.error < math.inf:
             trial = self._confirmed[method.name, tolerance] = self._measured(method, tolerance, trial)
         return trial
 
     def _measured(self, method: Method, tolerance: float, trial: Trial) -> Trial:
-        """A run that is known in part, at all marks and around the worst of them, and as an advice shows it."""
+        """A trial with its error at all marks and around the worst of them, and at the times that an advice shows."""
         times = max(FIRST_SAMPLES, int(CONFIRMING_SHARE * self.most / method.attempt_evaluations))
         marks = self.marks[:: math.ceil(len(self.marks) / times)]
         error, _ = self._errors(method, tolerance, marks)
@@ -123,7 +123,7 @@ class AdaptiveTrials:
         return run
 
     def worst(self, method: Method, tolerance: float) -> int:
-        """The most steps that are tried in a frame, those for its state included."""
+        """The most attempted steps in a frame, including those for its state."""
         key = (method.name, tolerance)
         if key not in self._worst:
             number = len(self.output_times)
@@ -139,7 +139,7 @@ class AdaptiveTrials:
         return self._worst[key]
 
     def _legs(self, method: Method, leg: Leg, ends: Iterable[int]) -> Iterator[Leg]:
-        """From where a leg ended to the end of one frame after the other, or of several at once."""
+        """The legs from the end of one leg to each of these ends of frames."""
         for end in ends:
             run = quietly(self.scene.system, method, at=self.output_times[leg.end : end], max_steps=10**9, **leg.on)
             assert run.paces is not None
@@ -150,7 +150,7 @@ class AdaptiveTrials:
 
 
 class Leg(NamedTuple):
-    """Where a run is after so many frames: arguments to go on, and the steps tried so far."""
+    """The position of a run after some frames: the arguments to go on with, and the steps attempted so far."""
 
     end: int
     on: dict[str, Any]

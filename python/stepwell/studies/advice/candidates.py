@@ -1,7 +1,7 @@
 """The candidates of the search: each method with fixed steps, and each that can estimate its error with adaptive steps.
 
-Both have a k that is the number of steps, or grows like it: it doubles where steps are halved, and the error falls with its power
-that is the method's order. The search knows no more of them.
+Both have a k that is the number of steps, or grows like it: it doubles where steps are halved, and the error falls like k to the
+minus order of the method. The search knows no more about them.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from .motion import Grid
 from .predict import keeps_margin, longest_step
 from .trials import ASYMPTOTIC_ERROR, Trial, Trials
 
-#: The k that stands for a tolerance of 1; one more makes steps 1.5 % shorter there.
+#: The k of the tolerance 1, at which k + 1 has steps that are 1.5 % shorter.
 UNIT_TOLERANCE_K = 64
 
-#: No tolerance is smaller than this: below it rounding is all.
+#: No tolerance is smaller than this, since rounding is larger.
 LEAST_TOLERANCE = 1e-16
 
 #: Steps below the normal numbers of float32 have fewer digits.
 LEAST_SINGLE_STEP = 2.0**-126
 
-#: The first run with a tolerance may make this share of the evaluations of a run: where stability bounds the steps, a loose
-#: tolerance costs as much as a tight one, and a search that began with such runs of every method would have nothing left.
+#: The first run with a tolerance may make this fraction of the evaluations of a run: where stability bounds the steps, a loose
+#: tolerance costs as much as a tight one, and such runs of every method would use up the search.
 FIRST_RUN_SHARE = 1 / 16
 
-#: The error of a run with a tolerance is measured at many times, but not at every one: it may be at most this share of
-#: what is allowed.
+#: The error of a run with a tolerance is measured at many times, but not at every one: it may be at most this fraction of the
+#: allowed error.
 ERROR_SHARE = 0.95
 
 
@@ -42,10 +42,10 @@ class Candidate(Protocol):
         method: the method.
         by: ``"step"`` or ``"tolerance"``.
         name: the method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``; or by "float32".
-        dtype: in which its steps are computed.
+        dtype: the precision of its steps.
         first: the least k.
-        share: of the error that is allowed, what the run may have.
-        seen: the runs that were made, by k.
+        share: the fraction of the allowed error that its runs may have.
+        seen: its runs so far, by k.
     """
 
     method: Method
@@ -64,10 +64,10 @@ class Candidate(Protocol):
         """The run with that k."""
 
     def confirm(self, k: int) -> Trial:
-        """The same, measured more closely."""
+        """The run with that k, measured more closely."""
 
     def measured(self, k: int) -> Trial:
-        """The same of a run that need not be good enough."""
+        """As ``confirm``, for a run that need not be good enough."""
 
     def within_limit(self, k: int) -> int:
         """This k, or the least larger one with which a linear system does not blow up, nor with somewhat longer steps."""
@@ -79,7 +79,7 @@ class Candidate(Protocol):
         """Whether there is such a run."""
 
     def described(self, k: int) -> str:
-        """What k stands for, in words."""
+        """The steps or the tolerance of k, in words."""
 
 
 class Fixed:
@@ -104,7 +104,7 @@ class Fixed:
         return trial
 
     def confirm(self, k: int) -> Trial:
-        """The same run, at every step."""
+        """The run with that k, compared at every step."""
         return self.trials.confirm(self.method, self.grid.dt(k), self.grid.steps(k))
 
     measured = confirm
@@ -129,14 +129,14 @@ class Fixed:
 class Single(Fixed):
     """Steps of one length in float32.
 
-    Shorter steps do not help where rounding alone is more than what is allowed, so the search ends there.
+    Shorter steps do not help where rounding alone is above the allowed error, so the search ends there.
 
     Args:
         method: the method.
         trials: runs in float32.
-        grid: the steps that can be chosen.
-        share: of the error that is allowed, what the run may have.
-        wide: the same runs in float64.
+        grid: the possible steps.
+        share: the fraction of the allowed error that a run may have.
+        wide: the runs with the same steps in float64.
         allowed: the state error that its runs may have.
     """
 
@@ -147,14 +147,14 @@ class Single(Fixed):
         self.name, self.wide, self.allowed = single_name(method), wide, allowed
 
     def possible(self, k: int) -> bool:
-        """Whether the step is a normal number of float32, and fewer steps leave hope for so many."""
+        """Whether the step is a normal number of float32, and rounding was not too large already with fewer steps."""
         before = max((n for n in self.seen if n < k), default=None)
         return super().possible(k) and self.grid.dt(k) >= LEAST_SINGLE_STEP and (before is None or not self.is_rounding(before))
 
     def is_rounding(self, k: int) -> bool:
-        """Whether rounding alone makes the error of a run that was made too large.
+        """Whether rounding alone makes the error of the run with that k too large.
 
-        The states of the two precisions differ by at least as much as their errors do, and rounding is all that they differ by.
+        The states of the two precisions differ by rounding only, and by at least as much as their errors do.
         """
         error = self.seen[k].error
         if not self.allowed < error < ASYMPTOTIC_ERROR:
@@ -178,7 +178,7 @@ class Adaptive:
         self.method, self.name = method, f"{method.name}, tolerance"
         self.trials, self.power = trials, method.error_order
         self.seen: dict[int, Trial] = {}
-        # A single step may be wrong by the tolerance; more than what is allowed is luck.
+        # A single step may be wrong by the tolerance; with a tolerance above the allowed error, a run is good enough by luck.
         self.first = math.ceil(UNIT_TOLERANCE_K * min(1.0, trials.allowed) ** (-1.0 / self.power))
 
     @property
@@ -197,7 +197,7 @@ class Adaptive:
         return trial
 
     def confirm(self, k: int) -> Trial:
-        """The same, at many more times."""
+        """The run with that k, compared at many more times."""
         return self.trials.confirm(self.method, self.tolerance(k))
 
     def measured(self, k: int) -> Trial:

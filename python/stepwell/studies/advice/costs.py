@@ -1,4 +1,4 @@
-"""What a step costs on this machine, measured quickly: the shortest time of some repeats, since other load only adds to it."""
+"""The cost of a step on this machine, measured quickly: the shortest time of some repeats, since other load only adds to it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from ...model.methods import Method
 from ...scenes import Scene
 from ..measuring.timing import Batch, Effort, Timed, in_turns
 
-#: What ranks methods need not be exact, but soon there.
+#: Timings that rank methods need not be exact, but quick.
 EFFORT = Effort(members=512, numbers=16_384, fewest=1, seconds=0.0005, repeats=5, slow=0.25)
 
-#: Two timings that differ by less than this share are taken to be equal even if repeats agree better: the place of code and
-#: arrays in memory makes such differences. What repeats say counts up to the second number, above which they say nothing.
+#: Two timings that differ by less than the first fraction count as equal even if repeats agree better: the place of code and
+#: arrays in memory makes such differences. The noise of repeats counts up to the second number, above which it says nothing.
 MIN_COST_NOISE, MAX_COST_NOISE = 0.05, 0.25
 
 
@@ -20,7 +20,7 @@ class Times(dict[str, float]):
     """Measured nanoseconds by method.
 
     Attributes:
-        noise: the share by which two of them may differ without a meaning, from the spread of the repeats.
+        noise: the relative difference of two times that means nothing, from the spread of the repeats.
     """
 
     noise: float = 0.0
@@ -30,9 +30,9 @@ def step_times(scene: Scene, methods: Sequence[Method], singles: Sequence[Method
     """Nanoseconds per step of one member of a batch, on one thread; all take turns.
 
     Args:
-        scene: what is stepped.
-        methods: by which, in float64.
-        singles: by which, in float32.
+        scene: the scene that is stepped.
+        methods: the methods in float64.
+        singles: the methods in float32.
 
     Returns:
         Times by the method's name, those in float32 by ``single_name``.
@@ -44,7 +44,7 @@ def step_times(scene: Scene, methods: Sequence[Method], singles: Sequence[Method
 
 
 def tried_times(scene: Scene, methods: Sequence[Method]) -> Times:
-    """Nanoseconds per step that is tried in a run with a tolerance, rejected ones counted; otherwise as ``step_times``."""
+    """Nanoseconds per attempted step in a run with a tolerance, including rejected ones; otherwise as ``step_times``."""
     batch = Batch(scene, EFFORT.members_of(scene))
     return _least(batch, {method.name: batch.attempts(method) for method in methods})
 
@@ -62,7 +62,7 @@ def _least(batch: Batch, runs: Mapping[str, Timed]) -> Times:
 
 
 def cost_noise(repeats: Iterable[Sequence[float]]) -> float:
-    """By which share the least of some repeats may be wrong: how far the second least is above it, of the worst method."""
+    """The relative error of the shortest of some repeats: the distance to the second shortest, of the worst method."""
     repeats = list(repeats)
     if not repeats:
         return 0.0

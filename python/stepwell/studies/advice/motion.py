@@ -1,4 +1,4 @@
-"""The true motion of a scene as trials ask for it: quickly, at whole frames, and only as far as it is known."""
+"""The true motion of a scene for trials: computed quickly, over whole frames, and only as far as it is known."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ from ...scenes.table import Exact, tabled
 from ...scenes.truth import with_truth
 from ..measuring.measure import SAVED_TIMES
 
-#: Without a frame a run has at least so many steps.
+#: The least number of steps of a run without a frame.
 MIN_STEPS = 4
 
-#: A reference solution without a formula is this many times as accurate as the tolerance, and its table that many times.
+#: A reference solution without a formula is TRUTH_FACTOR times as accurate as the tolerance, and its table TABLE_FACTOR times.
 TRUTH_FACTOR, TABLE_FACTOR = 10.0, 1000.0
 
-#: Runs that are compared with it may therefore use up this share of the tolerance: but for rounding, the error of the tighter of
-#: its two runs is a tenth of their difference.
+#: Runs that are compared with it may have this fraction of the tolerance as error: except for rounding, the error of the tighter
+#: of its two runs is a tenth of their difference.
 ERROR_SHARE = 0.95
 
 #: The largest error of the table, whatever the tolerance, relative to the blocks' largest lengths.
 MAX_TABLE_ERROR = 1e-9
 
-#: A trial is compared with the reference at so many times evenly spaced in time, and at as many evenly spaced in the length of
+#: A trial is compared with the reference at this many times evenly spaced in time, and at as many evenly spaced in the length of
 #: the path, so that a short encounter is not missed.
 EVEN_SAMPLES = 1000
 
-#: The latter are more on a long path: so many for each part of it as long as the block's largest length, and at most so many.
+#: The latter are more on a long path: SAMPLES_PER_LENGTH for each part as long as the block's largest length, MAX_SAMPLES at
+#: most.
 SAMPLES_PER_LENGTH, MAX_SAMPLES = 4.0, 20_000
 
-#: The length of the path is found by so many refinements, each of which adds times where the path is long.
+#: The number of refinements of the length of the path, each of which adds times where the path is long.
 PATH_ITERATIONS = 4
 
-#: A step that is rounded to float32 is longer by at most this share, twice the half of a unit in the last place.
+#: A step that is rounded to float32 is longer by at most this fraction, twice the half of a unit in the last place.
 SINGLE_STEP_ROUNDING = 2.0**-23
 
 #: How many results of ``exact`` are cached: all methods are tried with the same numbers of steps, hence at the same times.
@@ -46,11 +47,11 @@ CACHED_ANSWERS = 96
 
 
 class Grid(NamedTuple):
-    """The steps that can be chosen: k = 1, 2, … of them in a span of time, of which the horizon has so many.
+    """The possible steps: k = 1, 2, … of them in a span of time.
 
     Attributes:
-        span: the frame, or the whole horizon if any step will do; in units of time.
-        spans: how many spans reach the horizon.
+        span: the frame, or the whole horizon without one, in units of time.
+        spans: the number of spans that reach the horizon.
         framed: whether the spans are frames.
     """
 
@@ -85,21 +86,21 @@ class Grid(NamedTuple):
 
 
 def grid_of(horizon: float, frame: float | None) -> Grid:
-    """The steps that can be chosen to reach a horizon."""
+    """The grid of possible steps for a horizon."""
     if frame is None:
         return Grid(horizon, 1, False)
     return Grid(frame, max(1, math.ceil(horizon / frame - 1e-9)), True)
 
 
 class Motion(NamedTuple):
-    """What runs are compared with.
+    """The true motion, with which runs are compared.
 
     Attributes:
-        scene: with an ``exact`` that is fast, known over the horizon and to the end of the last span.
-        grid: the steps that can be chosen.
-        marks: times within the horizon at which errors are looked for, ascending from 0.
-        cut: whether the scene's horizon is longer, and its true motion not known so far.
-        share: of the error that is allowed, what a run may have that is compared with it.
+        scene: the scene with an ``exact`` that is fast, and known over the horizon and to the end of the last span.
+        grid: the possible steps.
+        marks: times within the horizon at which errors are measured, ascending from 0.
+        cut: whether the scene's horizon is longer than its true motion is known.
+        share: the fraction of the allowed error that a run may have, since the motion has an error, too.
         until: the last time for which the motion is known.
     """
 
@@ -147,7 +148,7 @@ def motion_of(scene: Scene, frame: float | None, tolerance: float, single: bool 
 
 
 def _marks(scene: Scene) -> Array:
-    """Times over the horizon at which errors are looked for: even ones, and ones that are evenly far apart on the path."""
+    """Times over the horizon at which errors are measured: evenly spaced in time, and evenly spaced on the path."""
     assert scene.exact is not None
     t = even = np.linspace(0.0, scene.horizon, EVEN_SAMPLES + 1)
     path = np.linspace(0.0, 1.0, EVEN_SAMPLES + 1)
@@ -167,7 +168,7 @@ def _marks(scene: Scene) -> Array:
 
 
 def _with_more(exact: Exact, t: Array, blocks: tuple[Array, Array], more: Array) -> tuple[Array, tuple[Array, Array]]:
-    """All times in order and the blocks there; only those at the further times are computed."""
+    """All times in order and the blocks there; only those at the additional times are computed."""
     times = np.concatenate([t, more])
     order = np.argsort(times)
     v, y = (np.concatenate(both)[order] for both in zip(blocks, exact(more), strict=True))
@@ -175,9 +176,9 @@ def _with_more(exact: Exact, t: Array, blocks: tuple[Array, Array], more: Array)
 
 
 class Within:
-    """A solution up to a time; a last time past that by rounding is taken for it.
+    """A solution up to a time; a time beyond it by rounding counts as this time.
 
-    What it was asked for lately is not computed twice.
+    The last results are cached.
     """
 
     def __init__(self, solution: Exact, until: float) -> None:
@@ -204,7 +205,7 @@ class Within:
 
 
 def looked_up(exact: Exact, times: Array) -> Exact:
-    """The same function, which has its answers for these times, ascending, and any of them, at hand."""
+    """The function with its results for these times, ascending, in a table."""
     blocks = exact(times)
 
     def answer(t: Array) -> tuple[Array, Array]:

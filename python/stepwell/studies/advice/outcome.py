@@ -1,4 +1,4 @@
-"""What a search found, as the rows of an advice, and what it costs on this machine."""
+"""The results of a search as the rows of an advice, with their costs on this machine."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Spending:
 def row(
     trials: Trials, candidate: Candidate, fewest: Fewest, spent: Spending, budget: float | None, fastest: float | None
 ) -> Row:
-    """The row of a candidate that is good enough; ``fastest`` is the fastest oscillation along the motion, if there is one."""
+    """The row of a candidate that is good enough; ``fastest`` is the fastest oscillation along the motion, or None."""
     method, trial, grid = candidate.method, fewest.trial, trials.grid
     ns, mean, longest = spent.times[candidate.name], spent.mean(candidate, trial), spent.longest(candidate, fewest.k)
     per_frame = candidate.evaluations * trial.steps / grid.spans
@@ -129,7 +129,7 @@ def rejection(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
 def shortfall_of(
     candidates: Sequence[Candidate], fewest: Mapping[str, Fewest], spent: Spending, budget: float | None
 ) -> Shortfall:
-    """What would have to give: the least error within the budget of all that was tried, and the budget for the tolerance."""
+    """The shortfall: the least error within the budget among all tried runs, and the budget that the tolerance needs."""
     least, best = _least(candidates, spent, budget)
     needs = [(spent.longest(each, fewest[each.name].k), each.name) for each in candidates if each.name in fewest]
     needed, by = min(needs) if needs else (None, None)
@@ -141,10 +141,10 @@ def shortfall_of(
 
 
 def _least(candidates: Sequence[Candidate], spent: Spending, budget: float | None) -> tuple[float, tuple[Candidate, int] | None]:
-    """The least error within the budget, and whose it is.
+    """The least error within the budget, and its candidate and k.
 
-    Of a run that was not good enough only a part of its errors is known, which is less than the largest: so the least of them is
-    measured until one that was measured is the least.
+    For a run that was not good enough only a lower bound of its error is known. So the run with the least bound is measured until
+    a measured error is the least.
     """
     waiting = [
         (trial.error, i, k, False)

@@ -20,12 +20,12 @@ SAMPLES = 10_000
 #: Modes that are too close to each other to be distinguished by this give no prediction.
 MAX_CONDITION = 1e8
 
-#: States of the true motion at which a system that is not linear is taken for one; not one with more numbers than this, for
-#: eigenvalues take long.
+#: The number of states of the true motion at which a nonlinear system is linearised; and the most numbers of a state for that,
+#: since eigenvalues take long.
 LINEARIZED_STATES, MAX_NUMBERS = 400, 128
 
-#: A step that is so many times as long as an advised one must not blow up either: more than twice how far apart the steps are at
-#: which the observed limit is looked for.
+#: A step that is this many times as long as an advised one must not blow up either. The margin is more than twice the distance
+#: between the steps at which the observed limit is searched.
 MARGIN = 1.05
 
 #: The observed limit is searched on a geometric grid of this many steps in a factor of two: 2.2 % apart.
@@ -33,12 +33,12 @@ RUNGS_PER_OCTAVE = 32
 
 
 class Prediction(NamedTuple):
-    """What the eigenvalues say of a step of a linear system.
+    """The prediction for a step of a linear system from its eigenvalues.
 
     Attributes:
         error: the largest state error over the horizon, all modes of the start together.
         frequency: relative frequency error Ψ/Φ − 1 of the mode of the start that drifts most; None if it does not oscillate.
-        damping: what is added to the damping of that mode, in 1 per unit of time; below zero it grows.
+        damping: the damping that the method adds to that mode, in 1 per unit of time; below zero the mode grows.
     """
 
     error: float
@@ -47,15 +47,15 @@ class Prediction(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """Where a method blows up.
+    """The stability limit of a method on a scene.
 
     Attributes:
-        dt: the step beyond which something grows, in units of time; 0 for never stable, infinite for always; None if unknown.
-            Where rounding hides what grows, the largest step of which it is known that nothing does; ``mode`` then says so.
-        by: ``"linear"``, or ``"frozen"`` for the fastest oscillation along the true motion, as if it stood still; ``"none"`` of
-            steps that are chosen to a tolerance.
-        mode: what grows there, in words; None if nothing or unknown.
-        frequency: in rad per unit of time, of that mode, or None.
+        dt: the step beyond which a mode grows, in units of time; 0 for never stable, infinite for always; None if unknown. Where
+            rounding hides what grows, the largest step that is known to be stable; ``mode`` then says so.
+        by: ``"linear"``, or ``"frozen"`` for the fastest oscillation of the system linearised along the true motion; ``"none"``
+            for adaptive steps.
+        mode: the kind of growth beyond the limit, in words; None if there is none or it is unknown.
+        frequency: the frequency of that mode, in rad per unit of time, or None.
     """
 
     dt: float | None
@@ -89,7 +89,7 @@ def predicted(scene: Scene, method: Method, dt: float, steps: int) -> Prediction
         errors = [
             np.sqrt((b * b).sum(axis=0)).max() / scale for b, scale in zip(blocks, scene.scales, strict=True) if len(b) and scale
         ]
-        # The mode that drifts most, by its share of the start.
+        # The mode that drifts most, weighted by its share of the start.
         weight = np.abs(true_share) * np.sqrt((np.abs(shapes) ** 2).sum(axis=0))
         own = np.array([np.sqrt(weight[np.abs(rates - rate).argmin()]) for rate in analysis.rates])
         drift = np.log(analysis.eigenvalues) / dt - analysis.rates
@@ -100,7 +100,7 @@ def predicted(scene: Scene, method: Method, dt: float, steps: int) -> Prediction
 
 
 def limit(trials: Trials, method: Method, fastest: float | None) -> Limit:
-    """The limit of a method on a scene; ``fastest`` is what ``fastest_oscillation`` found of one that is not linear."""
+    """The limit of a method on a scene; ``fastest`` is the result of ``fastest_oscillation`` for a nonlinear one."""
     scene = trials.scene
     if scene.system.linear and scene.control is None:
         limits = limit_of(scene.system, method)
@@ -117,7 +117,7 @@ def limit(trials: Trials, method: Method, fastest: float | None) -> Limit:
 def longest_step(trials: Trials, method: Method) -> float:
     """The longest step that keeps a margin to the limit of a linear system; infinite where there is none.
 
-    What grows with every step, if slowly, has no limit to keep away from.
+    A method that grows slowly with every step has no limit to keep away from.
     """
     scene = trials.scene
     if not scene.system.linear or scene.control is not None:
@@ -126,7 +126,7 @@ def longest_step(trials: Trials, method: Method) -> float:
 
 
 def keeps_margin(trials: Trials, method: Method, dt: float) -> bool:
-    """Whether runs with steps up to ``MARGIN`` times as long do not blow up either. Of a linear system the limit is known."""
+    """Whether runs with steps up to ``MARGIN`` times as long do not blow up either; for a linear system, by its limit."""
     horizon = trials.scene.horizon
     steps = (math.floor(horizon / (dt * ratio)) for ratio in (MARGIN, math.sqrt(MARGIN)))
     return trials.scene.system.linear or not any(trials.unstable(method, horizon / n, n) for n in steps if n)
@@ -135,8 +135,8 @@ def keeps_margin(trials: Trials, method: Method, dt: float) -> bool:
 def fastest_oscillation(trials: Trials) -> float | None:
     """The largest frequency of a small disturbance along the true motion, in rad per unit of time, or None if none oscillates.
 
-    Eigenvalues of what stands still are no limit of what moves, but the fastest oscillation is where a method blows up if it goes
-    on for some steps.
+    Eigenvalues at fixed states do not bound the motion between them, but a method blows up at the fastest oscillation if that
+    lasts for some steps.
     """
     scene = trials.scene
     system = scene.system
@@ -172,7 +172,7 @@ def observed_limit(trials: Trials, method: Method, stable: int) -> float:
 
     low = 2 * RUNGS_PER_OCTAVE
     high = max(low, math.ceil(RUNGS_PER_OCTAVE * math.log2(stable / MARGIN)))
-    # From the fine end, which is known, since what is coarse may be stable again by chance.
+    # From the fine end, which is known to be stable, since coarse steps may be stable again by chance.
     last = high
     for j in range(high - RUNGS_PER_OCTAVE, low - 1, -RUNGS_PER_OCTAVE):
         if grows(j):

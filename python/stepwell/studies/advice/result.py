@@ -22,13 +22,13 @@ from .rows import Rejected, Row, Shortfall
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: The text has a line for at most so many methods; ``ranked`` and ``rejected`` have all.
+#: The most methods with a line in the text; ``ranked`` and ``rejected`` have all.
 LINES = 6
 
-#: And says of so many rejected ones of each kind why, and names the others.
+#: The most rejected methods of each kind whose reasons the text says; it names the others.
 REASONS = 2
 
-#: A run of a row may try so many times its steps: they depend a little on the times at which it is asked for its state.
+#: A run of a row may attempt this many times its steps, since these depend slightly on the output times.
 MORE_STEPS = 10
 
 #: The columns of the table; those whose name ends in ``>`` are flush right.
@@ -37,22 +37,22 @@ COLUMNS = ("method", "steps>", "dt>", "error>", "predicted>", "evaluations>", "n
 
 @dataclass(frozen=True)
 class Advice:
-    """Which method and which step.
+    """The advised methods and steps for a scene.
 
     Attributes:
-        scene: for which scene, up to the horizon over which its true motion is known.
+        scene: the scene, up to the horizon over which its true motion is known.
         frame: the frame, in units of time, or None for any step.
-        tolerance: the largest state error that is allowed.
-        budget: seconds that may be used in a frame (in a unit of time without one), or None for any.
-        cost: by what ``ranked`` is ordered, ``"time"`` or ``"evaluations"``.
-        ranked: what is good enough and fits, the cheapest first; of those whose costs differ by ``cost_noise`` or less, the one
-            with the smallest error.
+        tolerance: the largest allowed state error.
+        budget: the seconds allowed in a frame (in a unit of time without one), or None for any number.
+        cost: the order of ``ranked``, by ``"time"`` or ``"evaluations"``.
+        ranked: the methods that are good enough and fit, the cheapest first; among those whose costs differ by ``cost_noise`` or
+            less, the one with the smallest error.
         rejected: the other methods, and why.
-        shortfall: what would have to give; None if something fits.
-        runs: how many runs were made to find it.
-        cut: whether the scene's horizon is longer, and its true motion not known so far.
-        cost_noise: the share by which measured times may differ without a meaning; 0 for evaluations.
-        dtype: ``"float64"``, ``"float32"`` or ``"both"``: in which numbers steps were tried.
+        shortfall: the tolerance and the budget that would suffice; None if something fits.
+        runs: the number of runs of the search.
+        cut: whether the scene's horizon is longer than its true motion is known.
+        cost_noise: the relative difference of measured times that means nothing; 0 for evaluations.
+        dtype: ``"float64"``, ``"float32"`` or ``"both"``, the precision of the tried steps.
     """
 
     scene: Scene
@@ -70,11 +70,11 @@ class Advice:
 
     @property
     def best(self) -> Row | None:
-        """The cheapest that is good enough, or None."""
+        """The first of ``ranked``, or None."""
         return self.ranked[0] if self.ranked else None
 
     def data(self) -> dict[str, Any]:
-        """All of it for programs; what is infinite is None."""
+        """The advice as a dictionary; infinite numbers become None."""
         whole = {
             "scene": self.scene.name,
             "horizon": self.scene.horizon,
@@ -94,7 +94,7 @@ class Advice:
         return dict(finite(whole))
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """The text of ``data()`` in JSON; also written to a file if one is given."""
+        """The text of ``data()`` in JSON, which is also written to ``path`` if there is one."""
         if path is not None:
             write_json(self.data(), path)
         return json_text(self.data())
@@ -108,11 +108,11 @@ class Advice:
         """The run of a row, in full.
 
         Args:
-            row: of ``ranked``; the best if None.
+            row: a row of ``ranked``; the best if None.
 
         Returns:
-            A ``Run`` that saves every step, or with a tolerance the states at ``asked``. ``advice.scene.state_error`` gives its
-            errors.
+            A ``Run`` with every step saved, or with a tolerance the states at ``asked``. ``advice.scene.state_error`` computes
+            its errors.
 
         Raises:
             ArgumentError: if there is no row.
@@ -160,7 +160,7 @@ class Advice:
         return lines
 
     def _as_cheap(self, best: Row) -> list[str]:
-        """Which others cost the same as far as it was measured; the best has the smallest error of them."""
+        """The other methods whose costs equal the best one's up to the noise; the best has the smallest error of them."""
         if self.cost != "time":
             return []
         alike = best.seconds_per_time * (1.0 + self.cost_noise)
@@ -171,7 +171,7 @@ class Advice:
         return [f"As far as can be measured (±{100 * self.cost_noise:.0f} %), {sentence}."]
 
     def _beside(self, best: Row) -> list[str]:
-        """What float32 gains and costs, where it was asked for."""
+        """The gain and the cost of float32, if it was tried."""
         row = next((row for row in self.ranked if row.dtype == "float32"), None)
         if row is None or row.float64_error is None or row.float64_ns_per_step is None:
             return []
@@ -238,7 +238,7 @@ class Advice:
         return grid_of(self.scene.horizon, self.frame).spans
 
     def rejections(self, most: int | None = None) -> list[str]:
-        """Why the others are rejected, a line for each reason; of each kind no more than ``most``, the others by name."""
+        """Why other methods are rejected, a line for each reason; for each kind at most ``most``, then names only."""
         lines = []
         for kind in dict.fromkeys(each.kind for each in self.rejected):
             reasons: dict[str, list[str]] = {}
@@ -252,10 +252,10 @@ class Advice:
         return lines
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw cost and error of each ranked method, with the error that was asked for, and write the picture if asked.
+        """Draw cost and error of each ranked method, with the allowed error.
 
         Args:
-            path: the file; its ending says in which format.
+            path: the file to write, or None; its ending is that of the format.
 
         Returns:
             The figure; a notebook shows it.
@@ -273,7 +273,7 @@ class Advice:
 
     @property
     def title(self) -> str:
-        """What was asked."""
+        """The scene and the arguments of the advice, in a line."""
         frame = "any step" if self.frame is None else f"frame {self.frame:.4g}"
         per = "a unit of time" if self.frame is None else "a frame"
         request = f"error of {self.tolerance:g} or less up to t = {self.scene.horizon:.4g}, {frame}"
@@ -293,7 +293,7 @@ class Advice:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        """The same as a table, for notebooks."""
+        """The advice as a table, for notebooks."""
         return table(self.title, COLUMNS, self.table(), [*self.summary(), *self.rejections(REASONS)])
 
     def __repr__(self) -> str:
@@ -306,7 +306,7 @@ class Advice:
 
 
 def about(number: int) -> str:
-    """A number that follows from a measured time, to the digits that mean something: ``"about 7·10⁷"``, and small ones as is."""
+    """A number from a measured time, to its significant digits: ``"about 7·10⁷"``; a small number is exact."""
     if number < 100:
         return str(number)
     digits = f"{number:.0e}" if number >= 10_000 else f"{float(f'{number:.1g}'):.0f}"

@@ -1,4 +1,4 @@
-"""The rows of an advice: a method with a step that is accurate enough, why another is rejected, and what would have to give."""
+"""The rows of an advice: methods with a step that is accurate enough, rejected methods, and the shortfall if none fits."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ class Row:
         ns_per_step: measured nanoseconds per step of one member of a batch, on one thread. Not repeatable.
         seconds_per_frame: measured mean computing time of a frame; None without a frame.
         seconds_per_time: measured computing time per unit of time.
-        objects: the number of such objects that fit into the budget, in the most expensive frame; None without a budget.
+        objects: the number of such scenes that fit into the budget, in the most expensive frame; None without a budget.
         limit: the step beyond which a mode grows, by the eigenvalues: 0 for never stable, infinite for no limit, None if they
             do not decide, and for adaptive steps.
         limit_by: ``"linear"``, exact; ``"frozen"``, the fastest oscillation of the system linearised along the true motion;
             ``"none"``, for adaptive steps.
         mode: the kind of growth beyond the limit, in words, or None.
         mode_frequency: its frequency in the exact solution, in rad per unit of time, or None.
-        observed_limit: the largest step whose run over the horizon does not grow; infinite if none that was tried does.
-        robust: from this many steps (in a frame, or over the horizon) on, or from this tolerance down, all runs that were tried
+        observed_limit: the largest step whose run over the horizon does not grow; infinite if no tried run grows.
+        robust: the number of steps (in a frame, or over the horizon) from which on, or the tolerance below which, all tried runs
             are accurate enough; None if errors are above the tolerance up to twice as many steps.
-        tolerance: the tolerance of adaptive steps, as ``integrate`` takes it; None for fixed steps.
+        tolerance: the tolerance of adaptive steps, as in ``integrate``; None for fixed steps.
         rejected_steps: the number of rejected steps among the steps.
         worst_evaluations: function (rate) evaluations in the most expensive frame; None without a frame.
-        dtype: in which its steps are computed, ``"float64"`` or ``"float32"``. A step of float32 is ``dt`` rounded to it.
-        float64_error: of a row in float32, the largest state error of the same steps in float64; else None.
-        float64_ns_per_step: of a row in float32, what a step of the same method takes in float64; else None.
+        dtype: ``"float64"`` or ``"float32"``, the precision of its steps. In float32 the step is ``dt`` rounded to it.
+        float64_error: for a row in float32, the largest state error of the same steps in float64; else None.
+        float64_ns_per_step: for a row in float32, nanoseconds per step of the same method in float64; else None.
     """
 
     method: Method
@@ -88,22 +88,22 @@ class Row:
 
     @property
     def margin(self) -> float:
-        """The exact stability limit, or else the observed one, divided by the step: how many times as long a step may be.
+        """The stability limit, exact or else observed, divided by the step: the factor by which the step may be longer.
 
-        Infinite for adaptive steps, which are shortened instead.
+        It is infinite for adaptive steps, which are shortened instead.
         """
         exact = self.limit_by == "linear" and self.limit
         return (self.limit if exact and self.limit else self.observed_limit) / self.dt
 
     @property
     def is_robust(self) -> bool:
-        """Whether a few more steps are good enough too."""
+        """Whether slightly more steps are good enough too."""
         if self.tolerance is not None:
             return self.robust is not None and self.robust >= self.tolerance
         return self.robust is not None and self.robust <= (self.steps if self.substeps is None else self.substeps)
 
     def data(self) -> dict[str, Any]:
-        """The same for programs, the method by its name."""
+        """The row as a dictionary, with the method by its name."""
         names = [name for name in self.__dataclass_fields__ if name != "method"]
         first = {"method": self.method.name, "by": self.by}
         return first | {name: getattr(self, name) for name in names} | {"margin": self.margin}
@@ -117,9 +117,9 @@ class Rejected:
         method: its name.
         kind: ``"refused"`` by the system; ``"unstable"`` or ``"inaccurate"`` at the most steps that were tried; ``"dominated"``,
             more than ten times as expensive as the best; ``"budget"``, good enough but too expensive.
-        reason: the same in words and numbers.
-        by: ``"step"`` or ``"tolerance"``, what its steps were chosen by.
-        dtype: ``"float64"`` or ``"float32"``, in which they were computed.
+        reason: the reason in words and numbers.
+        by: ``"step"`` for fixed steps, ``"tolerance"`` for adaptive ones.
+        dtype: ``"float64"`` or ``"float32"``, the precision of its steps.
     """
 
     __repr__ = one_line
@@ -138,16 +138,16 @@ class Rejected:
 
 @dataclass(frozen=True)
 class Shortfall:
-    """What would have to give if nothing fits.
+    """The tolerance and the budget that would suffice if nothing fits.
 
     Attributes:
-        least_error: the least state error that was found within the budget, or infinity.
-        method: by which method, or None.
-        substeps: with how many steps in a frame (over the horizon without one), or None.
+        least_error: the least state error within the budget, or infinity.
+        method: the method with this error, or None.
+        substeps: its steps in a frame (over the horizon without one), or None.
         needed_budget: seconds in a frame (in a unit of time without one) that the tolerance needs, or None if nothing meets it.
-        needed_method: by which, ``"merson, tolerance"`` if it chooses its steps, or None.
-        tolerance: to which the steps of the least error are chosen, or None.
-        dtype: in which they are computed.
+        needed_method: the method that needs them, ``"merson, tolerance"`` for adaptive steps, or None.
+        tolerance: the tolerance of the adaptive steps with the least error, or None.
+        dtype: the precision of these steps.
     """
 
     __repr__ = one_line

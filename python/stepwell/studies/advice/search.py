@@ -15,11 +15,11 @@ from typing import NamedTuple
 from .candidates import Candidate
 from .trials import ASYMPTOTIC_ERROR, Trial
 
-#: Function (rate) evaluations that a run makes at most, or it would take too long; of a system of n > 8 numbers, this divided by
-#: (n/8) to this exponent.
+#: The most function (rate) evaluations of a run, so that it does not take too long; for a system of n > 8 numbers they are
+#: divided by (n/8) to this exponent.
 MAX_EVALUATIONS, SIZE_EXPONENT = 16_000_000, 1.5
 
-#: All runs of a search together make at most about so many times MAX_EVALUATIONS: each run may make this share of what is left.
+#: All runs of a search together make at most about TOTAL_BUDGET times MAX_EVALUATIONS: each may make this fraction of the rest.
 TOTAL_BUDGET, RUN_SHARE = 4.0, 0.5
 
 #: A candidate that costs more than this many times the cheapest is given up.
@@ -37,26 +37,26 @@ DENSE_ERROR_RATIO, DENSE_POINTS = 2.5, 6
 #: second, if all of them together make no more than the share IRREGULAR_SHARE of the evaluations that one run may make.
 IRREGULAR_RISE, IRREGULAR_ERROR_RATIO, IRREGULAR_POINTS, IRREGULAR_SHARE = 1.3, 8.0, (6, 24), 1 / 128
 
-#: A local minimum of the error is searched by so many halvings of the interval.
+#: The number of halvings of the interval in the search for a local minimum of the error.
 MINIMUM_HALVINGS = 8
 
 #: Errors are regular where, below REGULAR_ERROR, they fall over two doublings by powers that differ by at most ORDER_SPREAD and
-#: are at least the order less ORDER_DEFICIT. Then the search begins at the share REGULAR_START of the steps that the power
-#: predicts, if a run makes more than the share LONG_RUN_SHARE of the evaluations that it may make.
+#: are at least the order minus ORDER_DEFICIT. Then the search begins at the fraction REGULAR_START of the steps that the power
+#: predicts, if a run makes more than the fraction LONG_RUN_SHARE of the evaluations that it may make.
 REGULAR_ERROR, ORDER_SPREAD, ORDER_DEFICIT, REGULAR_START, LONG_RUN_SHARE = 0.02, 1.0, 1.3, 0.75, 1 / 256
 
-#: Where a run makes more than this share of the evaluations that it may make, the search only halves the last doubling: so many
-#: times, and once where that cannot make it the cheapest.
+#: Where a run makes more than this fraction of the evaluations that it may make, the search only halves the last doubling,
+#: ``HALVINGS`` times, or once where that cannot make it the cheapest.
 HALVED_RUN_SHARE, HALVINGS = 1 / 12, 3
 
-#: When something was found, a run that costs more may make at most this share of the evaluations that a run may make.
+#: Once a candidate is good enough, a more expensive run may make at most this fraction of the evaluations that a run may make.
 LATER_RUN_SHARE = 1 / 4
 
 #: The number of steps that the order predicts is wrong by up to this factor.
 PREDICTION_FACTOR = 3.0
 
 
-#: After a run with a tolerance that stopped early k is so many times as large.
+#: The factor by which k grows after a run with a tolerance that stopped early.
 STOPPED_LEAP = 4
 
 
@@ -64,11 +64,11 @@ class Fewest(NamedTuple):
     """The fewest steps of a candidate that are good enough.
 
     Attributes:
-        k: the candidate's.
+        k: the candidate's k.
         trial: the confirming run.
-        robust: from here on every k that was tried, up to twice as large, is good enough too; k itself as a rule, and None if
-            there is no such k.
-        expected: error that is extrapolated by the order from a run with longer steps, or None.
+        robust: the k from which on every k that was tried, up to twice as large, is good enough too; usually k itself, and None
+            if there is no such k.
+        expected: the error extrapolated by the order from a run with longer steps, or None.
     """
 
     k: int
@@ -81,10 +81,10 @@ class Missed(NamedTuple):
     """Why a candidate was given up: ``unstable``, ``inaccurate`` or ``dominated``.
 
     Attributes:
-        kind: which.
-        k: the largest that was run.
-        trial: that run.
-        expected: k that the order says it takes, or None.
+        kind: which of these.
+        k: the largest k that was run.
+        trial: its run.
+        expected: the k that would be needed according to the order, or None.
         expensive: whether more steps were not tried because they cost too much compared with the best.
     """
 
@@ -99,12 +99,12 @@ class Search:
     """The search of one scene and one tolerance.
 
     Args:
-        tolerance: the error that is allowed.
-        spans: the cost is that of one of so many parts of a run.
-        prices: what a step costs, by the candidate's name.
+        tolerance: the allowed error.
+        spans: the number of spans in a run; costs are those of one span.
+        prices: the cost of a step, by the candidate's name.
         longest: the most function evaluations of a run.
-        spent: returns how many all runs have made so far.
-        short: the most of a run where only short ones are worth it.
+        spent: returns the number of function evaluations of all runs so far.
+        short: the most function evaluations of a run where only short ones are worth it.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class Search:
         return min(self.short, self.longest, RUN_SHARE * max(0.0, TOTAL_BUDGET * self.longest - self.spent()))
 
     def cost(self, candidate: Candidate, k: int) -> float:
-        """The cost of a span, in a run that was made."""
+        """The cost of a span in the run with this k."""
         return self.prices[candidate.name] * candidate.look(k).steps / self.spans
 
     def allowed(self, candidate: Candidate) -> float:
@@ -151,9 +151,9 @@ class Search:
         ceilings: Mapping[str, float] = MappingProxyType({}),
         hints: Mapping[str, Collection[int]] = MappingProxyType({}),
     ) -> tuple[dict[str, Fewest], dict[str, Missed]]:
-        """What was found, and what was given up, by the candidate's name.
+        """The fewest steps of each candidate that is good enough, and why the others were given up, by the candidate's name.
 
-        ``ceilings`` are the most steps in a span, if any, ``hints`` are k that may be good enough.
+        ``ceilings`` are the most steps in a span, if limited, ``hints`` are k that may be good enough.
         """
         octaves, missed = self.octaves(candidates, ceilings)
         by_name = {candidate.name: candidate for candidate in candidates}
@@ -171,15 +171,15 @@ class Search:
             if cost > 2.0 * MAX_COST_RATIO * best:
                 missed[name] = Missed("dominated", k, candidate.look(k), None)
                 continue
-            # Three octaves back if that might be the cheapest of all, for a dip may hide there.
-            # One that cannot be, or whose runs are very long, is halved, as if errors were even.
+            # A candidate that might be the cheapest of all is searched three octaves back, since a dip may hide there. One that
+            # cannot be, or whose runs are very long, is halved as if errors fell evenly.
             least = (
                 self.halved(candidate, k, best)
                 if cost > 4.0 * best or self.very_long(candidate, k)
                 else self.finest(candidate, k, 8)
             )
             if least is None and self.confirmed(candidate, k):
-                least = k  # what is finer would take too long to look for
+                least = k  # a finer search would take too long
             least = self.least(candidate, least, hints.get(name, ()))
             if least is None:
                 missed[name] = Missed("inaccurate", k, candidate.look(k), None)
@@ -195,7 +195,7 @@ class Search:
         return fewest, missed
 
     def least(self, candidate: Candidate, k: int | None, hints: Collection[int]) -> int | None:
-        """The cheapest of a k that is good enough, if any, and of hints that are; or the next that keeps away from blowing up."""
+        """The cheapest k that is good enough, of this one and the hints; or the next one with a margin to blowing up."""
         good = [n for n in hints if self.confirmed(candidate, n)]
         good += [k] if k is not None else []
         least = min(good, key=lambda n: self.cost(candidate, n), default=None)
@@ -227,7 +227,7 @@ class Search:
             wanted = self.wanted(candidate, k, trial)
             least = max(2.0, (wanted or self.at_least(candidate, k, trial)) / k / PREDICTION_FACTOR)
             kind = "unstable" if trial.unstable else "inaccurate"
-            # What a run with a tolerance cost that stopped early says nothing of one that does not.
+            # The cost of a run with a tolerance that stopped early says nothing about one that does not.
             stopped = trial.unstable and candidate.by == "tolerance"
             following = STOPPED_LEAP * k if stopped else 2 * k
             evaluations, ceiling = trial.steps * candidate.evaluations, ceilings.get(candidate.name, math.inf)
@@ -237,16 +237,16 @@ class Search:
             elif cost * least > MAX_COST_RATIO * best and not stopped:
                 missed[candidate.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, expensive=True)
             else:
-                # Of equally expensive ones that which came farther goes first.
+                # Among equally expensive candidates the one that came further goes first.
                 heapq.heappush(waiting, (2.0 * cost / trial.share, i, following))
         return first, missed
 
     def wanted(self, candidate: Candidate, k: int, trial: Trial) -> int | None:
-        """The k that the order of the method asks for, if the error is small enough to tell."""
+        """The k predicted by the order of the method, if the error is small enough for a prediction."""
         return self.ordered(candidate, k, trial.error) if trial.error < ASYMPTOTIC_ERROR else None
 
     def at_least(self, candidate: Candidate, k: int, trial: Trial) -> int:
-        """The k that the order asks for where the run was long, and lost on the way: so that it is good enough up to there."""
+        """The k predicted by the order for a long run that was stopped: with it the run is good enough up to that point."""
         return self.ordered(candidate, k, trial.before) if trial.stopped else 0
 
     def ordered(self, candidate: Candidate, k: int, error: float) -> int:
@@ -254,7 +254,7 @@ class Search:
         return math.ceil(k * min(1e12, float((error / self.allowed(candidate)) ** (1.0 / candidate.method.order))))
 
     def finest(self, candidate: Candidate, k: int, back: int) -> int | None:
-        """The least k that is good enough, from so many times less than a good one to a little more."""
+        """The least k that is good enough, searched from ``back`` times less than a good one to a little more."""
         regular = self.regular(candidate, k)
         low = max(candidate.first, k // back, regular)
         failed, ladder = 0, rungs(low, 4 * k)
@@ -288,8 +288,8 @@ class Search:
     def denser(self, candidate: Candidate, ladder: list[int]) -> Iterator[int]:
         """The ladder, with more k where one of them may be good enough by chance.
 
-        That is where an error is just above the tolerance; where errors rise with more steps, for those of a chaotic motion are
-        irregular; and at a local minimum, where an error may change its sign.
+        That is so where an error is just above the tolerance; where errors rise with more steps, since those of a chaotic motion
+        are irregular; and at a local minimum, where an error may change its sign.
         """
         allowed = self.allowed(candidate)
         least, before, last = math.inf, (0, math.inf), (0, math.inf)
@@ -314,7 +314,7 @@ class Search:
                 )
 
     def minimum(self, candidate: Candidate, low: int, middle: int, high: int) -> Iterator[int]:
-        """Towards the least error between two k, from one between them where it is less."""
+        """Successive k that approach the least error between two k, from one in between with a smaller error."""
         for _ in range(MINIMUM_HALVINGS):
             inner = sorted({(low + middle) // 2, (middle + high) // 2} - {low, middle, high})
             if not inner:
@@ -326,9 +326,9 @@ class Search:
             low, middle, high = ladder[i - 1 : i + 2]
 
     def dense_points(self, candidate: Candidate, k: int) -> int:
-        """How many more are tried between two rungs where errors are irregular: the more, the shorter the runs.
+        """The number of k that are tried between two rungs where errors are irregular: the more, the shorter the runs.
 
-        With adaptive steps the least: every tolerance makes other steps anyway.
+        It is the smallest for adaptive steps, since every tolerance makes other steps anyway.
         """
         if candidate.by == "tolerance":
             return IRREGULAR_POINTS[0]
@@ -336,7 +336,7 @@ class Search:
         return max(IRREGULAR_POINTS[0], min(IRREGULAR_POINTS[1], int(IRREGULAR_SHARE * self.longest / evaluations)))
 
     def very_long(self, candidate: Candidate, k: int) -> bool:
-        """Whether a run takes so long that only few more like it can be made."""
+        """Whether a run takes so long that only a few more like it are possible."""
         return candidate.look(k).steps * candidate.evaluations > HALVED_RUN_SHARE * self.longest
 
     def halved(self, candidate: Candidate, k: int, best: float) -> int | None:
@@ -357,10 +357,10 @@ class Search:
         return high
 
     def robust(self, candidate: Candidate, k: int) -> int | None:
-        """From where on a few more steps are good enough too."""
+        """The k from which on slightly more steps are good enough too."""
         above = [rung for rung in rungs(k, 2 * k) if rung > k and self.affordable(candidate, rung, k)]
         near = sorted({k + 1, *above[:2]})
-        if self.very_long(candidate, k):  # what was run already, and one more
+        if self.very_long(candidate, k):  # only the runs that exist, and one more
             near = sorted({k + 1, *(n for n in candidate.seen if k < n <= 2 * k)})
         if all(self.good(candidate, n) for n in near if self.affordable(candidate, n, k)):
             return k
@@ -379,6 +379,6 @@ class Search:
 
 
 def rungs(low: int, high: int) -> list[int]:
-    """Whole numbers from ``low`` to ``high``, 9 % apart or by one; the same ones for every method."""
+    """Whole numbers from ``low`` to ``high``, 9 % apart or by one; every method has the same ones."""
     start, end = math.floor(RUNGS_PER_OCTAVE * math.log2(low)), math.ceil(RUNGS_PER_OCTAVE * math.log2(high))
     return sorted({n for j in range(start, end + 1) if low <= (n := round(float(2.0 ** (j / RUNGS_PER_OCTAVE)))) <= high})

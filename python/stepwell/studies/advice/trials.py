@@ -1,4 +1,4 @@
-"""Trial runs of a scene with fixed steps: how wrong a method is with a step, and whether it grows."""
+"""Trial runs of a scene with fixed steps: the error of a method with a step, and whether it grows."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from ...scenes.base import quiet_run
 from ..measuring.measure import grew
 from .motion import Motion
 
-#: A run saves at most so many numbers: every step, if these are fewer.
+#: The most numbers that a run saves; if all its steps have fewer, it saves every step.
 MAX_SAVED_NUMBERS = 2_000_000
 
-#: A confirming run compares all its saved states with the reference solution, up to so many.
+#: The most saved states that a confirming run compares with the reference solution.
 MAX_CONFIRMED_STATES = 50_000
 
-#: Below this an error is taken to be in the asymptotic range, where it falls by the method's order; above, nothing is predicted.
+#: An error below this counts as asymptotic: it falls by the method's order. Above, nothing is predicted.
 ASYMPTOTIC_ERROR = 0.3
 
-#: A long run is made in so many pieces. Where the error at the end of one is above LOST, or above both ASYMPTOTIC_ERROR and
-#: LOST_RATIO times what is allowed, the rest is left out: no more can be learned from it. The ratio is more than the search looks
-#: at (IRREGULAR_RISE times IRREGULAR_ERROR_RATIO there). If an error near LOST is allowed, it must be above twice that.
+#: A long run is made in PIECES pieces. If the error at the end of a piece is above LOST, or above both ASYMPTOTIC_ERROR and
+#: LOST_RATIO times the allowed error, the rest is omitted, since nothing more can be learned from it. The ratio is beyond the
+#: errors that the search uses (IRREGULAR_RISE times IRREGULAR_ERROR_RATIO there). If the allowed error is near LOST, the error
+#: must be above twice the allowed one.
 PIECES, LOST, LOST_RATIO = 12, 1.0, 16.0
 
 
@@ -35,13 +36,13 @@ class Trial(NamedTuple):
     """A run over the horizon.
 
     Attributes:
-        dt: the step; with a tolerance the mean of all that were tried.
-        steps: how many; with a tolerance all that were tried.
-        error: the largest state error; of a run that was stopped, up to there.
-        unstable: whether it is wrong altogether and grew, or with a tolerance stopped early.
-        rejected: how many of the steps were rejected.
+        dt: the step; with a tolerance the mean of all attempts.
+        steps: the number of steps; with a tolerance of all attempts.
+        error: the largest state error; for a run that was stopped, up to that point.
+        unstable: whether it has no correct digit and grew, or with a tolerance stopped early.
+        rejected: the number of rejected steps.
         before: the largest error before it left the asymptotic range, if it did.
-        share: of the run that was made; the rest of a long one is left out where it is wrong altogether.
+        share: the fraction of the horizon that was run; the rest of a long run without a correct digit is omitted.
     """
 
     dt: float
@@ -54,7 +55,7 @@ class Trial(NamedTuple):
 
     @property
     def stopped(self) -> bool:
-        """Whether a part of the run was left out."""
+        """Whether a part of the run was omitted."""
         return self.share < 1.0
 
 
@@ -62,10 +63,10 @@ class Trials:
     """Runs of one scene with fixed steps, each made once.
 
     Args:
-        motion: what runs are compared with.
-        tolerance: the state error that is allowed.
-        long: a run of more rate evaluations than this is stopped where it is wrong altogether.
-        dtype: in which they are computed.
+        motion: the true motion, with which runs are compared.
+        tolerance: the allowed state error.
+        long: a run of more rate evaluations than this is stopped where it has no correct digit.
+        dtype: the precision of the runs.
     """
 
     def __init__(self, motion: Motion, tolerance: float, long: float, dtype: str = "float64") -> None:
@@ -76,9 +77,9 @@ class Trials:
         self._done: dict[tuple[str, int, float], Trial] = {}
         self._dense: dict[tuple[str, int, float], Trial] = {}
         self._evaluations: dict[str, int] = {}
-        #: The last run, for what is looked at is often confirmed at once.
+        #: The last run, since ``confirm`` often follows ``look``.
         self._last: tuple[tuple[str, int, float], Run] | None = None
-        #: Runs, and rate evaluations of all.
+        #: The number of runs, and of all their rate evaluations.
         self.runs, self.work = 0, 0.0
 
     def evaluations(self, method: Method) -> int:
@@ -88,7 +89,7 @@ class Trials:
         return self._evaluations[method.name]
 
     def look(self, method: Method, dt: float, steps: int) -> Trial:
-        """The run, of which some two thousand states are compared with the true ones."""
+        """The run, with some two thousand states compared with the true ones."""
         key = (method.name, steps, dt)
         if key not in self._done:
             run, worst = self._watched(method, dt, steps)
@@ -101,7 +102,7 @@ class Trials:
         return self._done[key]
 
     def confirm(self, method: Method, dt: float, steps: int) -> Trial:
-        """The same run, of which every state is compared if they are not too many."""
+        """The run, with every state compared unless there are too many."""
         key = (method.name, steps, dt)
         if key not in self._dense:
             trial = self.look(method, dt, steps)
@@ -123,7 +124,7 @@ class Trials:
         return max(1, math.ceil(steps * self.numbers / MAX_SAVED_NUMBERS))
 
     def _watched(self, method: Method, dt: float, steps: int) -> tuple[Run, float]:
-        """The run, of which the rest is left out if it is long and was wrong altogether; and the largest error that was seen."""
+        """The run and its largest error; a long run ends where it has no correct digit."""
         every = self._every(steps)
         piece = every * math.ceil(steps / (PIECES * every))
         if self.evaluations(method) * steps <= self.long or piece >= steps:

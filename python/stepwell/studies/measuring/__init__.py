@@ -1,1 +1,1 @@
-"""What methods cost and how wrong they are: work-precision data, and peers."""
+"""The costs and errors of methods: work-precision data, and peers."""

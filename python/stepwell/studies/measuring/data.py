@@ -32,9 +32,9 @@ class Timing(ValueEquality):
     """Measured nanoseconds, per step or per unit of time of one member: not repeatable.
 
     Attributes:
-        median: of the repeats.
+        median: the median of the repeats.
         low: the least of them.
-        high: the greatest.
+        high: the greatest of them.
     """
 
     median: float
@@ -42,7 +42,7 @@ class Timing(ValueEquality):
     high: float
 
     def over(self, dt: float) -> Timing:
-        """Per unit of time, of a time per step."""
+        """The time per unit of simulated time, from this time per step."""
         return Timing(self.median / dt, self.low / dt, self.high / dt)
 
     @classmethod
@@ -61,12 +61,12 @@ class Point(ValueEquality):
         cost: function (rate) evaluations per unit of simulated time; NaN if a peer does not report them.
         state_error: the largest of ``Scene.state_error`` over the run; with a tolerance at the output times.
         energy_error: the largest of ``Scene.energy_error`` over the run, likewise; NaN if the system has no energy.
-        unstable: the state left the finite numbers, or is wrong altogether (an error above 1) and grew: its largest
-            amplitude in the second half of the run is more than a tenth above that in the first half, and above the
-            exact one. With a tolerance: the run stopped early.
+        unstable: whether the state left the finite numbers, or has no correct digit (an error above 1) and grew: its largest
+            amplitude in the second half of the run is more than a tenth above that in the first half, and above the exact one.
+            With a tolerance: whether the run stopped early.
         end_error: the state error at the end of the run.
-        phase_error: by how many periods the end is ahead of the exact motion (negative: behind); None for a scene without a
-            period, and for a state without a correct digit.
+        phase_error: the number of periods by which the end is ahead of the exact motion (negative: behind); None for a scene
+            without a period, and for a state without a correct digit.
         tolerance: the tolerance of adaptive steps, or None.
     """
 
@@ -91,8 +91,8 @@ class Point(ValueEquality):
         return not self.unstable and self.state_error <= 1.0
 
 
-#: A point is right by luck if one of the next so many is more than so many times as wrong. Rounding errors grow at most with the
-#: number of steps, by a factor of 2 within three rungs of the ladder.
+#: A point is right by luck if one of the next LATER points has more than LUCKY times its error. Rounding errors grow at most with
+#: the number of steps, by a factor of 2 within three rungs of the ladder.
 LATER, LUCKY = 3, 4.0
 
 
@@ -107,10 +107,10 @@ class Curve(ValueEquality):
             is unstable, 0 if all are, and infinite with tolerances.
         step_time: measured time of a step of one member of a batch.
         single_time: measured time of a step of a single run.
-        by: ``"step"`` or ``"tolerance"``, by which the points differ.
+        by: ``"step"`` or ``"tolerance"``: the setting in which the points differ.
         times: for a peer, the measured time per unit of simulated time at each point, in a single run.
         fused: whether it was computed with fused multiply-adds.
-        dtype: ``"float64"`` or ``"float32"``, in which it was computed.
+        dtype: ``"float64"`` or ``"float32"``, the precision of the runs.
     """
 
     method: Method | Peer
@@ -125,7 +125,7 @@ class Curve(ValueEquality):
 
     @property
     def name(self) -> str:
-        """The method's name, followed by "tolerance", "fused" or "float32" where that is so: ``"rk4, fused"``."""
+        """The method's name, followed by "tolerance", "fused" or "float32" where they apply: ``"rk4, fused"``."""
         return f"{self.method.name}{self._kind}"
 
     @property
@@ -158,7 +158,7 @@ class Curve(ValueEquality):
         return tuple(point for point in self.points if point.usable)
 
     def dependable(self, kind: str = "state_error", floor: float = 0.0) -> tuple[Point, ...]:
-        """The usable points that were not right by luck: none of the next three is far more wrong, by the error of that kind.
+        """The usable points that are not right by luck: none of the next three has a much larger error of that kind.
 
         A step may meet an impact just right, or lie in a narrow window of stability; a slightly shorter one does not. Errors
         below ``floor`` count as ``floor``.
@@ -185,10 +185,10 @@ class WorkPrecision(Drawn, Table, ValueEquality):
     Attributes:
         scene: the scene; if it has no exact solution, with that of a tight run, up to the time where that is known.
         curves: one for each method that can step the scene, then one for each with adaptive steps, then those of the peers.
-        refused: why the others cannot, by name.
+        refused: why the others cannot step it, by name.
         members: members of the batch whose time was measured, on one thread.
         repeats: how often each method was timed.
-        isa: the CPU level at which it was measured.
+        isa: the CPU level of the measurements.
         floor: the accuracy of the reference solution; errors below this are not meaningful.
         cut: whether the scene's horizon is longer than the time for which its true motion is known.
     """
@@ -208,10 +208,10 @@ class WorkPrecision(Drawn, Table, ValueEquality):
         return figure
 
     def plot(self, path: str | Path | None = None, *, error: str = "state_error", time: str = "batch") -> Figure:
-        """Draw it, and write it to ``path`` if given; the ending says in which format.
+        """Draw the chart.
 
         Args:
-            path: where to.
+            path: the file to write, or None; its ending is that of the format.
             error: the error to show: ``"state_error"``, ``"end_error"``, ``"phase_error"``, ``"energy_error"``.
             time: whether measured times are those of a ``"batch"`` or of a ``"single"`` run.
 
@@ -224,7 +224,7 @@ class WorkPrecision(Drawn, Table, ValueEquality):
     def front(self, error: str = "state_error", cost: str = "evaluations") -> list[dict[str, Any]]:
         """The Pareto front: the points that no other beats in both cost and error, from the cheapest to the most accurate.
 
-        Of points that are usable and not right by luck (``Curve.dependable``), with an error not below ``floor``.
+        Only points that are usable and not right by luck (``Curve.dependable``) count, with an error not below ``floor``.
 
         Args:
             error: one of ``"state_error"``, ``"end_error"``, ``"phase_error"``, ``"energy_error"``.

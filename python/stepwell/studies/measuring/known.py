@@ -1,4 +1,4 @@
-"""The exact solution of a scene for charts, which evaluate it thousands of times, up to the time until which it is known."""
+"""The exact solution of a scene for charts, which evaluate it thousands of times, as far as it is known."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Exact = Callable[[Array], tuple[Array, Array]]
 
 
 def chartable(scene: Scene) -> tuple[Scene, float]:
-    """The scene with a known motion over its whole horizon, without a control, and the least error that means something.
+    """The scene without a control, with a motion that is known over its whole horizon, and the least meaningful error.
 
     A scene without an exact solution gets one by ``with_truth``, and ends where that does.
 
@@ -45,7 +45,7 @@ def chartable(scene: Scene) -> tuple[Scene, float]:
 
 
 def dense(exact: Exact, until: float) -> Exact:
-    """The same motion from 0 to ``until``, by polynomials through states that are computed once."""
+    """The motion from 0 to ``until``, by polynomials through states that are computed once."""
     between = np.linspace(0.0, until, 97)[1:-1] + until / 2e4
     wanted = exact(between)
     nodes = FIRST_NODES

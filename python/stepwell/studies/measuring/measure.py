@@ -21,11 +21,11 @@ from .data import Curve, Point, Timing
 from .peers import Peer, Solved
 from .timing import MOST_TRIED
 
-#: Errors are looked for in at least this many states of a run, or in all if it has fewer.
+#: Errors are measured in at least this many states of a run, or in all if it has fewer.
 SAMPLES = 1000
 
 #: The amplitude of a run grows if the largest of its second half is above the largest of its first half by this factor,
-#: and above the exact solution's. What is large but bounded, as near a stability limit, is as large in both halves.
+#: and above the exact solution's. A large but bounded amplitude, as near a stability limit, is as large in both halves.
 MIN_GROWTH = 1.1
 
 #: Number of output times of a run with a tolerance, evenly spread, the last at the horizon. Each costs an extra step,
@@ -35,8 +35,8 @@ SAVED_TIMES = 10
 #: Extra steps for a saved state within a step: one that ends at it, and the step that passes it once more.
 EXTRA_STEPS = 2
 
-#: The phase error is searched from the best of so many shifts in time, evenly spaced over a period, if the state at the end is
-#: wrong by more than this.
+#: The search for the phase error begins at the best of COARSE_SHIFTS shifts in time, evenly spaced over a period, if the error of
+#: the state at the end is above COARSE_SEARCH_ABOVE.
 COARSE_SHIFTS, COARSE_SEARCH_ABOVE = 64, 0.05
 
 #: How often a peer is run at each of its settings; the median counts.
@@ -44,7 +44,7 @@ PEER_REPEATS = 3
 
 
 def refusal(scene: Scene, method: Method) -> str | None:
-    """Why the method cannot do the scene, or None."""
+    """Why the method cannot step the scene, or None."""
     try:
         fits_together(scene.system, method)
         engine.evaluations(method, scene.system)
@@ -72,7 +72,7 @@ def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = Fa
 
 def grew(amplitude: Array, half: int) -> bool:
     """Whether the amplitude of a run grows in its second half, which begins at state ``half``."""
-    # Not above the exact solution is no growth: a driven system may well start small. NaN is above everything.
+    # An amplitude that is not above the exact one does not count, since a driven system may start small. NaN is above everything.
     return not amplitude[half:].max() <= MIN_GROWTH * max(1.0, float(amplitude[: max(1, half)].max()))
 
 
@@ -110,7 +110,7 @@ def assess_peer(scene: Scene, peer: Peer) -> Curve:
     """Run the scene by a peer at each of its settings.
 
     Raises:
-        UnsupportedError: if the peer cannot do the scene, or is not installed.
+        UnsupportedError: if the peer cannot solve the scene, or is not installed.
     """
     times = output_times(scene)
     points, spent = [], []
@@ -150,7 +150,7 @@ def _errors(scene: Scene, t: Array, v: Array, y: Array, energies: Callable[[], A
 
 
 def _phase(scene: Scene, t: Array, v: Array, y: Array, state_error: float) -> float | None:
-    """The phase error, where it means something: in a motion with a period, and a state that has a digit right."""
+    """The phase error, where it is meaningful: for a motion with a period, and a state with a correct digit; else None."""
     if scene.period is None or not state_error <= 1.0:
         return None
     return phase_error(scene, v[-1], y[-1], float(t[-1]))
@@ -159,8 +159,8 @@ def _phase(scene: Scene, t: Array, v: Array, y: Array, state_error: float) -> fl
 def phase_error(scene: Scene, v: Array, y: Array, t: float) -> float:
     """How far a state at time t is ahead of the exact motion, in periods; behind is negative.
 
-    It is the shift s that brings exact(t + s) nearest to the state, both blocks in the scene's scales, divided by the period;
-    from −½ to ½, since a motion that is a whole period ahead looks right.
+    It is the shift s that brings exact(t + s) closest to the state, both blocks in the scene's scales, divided by the period. It
+    is between −½ and ½, since a motion that is a whole period ahead looks right.
 
     Raises:
         ArgumentError: if the scene has no exact solution or no period.
@@ -179,8 +179,8 @@ def phase_error(scene: Scene, v: Array, y: Array, t: float) -> float:
     if np.linalg.norm(state - states(np.zeros(1))[0]) > COARSE_SEARCH_ABOVE:
         shifts = period * (np.arange(COARSE_SHIFTS + 1) / COARSE_SHIFTS - 0.5)
         shift = float(shifts[np.argmin(np.linalg.norm(states(shifts) - state, axis=1))])
-    # The slope is good to eight digits or so, and Gauss-Newton's steps come to rest where the residue is across it whatever
-    # its length. No step is longer than the distance of two shifts: next to a near collision the orbit is no line.
+    # The slope has some eight digits, and Gauss-Newton's steps converge where the residue is orthogonal to it, whatever its
+    # length. No step is longer than the distance of two shifts, since near a close encounter the orbit is no straight line.
     small, most = 1e-5 * period, period / COARSE_SHIFTS
     for _ in range(30):
         before, here, after = states(shift + small * np.array([-1.0, 0.0, 1.0]))
@@ -195,7 +195,7 @@ def phase_error(scene: Scene, v: Array, y: Array, t: float) -> float:
 def largest_stable_step(
     scene: Scene, method: Method, points: Sequence[Point], fused: bool = False, dtype: str = "float64"
 ) -> float:
-    """The step at which the method falls off, within 0.1 %: below it every rung of ``points`` is stable.
+    """The step at which the method becomes unstable, within 0.1 %: below it every rung of ``points`` is stable.
 
     ``points`` go from the largest step to the smallest. Infinite if all are stable, 0 if not even the last one is.
     """

@@ -1,7 +1,7 @@
 """Other programs on the axes of a work-precision chart.
 
-A peer is a function of a scene, times and a setting (a tolerance or a step), or a ``Peer`` made of one. It returns
-the states at these times with its function (rate) evaluations and seconds. Peers for SciPy, heyoka and REBOUND are here; each
+A peer is a function of a scene, times and a setting (a tolerance or a step), or a ``Peer`` with such a function. It returns the
+states at these times, with its function (rate) evaluations and seconds. Peers for SciPy, heyoka and REBOUND are here; each
 package is imported when its function is called, and need not be installed otherwise.
 """
 
@@ -41,7 +41,7 @@ class Solved(ValueEquality):
         v: velocity blocks at the output times, shape (times, *block).
         y: coordinate blocks, likewise.
         evaluations: function (rate) evaluations, or None if not reported; it is then charted by its time alone.
-        seconds: computing time, without preparations that are made once.
+        seconds: computing time, without preparations that are needed only once.
     """
 
     v: Array
@@ -55,15 +55,15 @@ class Peer(ValueEquality):
     """Another program.
 
     Attributes:
-        name: in the table and the picture.
-        solve: a function, or an object that can be called: from scene, times of shape (n,) above 0, the last at the horizon, and
-            a setting, to what was found. It raises ``UnsupportedError`` for a scene that it cannot do, which the chart lists
-            among what is refused.
-        settings: with which to run it.
-        by: what they are, ``"tolerance"`` or ``"step"``.
-        order: of convergence, or None.
+        name: its name in the table and the picture.
+        solve: a callable that takes the scene, times of shape (n,) above 0 with the horizon as the last, and a setting, and
+            returns a ``Solved``. It raises ``UnsupportedError`` for a scene that it cannot solve, which the chart then lists as
+            refused.
+        settings: the settings with which it is run.
+        by: the kind of the settings, ``"tolerance"`` or ``"step"``.
+        order: the order of convergence, or None.
 
-    It is pickled with the name of its function, as ``pickle`` does with functions: one at the top of a module, not a lambda.
+    It is pickled by the name of its function, which must be at the top of a module and no lambda.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Peer(ValueEquality):
     order: int | None = None
 
     def __post_init__(self) -> None:
-        """Raise if it could not be run."""
+        """Raise if an argument is wrong."""
         if not isinstance(self.name, str):
             raise DTypeError(f"name: expected a text, got {short(self.name)}")
         if not callable(self.solve):
@@ -106,7 +106,7 @@ class Peer(ValueEquality):
 
 
 def peer(function: Peer | Callable[[Scene, Array, float], Solved]) -> Peer:
-    """A peer of a function: its name is the function's, its settings are tolerances.
+    """A peer with this function and its name, whose settings are tolerances.
 
     Raises:
         DTypeError: if it is neither a peer nor a function.
@@ -170,8 +170,8 @@ class ByScipy(ValueEquality):
 def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:
     """Taylor series by heyoka, compiled for the scene; bodies, and linear systems without inputs.
 
-    A step is counted as one by ``taylor`` of the same order (``Paces.evaluations``), or not at all where that would be too long.
-    States between steps are by the series. What is compiled before the run is not timed.
+    The evaluations of a step are those of ``taylor`` with the same order (``Paces.evaluations``), or unknown where that would be
+    too long. States between steps come from the series. Compilation before the run is not timed.
 
     Raises:
         UnsupportedError: if heyoka is not installed.
@@ -207,17 +207,17 @@ class ByHeyoka(ValueEquality):
         return Solved(*_blocks(scene, solved[-1][1:]), None if each is None else int(solved[3]) * each, seconds)
 
 
-#: REBOUND's integrators that are offered, and whether a setting is a tolerance.
+#: The integrators of REBOUND that can be peers, and whether a setting is a tolerance.
 REBOUND = {"ias15": True, "bs": True, "leapfrog": False}
 
 
 def rebound(integrator: str = "ias15", settings: Sequence[float] | None = None) -> Peer:
     """REBOUND; bodies under Newton's law only.
 
-    Its function evaluations are counted in a run of their own, which is not timed.
+    Its function evaluations are counted in a separate run, which is not timed.
 
     Args:
-        integrator: ``"ias15"`` or ``"bs"`` by tolerance (of ias15 its ``epsilon``, which is not an error but a power of one), or
+        integrator: ``"ias15"`` or ``"bs"`` by tolerance (for ias15 its ``epsilon``, which is not an error but a power of one), or
             ``"leapfrog"`` by step.
         settings: tolerances, or steps; steps are needed for leapfrog.
 
@@ -250,7 +250,7 @@ class ByRebound(ValueEquality):
         sim.G, sim.softening, sim.integrator = float(system.G), float(system.softening), integrator
         sim.dt = scene.dt if REBOUND[integrator] else setting
         for name in ("eps_rel", "eps_abs") if integrator == "bs" else ("epsilon",) if integrator == "ias15" else ():
-            # Since version 5 an integrator's options are its own; before, the simulation's.
+            # Since version 5 an integrator has its options; before, the simulation had them.
             setattr(getattr(sim, f"ri_{integrator}", sim.integrator), name, setting)
         for m, v, y in zip(system.masses.tolist(), scene.v.tolist(), scene.y.tolist(), strict=True):
             x3, v3 = [*y, 0.0][:3], [*v, 0.0][:3]

@@ -1,4 +1,4 @@
-"""How long a step takes. Methods take turns, so that whatever else the machine does meets them all alike."""
+"""The time of a step. Methods take turns, so that other load on the machine affects them all alike."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from ...runs.integration import quietly
 from ...scenes import Scene
 from .data import Timing
 
-#: Step of a timed run, as a share of the scene's: so small that no method leaves the finite numbers.
+#: The step of a timed run, over the scene's: so small that no method leaves the finite numbers.
 TIMED_STEP = 1e-4
 
-#: Tolerance of timed runs: those of a batch, and those of one member, whose call must be lost among many steps.
+#: The tolerances of timed runs: of a batch, and of one member, whose call must be negligible against many steps.
 BATCH_TOLERANCE, SINGLE_TOLERANCE = 1e-6, 1e-12
 
-#: With a tolerance a timed run of a batch tries at least so many steps, so that the cost of the call does not count, and at most
-#: so many. A quarter of them will do for a system of more numbers than LARGE.
+#: The least and the most attempts of a timed run of a batch with a tolerance, so that the cost of the call does not count. A
+#: quarter of them suffices for a system of more numbers than LARGE.
 MIN_TRIED, MAX_TRIED, LARGE = 64, 512, 128
 
-#: A run with a tolerance makes no more steps than this, rejected ones counted.
+#: The most attempts of a run with a tolerance.
 MOST_TRIED = 10_000_000
 
-#: One run suffices to choose the number of steps if it takes this many times as long as it must.
+#: One run suffices to choose the number of steps if it takes this many times as long as needed.
 MUCH = 20.0
 
-#: Runs so many times, and returns the seconds and the steps that were made.
+#: A function that repeats a run this many times, and returns the seconds and the number of steps.
 Timed = Callable[[int], tuple[float, int]]
 
 
 class Effort(NamedTuple):
-    """How much a measurement takes.
+    """The effort of a measurement.
 
     Attributes:
-        members: a batch has at most so many members: enough to hide the cost of the call, few enough for the cache.
-        numbers: and at most so many numbers in all, so that a cluster of stars does not take minutes.
-        fewest: but at least so many members.
-        seconds: a timed run takes at least this.
-        repeats: each method is timed so many times after its number of steps was chosen.
-        slow: repeats end when all methods together have taken so many seconds.
+        members: the most members of a batch: enough to hide the cost of the call, few enough for the cache.
+        numbers: the most numbers of a batch, so that a cluster of stars does not take minutes.
+        fewest: the least number of members, whatever the numbers.
+        seconds: the shortest time of a timed run.
+        repeats: how many times each method is timed after its number of steps was chosen.
+        slow: the seconds of all methods together after which repeats end.
     """
 
     members: int
@@ -56,7 +56,7 @@ class Effort(NamedTuple):
     slow: float = float("inf")
 
     def members_of(self, scene: Scene) -> int:
-        """How many members of the scene are timed as a batch."""
+        """The number of members of the scene that are timed as a batch."""
         return max(self.fewest, min(self.members, self.numbers // max(1, scene.v.size + scene.y.size)))
 
 
@@ -71,7 +71,7 @@ class Batch:
         self._v, self._y = v, y
 
     def steps(self, method: Method, **options: Any) -> Timed:
-        """Makes so many fixed steps, on one thread."""
+        """A run that makes the number of fixed steps, on one thread."""
 
         def timed(steps: int) -> tuple[float, int]:
             scene, begin = self.scene, time.perf_counter()
@@ -81,7 +81,7 @@ class Batch:
         return timed
 
     def attempts(self, method: Method, *, fused: bool = False) -> Timed:
-        """Makes so many equal runs with a tolerance, on one thread; the steps that were tried count."""
+        """A run that repeats an equal run with a tolerance, on one thread, and counts its attempts."""
         tolerance, most = (SINGLE_TOLERANCE, MOST_TRIED) if self._is_single else (BATCH_TOLERANCE, MAX_TRIED)
         time_of_enough = cache(partial(self._time_of_enough, method, fused))
 
@@ -94,7 +94,7 @@ class Batch:
         return timed
 
     def _time_of_enough(self, method: Method, fused: bool) -> float:
-        """The time until which a run tries enough steps."""
+        """The time until which a run makes enough attempts."""
         scene = self.scene
         fewest = MIN_TRIED if scene.v.size + scene.y.size <= LARGE else MIN_TRIED // 4
         end = scene.horizon / 1024
@@ -119,7 +119,7 @@ def in_turns(runs: Mapping[str, Timed], effort: Effort, members: int) -> dict[st
     times: dict[str, list[float]] = {}
     for name, timed in runs.items():
         n, (seconds, steps) = 1, timed(1)
-        # The quicker of two counts: a call that something else held up would look long enough. One far too long is not.
+        # The quicker of two runs counts, since other load would make a run look long enough, unless it is far too long.
         while seconds < MUCH * effort.seconds and min(seconds, timed(n)[0]) < effort.seconds:
             n *= 2
             seconds, steps = timed(n)
@@ -133,7 +133,7 @@ def in_turns(runs: Mapping[str, Timed], effort: Effort, members: int) -> dict[st
     return times
 
 
-#: The charts' effort, and that of ``stepwell bench``: a timed run takes fifty times a call's own cost.
+#: The effort for charts and for ``stepwell bench``: a timed run takes fifty times the cost of a call.
 CHARTS = Effort(members=4096, numbers=131_072, fewest=8, seconds=0.005, repeats=11)
 
 
@@ -145,18 +145,18 @@ def step_times(
     The time of a step depends neither on its length nor on the state, so one measurement serves a whole curve.
 
     Args:
-        scene: what to step.
-        methods: by which.
-        members: of the batch; as many as ``CHARTS`` says if None, and 0 for a run without a batch.
-        fused: with fused multiply-adds.
-        dtype: in float64 or float32.
+        scene: the scene.
+        methods: the methods.
+        members: the members of the batch; those of ``CHARTS`` if None, and 0 for a run without a batch.
+        fused: whether to use fused multiply-adds.
+        dtype: the precision, float64 or float32.
     """
     batch = Batch(scene, CHARTS.members_of(scene) if members is None else members)
     return _summaries(batch, {method.name: batch.steps(method, fused=fused, dtype=dtype) for method in methods})
 
 
 def tried_times(scene: Scene, methods: Sequence[Method], members: int | None = None, fused: bool = False) -> dict[str, Timing]:
-    """Nanoseconds per step that is tried, of one member of a batch, by method, in runs with a tolerance; as ``step_times``."""
+    """Nanoseconds per attempted step of one member of a batch, by method, in runs with a tolerance; as ``step_times``."""
     batch = Batch(scene, CHARTS.members_of(scene) if members is None else members)
     return _summaries(batch, {method.name: batch.attempts(method, fused=fused) for method in methods})
 

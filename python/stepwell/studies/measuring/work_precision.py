@@ -24,19 +24,19 @@ from .peers import peer as find_peer
 #: The longest and the shortest step of the ladder (a geometric grid of steps), as multiples of the scene's step.
 LARGEST, SMALLEST = 16.0, 1 / 3000
 
-#: So many longer steps are added, at which even the method with the largest stability limit is unstable.
+#: The number of additional longer steps, at which even the method with the largest stability limit is unstable.
 EXTRA_RUNGS = 2
 
 #: The most steps of a run of the ladder; more would take minutes.
 MAX_STEPS = 2_000_000
 
-#: The numbers of the curves of a chart.
+#: The precisions of the curves of a chart.
 DTYPES = ("float64", "float32", "both")
 
-#: For blocks of more numbers than this it is divided by the square of the ratio, as the number of pairs of bodies grows.
+#: For blocks of more numbers than this, MAX_STEPS is divided by the square of the ratio, as the number of pairs of bodies grows.
 SMALL_BLOCK = 16
 
-#: But it is so many times the number of steps that the scene takes: large nets are stable only near that.
+#: But the most steps are at least this many times those of the scene: large nets are stable only near these.
 TIMES_THE_SCENE = 10.0
 
 #: Steps of the ladder per factor of ten.
@@ -60,8 +60,8 @@ def work_precision(
     the end and the energy error. Cost is counted in function (rate) evaluations per unit of simulated time. It is also measured,
     for a single run and for a batch of equal members, on one thread. Everything but the times is repeatable to the bit.
 
-    A scene without an exact solution is compared with a run to a tight tolerance, as long as a less tight one agrees with
-    it; the horizon ends there. A scene's control is left out, since the true motion has none.
+    A scene without an exact solution is compared with a run to a tight tolerance, as long as a less tight one agrees with it; the
+    horizon ends there. A scene's control is omitted, since the true motion has none.
 
     Args:
         scene: a ``Scene``, or the name of one.
@@ -75,8 +75,8 @@ def work_precision(
         fused: compute with fused multiply-adds; ``"both"`` for a curve of each, "rk4" and "rk4, fused". A scene whose step is too
             long to be fused is refused.
         dtype: ``"float64"``, ``"float32"``, or ``"both"`` for a curve of each, "rk4" and "rk4, float32". Curves by tolerance are
-            computed in float64. A scene that float32 does not go with is refused.
-        progress: is called with the fraction that is done.
+            computed in float64. A scene that float32 does not support is refused.
+        progress: a function that is called with the fraction that is done.
 
     Returns:
         A ``WorkPrecision``. Methods that cannot step the system are in its ``refused``, with the reason.

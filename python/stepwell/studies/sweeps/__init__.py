@@ -1,4 +1,4 @@
-"""Ensembles: ``sweep``, samples for its axes, and what can be kept of each member."""
+"""Ensembles: ``sweep``, samples for its axes, and the outcomes of each member."""
 
 from .adaptive import Evaluations
 from .crossings import Crossing, Period

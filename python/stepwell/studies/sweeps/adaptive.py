@@ -21,15 +21,15 @@ from .exponents import Exponents
 from .observed import Piece
 from .outcomes import Outcome, ReducedOutcome, Reduction, Results, Variable
 
-#: A member takes so many numbers for the step-size controller while it is computed: before, after, and as it is handed over.
+#: The numbers of the step-size controller for each member in memory: before, after, and in transfer.
 NUMBERS_OF_A_CONTROLLER = 4 * PACE_NUMBERS
 
 
 class Evaluations(ReducedOutcome):
-    """What a member cost, with a tolerance: ``evaluations``, ``accepted_steps``, ``rejected_steps``.
+    """The cost of a member, with a tolerance: ``evaluations``, ``accepted_steps``, ``rejected_steps``.
 
-    Those of ``run.paces``: function (rate) evaluations of accepted and rejected steps, and of the extra steps for the times of
-    ``at``.
+    They are those of ``run.paces``: function (rate) evaluations of accepted and rejected steps, and of the extra steps for the
+    times of ``at``.
 
     Example:
         >>> axes = {"omega": ("omega", [1.0, 10.0])}
@@ -72,16 +72,16 @@ def arguments(
 
     Args:
         grid: the members.
-        method: by which they are computed.
-        tolerance: as the user gave it; None if it is an axis.
-        at: as the user gave it.
-        options: what goes with a tolerance only, by name; None if it was not given.
-        fixed: what goes with fixed steps only, by name; None if it was not given.
-        outcomes: what is kept.
+        method: the method.
+        tolerance: the user's argument; None if it is an axis.
+        at: the user's argument.
+        options: the arguments that need a tolerance, by name; None for those that the user left out.
+        fixed: the arguments that need fixed steps, by name; None for those that the user left out.
+        outcomes: the outcomes.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: what is not defined with a tolerance.
+        UnsupportedError: if an argument is not supported with a tolerance.
     """
     if wrong := [name for name, value in fixed.items() if value is not None]:
         raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
@@ -115,7 +115,7 @@ def arguments(
 
 
 def _one_for_all(tolerance: Any) -> Any:
-    """A tolerance, or a pair of them, of numbers and not of arrays."""
+    """A tolerance, or a pair of tolerances, that are numbers and not arrays."""
     parts = tolerance if isinstance(tolerance, tuple) else (tolerance,)
     numbers = [checks.numbers("tolerance", each, positive=True) for each in parts]
     if (isinstance(tolerance, tuple) and len(parts) != 2) or any(each.ndim for each in numbers):
@@ -140,7 +140,7 @@ def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
 
 
 def refuse_fixed(outcomes: Iterable[Outcome], options: Mapping[str, Any]) -> None:
-    """Raise if something was given that goes with a tolerance only."""
+    """Raise if there is an argument that needs a tolerance."""
     if options["max_steps"] is not None:
         raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
     if wrong := [name for name, value in options.items() if value is not None]:
@@ -153,7 +153,7 @@ def refuse_fixed(outcomes: Iterable[Outcome], options: Mapping[str, Any]) -> Non
 
 
 def lost(run: Run) -> int:
-    """How many members have an absolute tolerance so large that the motion is lost in it."""
+    """The number of members whose absolute tolerance is so large that the motion is lost in it."""
     if run.controller_state is None:
         return 0
     groups = len(run.controller_state.pace) - PACE_NUMBERS
@@ -166,7 +166,7 @@ def why(status: int) -> str:
     return f"{WHY_STOPPED[Status(status)]}{hint}"
 
 
-#: What is told of members that are lost in the absolute tolerance.
+#: The warning for members whose motion is lost in the absolute tolerance.
 LOST = (
     f"tolerance: for {{lost}} of {{members}} the absolute part lets a step err by more than {MAX_ABSOLUTE_SHARE:g} of the "
     f"longest that v or y has been; give one number, which goes by these lengths, or a smaller absolute part"

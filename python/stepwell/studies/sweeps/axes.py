@@ -1,4 +1,4 @@
-"""What is varied: arguments by name, each with the dimension along which its values lie, and the grid of all members."""
+"""The axes of a sweep: arguments by name, each with the dimension of its values, and the grid of all members."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Axis(NamedTuple):
         argument: its name.
         dims: names of the dimensions along which it varies.
         values: shape (*own axes of the argument, *sizes of the dimensions).
-        attrs: what is told of it, such as its units.
+        attrs: its attributes, such as units.
     """
 
     argument: str
@@ -33,7 +33,7 @@ class Axis(NamedTuple):
 
     @property
     def own(self) -> int:
-        """How many axes of its own the argument has."""
+        """The number of axes of the argument itself."""
         return self.values.ndim - len(self.dims)
 
 
@@ -41,10 +41,10 @@ class Chunk(NamedTuple):
     """Members that are computed together: a piece of the grid, whose members follow each other.
 
     Attributes:
-        place: which chunk along each dimension.
-        slices: of each dimension.
-        shape: how many members along each dimension.
-        first: number of its first member.
+        place: the index of the chunk along each dimension.
+        slices: its members along each dimension.
+        shape: the number of members along each dimension.
+        first: the number of its first member.
     """
 
     place: Shape
@@ -61,11 +61,11 @@ class Chunk(NamedTuple):
 class Grid:
     """All members of a sweep: the product of its dimensions.
 
-    Members are numbered with the last dimension fastest. Dimensions of ``dt`` come first, so that members of one step follow each
-    other: a run has one step.
+    Members are numbered with the last dimension fastest. Dimensions of ``dt`` come first, so that members with the same step
+    follow each other, since a run has one step.
 
     Attributes:
-        axes: what is varied.
+        axes: the arguments that vary.
         dims: names of the dimensions.
         shape: their sizes.
     """
@@ -83,7 +83,7 @@ class Grid:
                     )
                 given_by.setdefault(dim, axis.argument)
         self.dims, self.shape = tuple(sizes), tuple(sizes.values())
-        #: How many of the first dimensions ``dt`` varies along.
+        #: The number of dimensions along which ``dt`` varies; they are the first ones.
         self.of_dt = next((len(axis.dims) for axis in axes if axis.argument == "dt"), 0)
 
     @property
@@ -92,10 +92,10 @@ class Grid:
         return prod(self.shape)
 
     def chunk_shape(self, most: int) -> Shape:
-        """The shape of chunks of at most so many members (and of at least one), of about equal size.
+        """The shape of chunks of at most ``most`` members (and at least one), of about equal size.
 
-        A chunk is whole along the last dimensions, so its members follow each other, and one wide along the first, so each is of
-        one ``dt``.
+        A chunk is whole along the last dimensions, so that its members follow each other, and one wide along the first, so that
+        it has one ``dt``.
         """
         shape, room = [1] * len(self.shape), max(1, most)
         for i in range(len(self.shape) - 1, self.of_dt - 1, -1):
@@ -133,7 +133,7 @@ class Grid:
         return arguments
 
     def place(self, member: int) -> str:
-        """Where a member is, in words: the values that the dimensions have there."""
+        """The place of a member in words: the values of its dimensions."""
         index = dict(zip(self.dims, np.unravel_index(member, self.shape), strict=True))
         places = []
         for axis in self.axes:
@@ -144,7 +144,7 @@ class Grid:
 
 
 def grid(axes: Any) -> Grid:
-    """What is varied, from what the user gave.
+    """The grid of the user's axes.
 
     Raises:
         ArgumentError: what was given and what was expected.

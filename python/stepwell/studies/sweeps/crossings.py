@@ -1,4 +1,4 @@
-"""When a quantity passes a level: the first time, and the mean time from one passage to the next."""
+"""Passages of a level: the first time at which a quantity passes it, and the mean time from one passage to the next."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 #: The directions in words.
 WORDS = {number: word for word, number in checks.DIRECTIONS.items()}
-#: Halvings of an interval: what is left of it is below the spacing of its numbers.
+#: Halvings of an interval, after which the rest is below the spacing of its numbers.
 HALVINGS = 53
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 class _Passages(ReducedOutcome):
-    """Of a level."""
+    """An outcome of the passages of a level."""
 
     def __init__(self, of: Any = "y", level: float = 0.0, direction: int | Direction = 1, *, name: str | None = None) -> None:
         self.of: Of = checked(of)
@@ -51,16 +51,16 @@ class Crossing(_Passages):
     """The first time at which a quantity passes a level, ``y_crossing``; NaN if it did not.
 
     It passes between two observed states if it is below the level at the first and not below at the second (rising; likewise
-    falling). Of v, y and their components the time is that of the cubic through both values with the rates of the system at both
-    (Hermite): its error is of the order of (interval)⁴. Of other quantities it is linear, with an error of the order of
-    (interval)². What passes and comes back between two observed states is not seen.
+    falling). For v, y and their components the time is that of the cubic through both values with the rates of the system at both
+    (Hermite): its error is of the order of (interval)⁴. For other quantities it is linear, with an error of the order of
+    (interval)². A passage and return between two observed states is not seen.
 
     Args:
         of: "v" or "y", a component such as ("y", 0), a quantity such as "energy", or a function f(t, v, y) of states, whose v
             and y have the shape (*block, states, members).
-        level: in the units of the quantity.
+        level: the level, in the units of the quantity.
         direction: 1 or "rising", −1 or "falling", 0 or "both", as for ``Event``.
-        name: of the results, in place of what they are of.
+        name: the name of the results, in place of that of the quantity.
 
     Example:
         >>> quarter = sw.sweeps.Crossing("y", direction=-1)
@@ -83,9 +83,9 @@ class Period(_Passages):
 
     Args:
         of: as for ``Crossing``.
-        level: in the units of the quantity.
+        level: the level, in the units of the quantity.
         direction: 1 or "rising", −1 or "falling", 0 or "both", as for ``Event``.
-        name: of the results, in place of what they are of.
+        name: the name of the results, in place of that of the quantity.
 
     Example:
         >>> axes = {"y": ("y0", [0.1, 2.0])}
@@ -100,7 +100,7 @@ class Period(_Passages):
 
 
 class _State(NamedTuple):
-    """What is kept of the last observed state: its time, value, and blocks."""
+    """The last observed state: its time, value, and blocks."""
 
     t: float
     value: Array
@@ -148,7 +148,7 @@ class _States:
         self.mask: Mask = {1: rising, -1: falling, 0: rising | falling}[outcome.direction]
 
     def times(self, k: Whole, members: Mask) -> Array:
-        """When those members pass the level after the state k, shape (members,); NaN for the others."""
+        """The times at which these members pass the level after state k, shape (members,); NaN for the others."""
         each = np.arange(len(k))
         a, b = self.value[k, each], self.value[k + 1, each]
         start, length = self.t[k], self.t[k + 1] - self.t[k]
@@ -167,9 +167,9 @@ class _States:
 
 
 def _root(a: Array, b: Array, da: Array, db: Array) -> Array:
-    """Where in 0 … 1 the cubic with these values and slopes at both ends is zero; the ends have different signs.
+    """The zero in 0 … 1 of the cubic with these values and slopes at both ends, whose values have different signs.
 
-    Results by halving, in as many steps for each: the same operations for every member, wherever it is computed.
+    It is found by a fixed number of halvings: the operations are the same for every member, wherever it is computed.
     """
     third, second = 2.0 * (a - b) + da + db, 3.0 * (b - a) - 2.0 * da - db
     low, high = np.zeros(a.shape), np.ones(a.shape)

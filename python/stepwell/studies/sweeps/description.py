@@ -1,4 +1,4 @@
-"""What a sweep tells of itself: the attributes of its result, and what makes one sweep another than the next."""
+"""The description of a sweep: the attributes of its result, and those by which two sweeps differ."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
     """The layout of the results of a task, and its description in attributes.
 
     Args:
-        task: what is done with every chunk.
+        task: the task of every chunk.
         grid: the members.
-        system: that of the first member.
+        system: the system of the first member.
         bits: a hash of the first steps.
-        units: words by name.
+        units: units by name.
     """
     coords = coordinates(grid, units)
     renamed = {"t": "saved"} if grid.of_dt else {}
@@ -70,7 +70,7 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
 
 
 def _step_facts(task: Task, grid: Grid) -> dict[str, Any]:
-    """How long the steps are, and how many."""
+    """The length and the number of steps."""
     if task.at is None:
         dt = {} if grid.of_dt else {"dt": task.options["dt"]}
         return {**dt, "steps": task.steps, "transient": task.transient, "observe": task.observe}
@@ -96,7 +96,7 @@ def _times(
 
 
 def _digest(value: Any) -> str:
-    """A value in words: a number as it is, an array by its hash."""
+    """A value in words: a number itself, an array by its hash."""
     if isinstance(value, (str, bool, int, float, type(None))):
         return repr(value)
     try:

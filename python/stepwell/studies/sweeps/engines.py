@@ -1,4 +1,4 @@
-"""Where chunks are computed: threads of this process, an executor of ``concurrent.futures``, or a Dask cluster."""
+"""The engines that compute chunks: threads of this process, an executor of ``concurrent.futures``, or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class Engine:
     """Computes chunks.
 
     Args:
-        engine: what the user gave: None, an ``Executor``, or a ``dask.distributed.Client``.
-        threads: how many threads; None for as many as there are cores.
+        engine: the user's argument: None, an ``Executor``, or a ``dask.distributed.Client``.
+        threads: the number of threads; None for as many as there are cores.
 
     Attributes:
-        workers: how many chunks are computed at once.
-        here: whether by threads of this process.
+        workers: the number of chunks that are computed at once.
+        here: whether threads of this process compute them.
     """
 
     def __init__(self, engine: Any, threads: int | None) -> None:
@@ -53,7 +53,7 @@ class Engine:
             )
 
     def compute(self, task: Task, grid: Grid, chunks: Iterable[Chunk]) -> Iterator[tuple[Chunk, Done]]:
-        """What is found of each chunk, as they end. If it is closed early, chunks that have begun are stopped or awaited."""
+        """The results of each chunk, as chunks end. If the iterator is closed early, running chunks are stopped or awaited."""
         if not isinstance(self._executor, ThreadPoolExecutor | None):
             package = packed(task)
             yield from self._all(chunks, lambda chunk: self._executor.submit(sweep_chunk, package, grid.values(chunk), chunk))

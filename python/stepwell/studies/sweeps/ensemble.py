@@ -1,4 +1,4 @@
-"""``sweep``: an ensemble of runs, and what is kept of each, as a labelled array."""
+"""``sweep``: the outcomes of an ensemble of runs as a labelled array."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ MEMORY = 64 * 2**20
 MAX_MEMBERS = 1 << 14
 #: Likewise with a tolerance, where a chunk is made in pieces between the times of ``at`` only, so that Ctrl-C waits for it.
 MAX_ADAPTIVE_MEMBERS = 1 << 11
-#: Members are divided into so many chunks for each worker, or more, as long as each has so many members.
+#: The least number of chunks for each worker, as long as each chunk has at least MIN_MEMBERS members.
 CHUNKS_OF_A_WORKER, MIN_MEMBERS = 4, 256
 
 
@@ -94,16 +94,16 @@ def sweep(
     memory: float = MEMORY,
     progress: bool = False,
 ) -> xarray.Dataset:
-    """Run an ensemble, and keep of each member what was asked for, in an array with named dimensions.
+    """Run an ensemble, and return the outcomes of its members in arrays with named dimensions.
 
-    Members are computed in chunks, on all cores, in other processes or on a cluster. What is found of a member is the same to the
-    last bit on every engine and in every division into chunks. Trajectories are reduced while they are computed and are not
-    stored, unless ``"history"`` asks for them. Steps are fixed, by ``dt`` and ``steps``, or adaptive, by ``tolerance`` and
-    ``at``. Needs ``pip install "stepwell[sweep]"``.
+    Members are computed in chunks, on all cores, in other processes or on a cluster. The outcomes of a member have the same bits
+    on every engine and in every division into chunks. Trajectories are reduced while they are computed and are not stored, except
+    for ``"history"``. Steps are fixed, by ``dt`` and ``steps``, or adaptive, by ``tolerance`` and ``at``. Needs ``pip install
+    "stepwell[sweep]"``.
 
     Args:
-        system: a system; or what makes one of parameters by name: a class such as ``Oscillator``, your own equations, a function,
-            or ``functools.partial`` of any of them.
+        system: a system; or a callable that makes one from parameters by name: a class such as ``Oscillator``, your own
+            equations, a function, or ``functools.partial`` of any of them.
         axes: what varies, by the name of the argument: a parameter of the system, or ``y``, ``v``, ``dt``, ``force`` or
             ``tolerance``. Each is (dimension, values) or (dimension, values, attributes), as in xarray, or values alone, whose
             dimension has the name of the argument. Those of one dimension vary together; different dimensions are multiplied.
@@ -113,14 +113,14 @@ def sweep(
         v: velocity block at the start, the same for all members.
         y: coordinate block at the start, likewise.
         dt: the step, in units of time, above zero; with a tolerance the step to try first, or None.
-        steps: number of steps that are observed, one or more.
-        transient: number of steps before those, of which nothing is kept; none if None.
-        outcomes: what to keep of each member, one or a list: "last", "extremes", "mean", "crossing", "period", "lyapunov",
-            "evaluations", "history"; the classes of ``stepwell.sweeps`` of these names, with arguments; or a function of the
-            ``Run`` of a chunk. "last" if None, or with ``every``, "history". How a member ended, ``status`` and
-            ``first_bad_step``, is always kept.
-        every: steps between the states of a history, or of the runs that functions are given.
-        observe: steps between the states that reductions see; every one if None. What happens in between is not seen.
+        steps: number of observed steps, one or more.
+        transient: number of steps before these, which are not observed; none if None.
+        outcomes: the outcomes of each member, one or a list: "last", "extremes", "mean", "crossing", "period", "lyapunov",
+            "evaluations", "history"; the classes of ``stepwell.sweeps`` with these names, with arguments; or a function of the
+            ``Run`` of a chunk. None is "last", or with ``every``, "history". How a member ended, ``status`` and
+            ``first_bad_step``, is always among the results.
+        every: steps between the states of a history, or of the runs that functions get.
+        observe: steps between the states that reductions see; one if None. Reductions miss what happens in between.
         tolerance: in place of ``steps``, for adaptive steps of each member: a number, or a pair (relative, absolute), as for
             ``integrate``. An axis of this name has the relative ones.
         at: with a tolerance, the times whose states are observed: the last is that of "last", a history has all of them, and
@@ -131,30 +131,30 @@ def sweep(
         positive: with a tolerance, the components that must not become negative, as for ``integrate``.
         control: as for ``integrate``, the same for all members.
         force: likewise.
-        events: what is located of each member, as for ``integrate``; an event may stop a member, or change its state. Of an event
-            ``ground`` there are ``ground_count``, how many there were, and ``ground_t``, the time of the first, NaN without one;
-            ``stopped_at`` is when an event stopped a member. All states that reductions see are then in memory at once. Not with
-            ``transient`` or "lyapunov".
+        events: events to locate in each member, as for ``integrate``; an event may stop a member, or change its state. The
+            results of an event ``ground`` are ``ground_count``, the number of its occurrences, and ``ground_t``, the time of the
+            first, NaN without one; ``stopped_at`` is the time at which an event stopped a member. All states that reductions see
+            are then in memory at once. Not with ``transient`` or "lyapunov".
         fused: likewise.
-        dtype: ``"float64"`` or ``"float32"``, in which steps are made, as for ``integrate``. In float32 states are float32 and
-            what is found of them is computed in float64; a dt is rounded to float32. With fixed steps only.
+        dtype: ``"float64"`` or ``"float32"``, the precision of steps, as for ``integrate``. In float32 states are float32, and
+            outcomes are computed from them in float64; a dt is rounded to float32. With fixed steps only.
         t0: time of step 0.
         start: likewise.
         units: words for "t", "v", "y", parameters and results, by name; they become attributes.
-        store: a path ending in .zarr or .nc. Every finished chunk is written there, and a sweep that was interrupted goes on
-            where it stopped when it is called again. Then the results need not fit in memory. None for memory.
+        store: a path ending in .zarr or .nc, or None for memory. Every finished chunk is written there, and an interrupted sweep
+            goes on where it stopped when it is called again. With a store the results need not fit in memory.
         engine: None for threads of this process, an ``Executor`` of ``concurrent.futures``, or a ``dask.distributed.Client``.
-        threads: how many threads, without an engine; None for as many as there are cores.
-        chunk: most members of a chunk; None for as many as ``memory`` allows, up to 16384.
-        memory: how many bytes a chunk may take while it is computed. As many chunks are computed at once as there are workers.
-        progress: show a progress bar, in a terminal or in a notebook.
+        threads: the number of threads without an engine; None for as many as there are cores.
+        chunk: the most members of a chunk; None for as many as ``memory`` allows, up to 16384.
+        memory: the bytes that a chunk may take while it is computed. As many chunks are computed at once as there are workers.
+        progress: whether to show a progress bar, in a terminal or in a notebook.
 
     Returns:
         An ``xarray.Dataset``. Its attributes say how it was made; ``bits`` is a hash of all results.
 
     Raises:
         ArgumentError: before any work: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system, if float32 does not go with what is asked for, or a package is
+        UnsupportedError: if the method cannot step the system, if an argument is not supported in float32, or if a package is
             missing.
         KeyboardInterrupt: at Ctrl-C. The store has all chunks that were finished.
 
@@ -162,9 +162,9 @@ def sweep(
         DivergenceWarning: how many members left the finite range, and which first. The others are not affected.
         ToleranceWarning: how many members stopped before the last time, which first, and why; or that an absolute tolerance is
             so large that the motion is lost in it.
-        AccuracyWarning: if numbers are finite and mean nothing: how many members grew a million times by fixed steps that are
-            beyond the stability limit, and which first; or a pendulum turned so far that its angle has no sine. Encounters of
-            bodies are not searched for here.
+        AccuracyWarning: if numbers are finite but meaningless: how many members grew a millionfold by fixed steps beyond the
+            stability limit, and which first; or a pendulum turned so far that its angle has no sine. Encounters of bodies are not
+            searched for here.
 
     Example:
         >>> axes = {"omega": ("omega", [1.0, 2.0, 4.0]), "y": ("y0", [0.5, 1.0])}
@@ -229,7 +229,7 @@ def sweep(
 
 
 def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any], needed: tuple[str, ...]) -> None:
-    """Raise if an argument is given twice or not at all, or a parameter is of nothing."""
+    """Raise if an argument is given twice or not at all, or the system has no such parameter."""
     if both := [name for name, value in fixed.items() if value is not None and name in varied]:
         raise ArgumentError(f"{both[0]}: given twice, as an argument and in axes; leave one of them out")
     if missing := [name for name in needed if fixed[name] is None and name not in varied]:
@@ -242,7 +242,7 @@ def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any], needed: 
             )
     elif not callable(system):
         raise DTypeError(f"system: expected a system, or what makes one of parameters by name, got {type(system).__name__}")
-    elif not isinstance(system, type):  # a class says itself what it takes
+    elif not isinstance(system, type):  # a class checks its parameters itself
         _takes(system, sorted(varied - set(OF_THE_RUN)))
 
 
@@ -250,7 +250,7 @@ def _takes(maker: Callable[..., Any], parameters: Sequence[str]) -> None:
     """Raise if a function does not take the parameters that have axes, by their names."""
     try:
         signature = inspect.signature(maker)
-    except (TypeError, ValueError):  # of some callables nothing is known
+    except (TypeError, ValueError):  # some callables have no signature
         return
     try:
         signature.bind_partial(**dict.fromkeys(parameters))
@@ -307,7 +307,7 @@ def _probe(task: Task, grid: Grid) -> tuple[System, str, set[str]]:
 
 
 def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | None) -> int:
-    """How many members a chunk may have."""
+    """The most members of a chunk."""
     most = task.most_members(system)
     if most < 1:
         needed = 8.0 * task.numbers(system) / 2**20
@@ -322,10 +322,10 @@ def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | 
 
 
 def _compute(task: Task, grid: Grid, engine: Engine, results: Memory | Zarr, progress: bool) -> None:
-    """Compute every chunk that is not finished, and keep what is found."""
+    """Compute every chunk that is not finished, and store its results."""
     done, tally = 0, _Tally(grid, task)
 
-    def unfinished() -> Iterator[Chunk]:  # one after the other, for there may be more than memory has room for
+    def unfinished() -> Iterator[Chunk]:  # one after the other, since there may be too many for memory
         nonlocal done
         for chunk in grid.chunks(results.chunk_shape):
             if results.finished(chunk):
@@ -354,7 +354,7 @@ def _compute(task: Task, grid: Grid, engine: Engine, results: Memory | Zarr, pro
 
 
 class _Tally:
-    """What there is to warn of."""
+    """The members to warn of."""
 
     def __init__(self, grid: Grid, task: Task) -> None:
         self.grid, self.task, self.bad, self.members, self.first, self.step = grid, task, 0, 0, grid.members, -1

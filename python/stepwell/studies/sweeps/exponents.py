@@ -20,10 +20,10 @@ class Exponents(Outcome):
     Not with ``control``, ``force``, ``fused``, ``start`` or float32.
 
     Args:
-        exponents: how many, or "all".
+        exponents: the number of exponents, or "all".
         every: steps from one orthonormalisation to the next. With a tolerance, these are at the times of ``at``.
-        transient: with a tolerance, the number of intervals between these times that are left out, of which the first begins at
-            ``t0``. With fixed steps those of the sweep's ``transient`` are.
+        transient: with a tolerance, the number of omitted intervals between the times ``t0`` and those of ``at``. With fixed
+            steps, the steps of the sweep's ``transient`` are omitted.
 
     Example:
         >>> axes = {"damping": ("damping", [0.1, 0.2])}

@@ -1,4 +1,4 @@
-"""Packages that only sweeps need: imported on first use; one that is missing is an error that names the command."""
+"""Packages that only sweeps need, imported on first use; the error for a missing one names the command that installs it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from ...errors import UnsupportedError
 
-#: What to install.
+#: The command that installs them.
 COMMAND = 'pip install "stepwell[sweep]"'
 
 

@@ -1,4 +1,4 @@
-"""Sweeps with events: how often each happens to a member, when first, and when one stopped it."""
+"""Sweeps with events: how often each occurs in a member, the first time, and the time at which one stopped the member."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from .exponents import Exponents
 from .observed import Piece
 from .outcomes import Function, Outcome, ReducedOutcome, Reduction, Results, Variable
 
-#: How a member ended that an event stopped.
+#: The status of a member that an event stopped.
 EVENTS = (int(Status.EVENT), int(Status.REST))
 
 
 def events_of(events: Any, outcomes: Iterable[Outcome], transient: Any) -> tuple[Event, ...]:
-    """The events that were given, of which one occurrence is kept where no function asks for more.
+    """The events, checked; only one occurrence of each is stored unless a function needs more.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: what does not go with events.
+        UnsupportedError: if an argument is not supported with events.
     """
     located = several(events)
     for event in located:
@@ -49,7 +49,7 @@ def events_of(events: Any, outcomes: Iterable[Outcome], transient: Any) -> tuple
 
 
 class Happenings(ReducedOutcome):
-    """What a sweep keeps of its events."""
+    """The outcome of the events of a sweep."""
 
     observes = False
 

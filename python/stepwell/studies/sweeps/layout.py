@@ -15,9 +15,9 @@ from ...runs.result import Status
 from .axes import Chunk, Grid
 from .outcomes import Results
 
-#: What stands for whole numbers of members that are not computed yet.
+#: The value of whole numbers of members that are not computed yet.
 NOT_YET = -1
-#: Length of a hash in bytes: of all results, and of those of a chunk.
+#: The length in bytes of a hash of all results, and of those of a chunk.
 BYTES_OF_HASH, BYTES_OF_CHUNK_HASH = 16, 8
 
 
@@ -27,8 +27,8 @@ class Planned(NamedTuple):
     Attributes:
         dims: its dimensions, those of the sweep first.
         shape: their sizes.
-        dtype: of its numbers.
-        attrs: what is told of it.
+        dtype: the type of its numbers.
+        attrs: its attributes.
     """
 
     dims: tuple[str, ...]
@@ -38,17 +38,17 @@ class Planned(NamedTuple):
 
     @property
     def fill(self) -> Any:
-        """What is there before it is computed."""
+        """The value of elements that are not computed yet."""
         return {"f": np.nan, "i": NOT_YET}.get(self.dtype.kind, 0)
 
 
 class Layout(NamedTuple):
-    """How the results of a sweep are laid out.
+    """The layout of the results of a sweep.
 
     Attributes:
         grid: its members.
         coords: coordinates by name: dimensions, values, attributes.
-        attrs: how it was made.
+        attrs: the attributes of the dataset, which say how it was made.
         units: units by quantity: "t", "v", "y", or the name of a variable.
         renamed: other names for own dimensions.
     """
@@ -92,8 +92,8 @@ class Layout(NamedTuple):
 def coordinates(grid: Grid, units: Mapping[str, str]) -> dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]:
     """Coordinates of the axes.
 
-    One that alone varies along its dimension has the name of that; others have that of their argument, and ``v`` and ``y``, which
-    may be names of results, are ``v_start`` and ``y_start``.
+    An argument that alone varies along its dimension has the name of the dimension; others have their own names, except that
+    ``v`` and ``y``, which may be names of results, become ``v_start`` and ``y_start``.
     """
     coords = {}
     for axis in grid.axes:
@@ -115,7 +115,7 @@ def coordinates(grid: Grid, units: Mapping[str, str]) -> dict[str, tuple[tuple[s
 
 
 def _plain(values: Array) -> Array:
-    """Numbers that every format has, NaN of one spelling."""
+    """Numbers of types that every format has, with one bit pattern for NaN."""
     if values.dtype.kind == "b":
         values = values.astype(np.int8)
     if values.dtype.kind == "f":
@@ -142,7 +142,7 @@ def hash_of_chunk(arrays: Mapping[str, Array]) -> int:
 
 
 def hash_of_all(chunks: Iterable[Mapping[str, Array]]) -> str:
-    """A hash of the bits of all results; it does not depend on how they were divided, for a chunk's members follow each other."""
+    """A hash of the bits of all results, independent of the division into chunks, since a chunk's members follow each other."""
     digests: dict[str, Any] = {}
     for arrays in chunks:
         for name, values in arrays.items():

@@ -1,4 +1,4 @@
-"""What is observed of a run: v, y, a component of them, a recordable quantity, or a function of the state."""
+"""The observed quantities of a run: v, y, a component of them, a recordable quantity, or a function of the state."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...model.systems import System
 from ...runs.result import Run
 
 Name = str
-#: What can be asked for.
+#: The observable quantities.
 Of = Name | tuple[Any, ...] | Callable[[Array, Array, Array], Any]
 
 
@@ -23,7 +23,7 @@ class Piece(NamedTuple):
 
     Attributes:
         run: the piece of the run; its first state may be the last one of the piece before.
-        since: 1 if it is, otherwise 0: index of the first state that is new.
+        since: the index of the first new state: 1 if the first is that of the piece before, else 0.
     """
 
     run: Run
@@ -37,7 +37,7 @@ class Piece(NamedTuple):
     def of(self, what: Of) -> Array:
         """A quantity of the new states, shape (states, *its own axes, members).
 
-        Of states of float32, v and y are float32; all else is computed of them in float64.
+        For states in float32, v and y are float32; other quantities are computed from them in float64.
         """
         run, since = self.run, self.since
         if isinstance(what, str) and what in ("v", "y"):
@@ -72,7 +72,7 @@ def name_of(what: Of | Callable[..., Any]) -> str:
 
 
 def checked(what: Any) -> Of:
-    """The observed quantity, if it is one.
+    """An argument that should be an observable quantity, checked.
 
     Raises:
         ArgumentError: if not.

@@ -1,6 +1,6 @@
-"""What a sweep keeps of a member: its last state, extremes, means, the history at intervals, or the result of a function.
+"""The outcomes of a member: its last state, extremes, means, the history at intervals, or the result of a function.
 
-Reductions see the states of a run piece by piece and keep a few numbers of each member. They do not depend on where pieces end.
+Reductions see the states of a run piece by piece and store a few numbers for each member. They do not depend on where pieces end.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Variable(NamedTuple):
     Attributes:
         dims: names of its own axes.
         values: shape (*own axes, members).
-        about: what it is, in words.
+        about: its description.
         unit: the quantity whose unit it has, "v", "y" or "t"; None for others.
         coords: coordinates along its own axes, by name.
     """
@@ -42,10 +42,10 @@ Results = dict[str, Variable]
 
 
 def together(parts: Iterable[Results]) -> Results:
-    """All results.
+    """The results of several outcomes in one dictionary.
 
     Raises:
-        ArgumentError: if two have one name.
+        ArgumentError: if two have the same name.
     """
     results: Results = {}
     for part in parts:
@@ -56,7 +56,7 @@ def together(parts: Iterable[Results]) -> Results:
 
 
 class Reduction(ABC):
-    """Sees the pieces of a run, in their order, and keeps what it needs."""
+    """Reduces the pieces of a run, in their order, to a few numbers of each member."""
 
     @abstractmethod
     def see(self, piece: Piece) -> None:
@@ -68,11 +68,11 @@ class Reduction(ABC):
 
 
 class Outcome(ValueEquality):
-    """What is to be kept of each member; given in ``outcomes`` of ``stepwell.sweep``.
+    """A result for each member, for ``outcomes`` of ``stepwell.sweep``.
 
     Attributes:
-        observes: whether it sees the states in between, and not the last alone.
-        numbers: about how many numbers it keeps of each member, besides those of a state.
+        observes: whether it needs the states in between, and not only the last one.
+        numbers: about how many numbers it stores for each member, besides those of a state.
     """
 
     observes: ClassVar[bool] = True
@@ -151,7 +151,7 @@ class _Several(ReducedOutcome):
             possible(self.of, system)
 
     def whats(self, run: Run) -> list[Of]:
-        """What is reduced."""
+        """The quantities that are reduced."""
         return [*_blocks(run.system)] if self.of is None else [self.of]
 
 
@@ -162,7 +162,7 @@ class Extremes(_Several):
 
     Args:
         of: as for ``Crossing``; both blocks if None.
-        name: of the results, in place of what they are of.
+        name: the name of the results, in place of that of the quantity.
 
     Example:
         >>> outcome = sw.sweeps.Extremes("energy")
@@ -197,7 +197,7 @@ class _Extremes(Reduction):
         results = {}
         for what, least, largest in zip(self.outcome.whats(self.run), self.least, self.largest, strict=True):
             name, dims = self.outcome.name or name_of(what), _dims(self.run, what, least)
-            # Which of −0 and +0 is the least depends on the order in which they are compared; adding +0 leaves +0 alone.
+            # Which of −0 and +0 is the least depends on the order of comparisons; adding +0 makes both +0.
             results[f"{name}_min"] = Variable(dims, least + 0.0, f"least {name} of the observed states", _unit(what))
             results[f"{name}_max"] = Variable(dims, largest + 0.0, f"largest {name} of the observed states", _unit(what))
         return results
@@ -206,11 +206,11 @@ class _Extremes(Reduction):
 class Mean(_Several):
     """The mean over the observed time, ``y_mean``, by the trapezoidal rule over the observed states.
 
-    Its error against the mean of a smooth motion is (interval)²/12 times the largest second derivative, at most.
+    Its error is at most (interval)²/12 times the largest second derivative of a smooth motion.
 
     Args:
         of: as for ``Crossing``; both blocks if None.
-        name: of the results, in place of what they are of.
+        name: the name of the results, in place of that of the quantity.
 
     Example:
         >>> square = sw.sweeps.Mean(lambda t, v, y: y * y, name="square")
@@ -225,7 +225,7 @@ class Mean(_Several):
         return _Mean(self)
 
 
-#: So many numbers of states are added up at once.
+#: The most numbers of states that are summed in one call.
 NUMBERS_AT_ONCE = 1 << 16
 
 
@@ -244,7 +244,7 @@ class _Mean(Reduction):
             now = [np.asarray(each[0], np.float64) for each in all_of]
             self.sums, self.before, self.begin = [np.zeros(each.shape) for each in now], now, float(piece.t[0])
             self.t = self.begin
-        # Some states at once: a chunk of few members has many of them.
+        # Several states at once, since a chunk of few members has many of them.
         at_once = max(1, NUMBERS_AT_ONCE // max(1, *(each[:1].size for each in all_of)))
         for k in range(first, len(piece.t), at_once):
             self._add(piece.t[k : k + at_once], [each[k : k + at_once] for each in all_of])
@@ -270,10 +270,10 @@ class _Mean(Reduction):
 
 
 def called(name: Any, of: Of | None) -> str | None:
-    """The name of results, if one is given.
+    """The user's name of results, or None.
 
     Raises:
-        ArgumentError: if it is none, or would be that of v and of y.
+        ArgumentError: if it is no name, or would be the name of two results, those of v and y.
     """
     if name is None:
         return None
@@ -285,9 +285,9 @@ def called(name: Any, of: Of | None) -> str | None:
 
 
 class History(ReducedOutcome):
-    """The states at intervals: ``v`` and ``y`` along the dimension ``t``; ``every`` of ``stepwell.sweep`` asks for it.
+    """The states at intervals: ``v`` and ``y`` along the dimension ``t``; the interval is ``every`` of ``stepwell.sweep``.
 
-    With a tolerance, those at the times of ``at``.
+    With a tolerance, they are the states at the times of ``at``.
 
     Where ``dt`` is an axis the dimension is ``saved``, and ``t`` a coordinate that depends on both.
 
@@ -330,9 +330,9 @@ class _History(Reduction):
 class Function(Outcome):
     """The results of a function of the run of a chunk of members.
 
-    It is called with a ``Run`` whose batch is the chunk, one axis of members, with the states after the transient that ``every``
-    asks for; without it, the last alone; with a tolerance, those at the times of ``at``. A member may be in a chunk with any
-    others, so the result of one must not depend on the others.
+    It is called with a ``Run`` whose batch is the chunk, one axis of members. The run has the states after the transient at the
+    interval ``every``; without it only the last one; with a tolerance those at the times of ``at``. A member may be in a chunk
+    with any others, so the result of one must not depend on the others.
 
     Args:
         function: returns an array whose last axis is that of the members, or a dictionary of them by name; in place of an array,

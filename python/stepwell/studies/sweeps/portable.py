@@ -1,4 +1,4 @@
-"""What goes to another process: by cloudpickle, with own equations of a script or a notebook by their text and not by name."""
+"""Tasks for other processes: by cloudpickle, with own equations of a script or a notebook by their code and not by name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .axes import Chunk
 from .extras import need
 from .task import Done, Task, run
 
-#: Tasks that a process remembers; each is the same for all chunks of a sweep.
+#: The number of tasks that a process caches; all chunks of a sweep have the same task.
 REMEMBERED_TASKS = 4
 
 
@@ -59,7 +59,7 @@ def _found_by_name(definition: Definition) -> bool:
 def _defined(
     function: Callable[..., Any], options: tuple[Any, ...], module: str, qualified: str, invariants: list[Invariant]
 ) -> Definition:
-    """A definition, made again in another process."""
+    """A definition, created again in another process."""
     definition = Definition(function, *options)
     definition.__module__, definition.__qualname__ = module, qualified
     definition.invariants = {each.name: each for each in invariants}
@@ -68,7 +68,7 @@ def _defined(
 
 @lru_cache(REMEMBERED_TASKS)
 def _task(package: bytes) -> Task:
-    """A task, unpacked once a process: so its system is traced once, and its kernels are compiled once."""
+    """A task, unpacked once in each process, so that its system is traced and its kernels are compiled only once."""
     task = pickle.loads(package)
     assert isinstance(task, Task)
     return task

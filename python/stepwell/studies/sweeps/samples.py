@@ -17,10 +17,10 @@ def random(dim: str, count: int, *, seed: int, **ranges: Any) -> dict[str, Any]:
 
     Args:
         dim: name of the dimension along which all of them vary.
-        count: how many samples.
-        seed: the same seed gives the same samples (of NumPy's PCG64).
+        count: the number of samples.
+        seed: the seed of NumPy's PCG64; the same seed gives the same samples.
         ranges: by the name of an argument, the pair (low, high) between which it is uniform, or a distribution of
-            ``scipy.stats``, or anything with a method ``ppf``, the inverse of its distribution function.
+            ``scipy.stats``, or any object with a method ``ppf``, the inverse of its distribution function.
 
     Returns:
         Axes for ``stepwell.sweep``, by name. They are a dictionary: ``axes | {"mu": ("mu", values)}`` adds another dimension.
@@ -43,8 +43,8 @@ def sobol(dim: str, count: int, *, seed: int, **ranges: Any) -> dict[str, Any]:
 
     Args:
         dim: name of the dimension along which all of them vary.
-        count: how many samples; a power of two, since other numbers lose the balance of the sequence.
-        seed: of the scrambling.
+        count: the number of samples; a power of two, since other numbers lose the balance of the sequence.
+        seed: the seed of the scrambling.
         ranges: as for ``random``.
 
     Returns:
@@ -64,7 +64,7 @@ def sobol(dim: str, count: int, *, seed: int, **ranges: Any) -> dict[str, Any]:
     if count & (count - 1):
         raise ArgumentError(f"count: expected a power of two for Sobol's sequence, got {count}; {1 << count.bit_length()} is one")
     qmc = need("scipy.stats.qmc")
-    # Older versions call it seed, and warn of nothing.
+    # Older versions of SciPy call the argument seed.
     rng = np.random.Generator(np.random.PCG64(seed))
     try:
         sequence = qmc.Sobol(len(ranges) or 1, scramble=True, rng=rng)
@@ -75,7 +75,7 @@ def sobol(dim: str, count: int, *, seed: int, **ranges: Any) -> dict[str, Any]:
 
 
 def _fits(count: int, ranges: dict[str, Any]) -> None:
-    """Raise unless there is room for the samples as they are drawn, as they are placed, and for what both need in between."""
+    """Raise unless memory suffices for the samples as drawn, as values of arguments, and for temporary arrays."""
     checks.fits("count: the samples", 4 * len(ranges), (count,), "take fewer")
 
 

@@ -1,4 +1,4 @@
-"""Where results go: arrays in memory, or a Zarr store to which every finished chunk is written."""
+"""The stores of results: arrays in memory, or a Zarr store to which every finished chunk is written."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ from .extras import need
 from .layout import Layout, Planned, along_dims, hash_of_all, hash_of_chunk
 from .outcomes import Results
 
-#: Group and array, in a store, of the hashes of finished chunks.
+#: The group and the array of a store with the hashes of finished chunks.
 PROGRESS, HASHES = "progress", "hashes"
 #: Attributes of a store: what it is a sweep of, and the shape of its chunks.
 SWEEP, CHUNK_SHAPE, BITS = "sweep", "chunk_shape", "bits"
 #: And, for xarray, which arrays are coordinates, and the order of the others.
 COORDINATES, RESULTS = "coordinates", "results"
 
-#: How each member ended takes a byte, when it did eight more; and there is at least one result.
+#: The least numbers of a member, 8 bytes each: its status takes a byte, its first bad step eight, and there is at least one
+#: result.
 LEAST_NUMBERS = 17 / 8
 
 
@@ -45,7 +46,7 @@ class Memory:
         return False
 
     def write(self, chunk: Chunk, results: Results) -> None:
-        """Take the results of a chunk."""
+        """Store the results of a chunk."""
         if not self.arrays:
             self.about = self.layout.arrays(results)
             numbers = sum(each.dtype.itemsize * float(np.prod(each.shape)) for each in self.about.values()) / 8.0
@@ -67,10 +68,10 @@ class Memory:
 
 
 class Zarr:
-    """A Zarr store. It appears at its path when the first chunk is done, with room for all; each chunk is written once.
+    """A Zarr store. It appears at its path, with space for all results, when the first chunk is done; each chunk is written once.
 
-    A chunk's hash is written after its results. A chunk whose results do not have it was interrupted, or damaged, and is not
-    finished.
+    A chunk's hash is written after its results. A chunk whose results do not match its hash was interrupted or damaged, and is
+    not finished.
     """
 
     def __init__(self, path: Path, layout: Layout, chunk_shape: Shape) -> None:
@@ -85,7 +86,7 @@ class Zarr:
         try:
             group = self._zarr.open_group(self.path, mode="r+", use_consolidated=False)
             there = json.loads(group.attrs[SWEEP])
-        except Exception as error:  # whatever zarr says of a folder or a file that is no store
+        except Exception as error:  # zarr raises exceptions of many kinds for a folder or a file that is no store
             raise ArgumentError(
                 f"store: expected a new path or that of a sweep, got {checks.short(str(self.path), checks.PATH)}, "
                 f"which is something else ({type(error).__name__}: {error})"
@@ -109,7 +110,7 @@ class Zarr:
                 there = getattr(group[name], "shape", ())
                 if there[: len(shape)] != shape:
                     raise ShapeError(f"expected {shape}, got {there}")
-            except Exception as error:  # of torn metadata every part of zarr says something else
+            except Exception as error:  # parts of zarr raise different exceptions for damaged metadata
                 raise self._torn(name, error) from None
 
     def _torn(self, what: str, error: Exception) -> ArgumentError:
@@ -125,14 +126,14 @@ class Zarr:
         try:
             written = int(self.group[f"{PROGRESS}/{HASHES}"][chunk.place])
             return written != 0 and hash_of_chunk(self._read(chunk)) == written
-        except Exception:  # a torn file is an error of its codec, of which each has its own
+        except Exception:  # each codec raises its own exceptions for a damaged file
             return False
 
     def _read(self, chunk: Chunk) -> dict[str, Array]:
         return {name: self.group[name][chunk.slices] for name in self.group.attrs[RESULTS]}
 
     def write(self, chunk: Chunk, results: Results) -> None:
-        """Write the results of a chunk, and then that it is finished."""
+        """Write the results of a chunk, and then its hash."""
         with self._disk():
             if self.group is None:
                 self._create(self.layout.arrays(results))
@@ -161,7 +162,7 @@ class Zarr:
         return self.path.with_name(f".{self.path.name}.new")
 
     def _create(self, arrays: dict[str, Planned]) -> None:
-        """Make the store in a folder beside its path and move it there when it is whole."""
+        """Create the store in a folder beside its path and move it there when it is complete."""
         beside = self._beside
         if beside.exists():
             shutil.rmtree(beside)
@@ -201,12 +202,12 @@ class Zarr:
 
 
 def _counts(sizes: Shape, widths: Shape) -> Shape:
-    """How many chunks of that shape there are along each dimension."""
+    """The number of chunks of that shape along each dimension."""
     return tuple(-(-size // width) for size, width in zip(sizes, widths, strict=True))
 
 
 class NetCDF(Zarr):
-    """A NetCDF file, written when all is done; until then the results are in a Zarr store beside it, which can be continued."""
+    """A NetCDF file, written when all chunks are finished; until then a Zarr store beside it has the results."""
 
     def __init__(self, path: Path, layout: Layout, chunk_shape: Shape) -> None:
         self.file = path
@@ -217,7 +218,7 @@ class NetCDF(Zarr):
             try:
                 with need("xarray").open_dataset(path, engine="h5netcdf") as there:
                     sweep = json.loads(there.attrs[SWEEP])
-            except Exception as error:  # whatever is said of a file that is none
+            except Exception as error:  # exceptions of many kinds for a file that is no NetCDF file
                 raise ArgumentError(
                     f"store: expected a new path or that of a sweep, got {checks.short(str(path), checks.PATH)}, which is "
                     f"something else ({type(error).__name__}: {error})"
@@ -251,7 +252,7 @@ class NetCDF(Zarr):
 
 
 def _room(path: Path, needed: int) -> None:
-    """Raise unless the disk of a path has so many bytes left."""
+    """Raise unless the disk of a path has enough free bytes."""
     free = shutil.disk_usage(path.parent).free
     if needed > free:
         raise TooLargeError(
@@ -271,7 +272,7 @@ def opened(path: Path, chunks: Any = None) -> Any:
 
 
 def same_sweep(path: Path, there: dict[str, Any], wanted: dict[str, Any]) -> None:
-    """Raise if a store is of another sweep than the one that is asked for."""
+    """Raise if a store has the results of another sweep."""
     names = [name for name in {**there, **wanted} if there.get(name) != wanted.get(name)]
     if names:
         differences = "; ".join(

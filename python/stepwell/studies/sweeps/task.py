@@ -1,4 +1,4 @@
-"""A chunk of members: its system is made, its run is made in pieces, and what was asked for is kept."""
+"""The task of a sweep: for a chunk of members it makes the system, runs it in pieces, and computes the outcomes."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from .exponents import Exponents
 from .observed import Piece
 from .outcomes import Function, History, Outcome, ReducedOutcome, Results, Variable, together
 
-#: A piece of a run makes at most so many steps of members, after which a sweep may be stopped.
+#: The most steps times members of a piece of a run, after which a sweep can be stopped.
 MAX_STEPS_OF_MEMBERS = 50_000_000
-#: A state in a piece takes its own numbers so many times: itself, what is computed of it, and what that leaves in between.
+#: How many times the numbers of a saved state are in memory: itself, quantities of it, and temporary arrays.
 COPIES_OF_A_STATE = 4
-#: A member takes its own numbers so many times besides: where it starts, what it carries, where it ends.
+#: How many times the numbers of a member are in memory besides: at the start, in the carry, at the end.
 COPIES_OF_A_MEMBER = 12
 
 
@@ -43,19 +43,19 @@ class Stopped(Exception):  # noqa: N818 (not an error)
 
 
 class Task(NamedTuple):
-    """What to do with every chunk.
+    """The task of every chunk.
 
     Attributes:
-        system: a system, or what makes one of parameters by name.
-        method: name of the method.
+        system: a system, or a callable that makes one from parameters by name.
+        method: the name of the method.
         options: further arguments of ``integrate``, the same for all members.
-        transient: steps before those that are observed.
-        steps: steps that are observed.
-        observe: interval of the states that reductions see, in steps.
-        every: interval of the states of a history or of a function's run, in steps; None for the last alone.
-        outcomes: what to keep.
-        memory: how many bytes a chunk may take.
-        at: with a tolerance, the times whose states are observed, and all that are saved; None with fixed steps.
+        transient: the number of steps before the observed ones.
+        steps: the number of observed steps.
+        observe: the interval of the states that reductions see, in steps.
+        every: the interval of the states of a history or of a function's run, in steps; None for only the last one.
+        outcomes: the outcomes.
+        memory: the bytes that a chunk may take.
+        at: with a tolerance, the times of the observed states, which are all that are saved; None with fixed steps.
     """
 
     system: Any
@@ -75,11 +75,11 @@ class Task(NamedTuple):
 
     @property
     def single(self) -> bool:
-        """Whether steps are made in float32."""
+        """Whether steps are computed in float32."""
         return self.options.get("dtype") == "float32"
 
     def rounded(self, dt: Array) -> Array:
-        """The steps that are made of those that were given."""
+        """The lengths of steps, rounded to the precision of the task."""
         return dt.astype(np.float32).astype(np.float64) if self.single else dt
 
     @property
@@ -89,13 +89,13 @@ class Task(NamedTuple):
 
     @property
     def between(self) -> int | None:
-        """Interval of the states that are saved for reductions; None for the last alone."""
+        """The interval of the states that are saved for reductions; None for only the last one."""
         observed = self.observe if any(each.observes for each in self.reductions) else 0
         history = (self.every or 0) if self.kinds(History) else 0
         return gcd(observed, history) or None
 
     def numbers(self, system: System) -> float:
-        """How many numbers a member takes while it is computed, without the states of a piece."""
+        """The numbers of a member in memory while it is computed, without the states of a piece."""
         state = prod(system.v_shape) + prod(system.y_shape)
         numbers = COPIES_OF_A_MEMBER * state + sum(each.numbers for each in self.outcomes)
         saved = 1 if self.every is None else self.steps // self.every + 2
@@ -114,7 +114,7 @@ class Task(NamedTuple):
         return numbers
 
     def most_members(self, system: System) -> int:
-        """How many members may be in a chunk, for its memory."""
+        """The most members of a chunk whose memory suffices."""
         state = prod(system.v_shape) + prod(system.y_shape)
         least = (
             0 if self.between is None and self.at is None else 3 * COPIES_OF_A_STATE * state
@@ -122,20 +122,20 @@ class Task(NamedTuple):
         return int(self.memory / (8.0 * (self.numbers(system) + least)))
 
     def states_at_once(self, system: System, members: int) -> int:
-        """How many saved states a piece may have, for its memory."""
+        """The most saved states of a piece for which the memory of the chunk suffices."""
         state = prod(system.v_shape) + prod(system.y_shape)
         room = self.memory / (8.0 * members) - self.numbers(system)
         return max(2, int(room / (COPIES_OF_A_STATE * state)))
 
 
 class Done(NamedTuple):
-    """What was found of a chunk.
+    """The results of a chunk.
 
     Attributes:
         results: by name, values of shape (*own axes, members).
-        doubt: a message if the numbers are finite and mean nothing, or None.
-        lost: how many members have an absolute tolerance so large that the motion is lost in it.
-        growth: of the members that grew by fixed steps beyond their stability limit, or None.
+        doubt: a message if the numbers are finite but meaningless, or None.
+        lost: the number of members whose absolute tolerance is so large that the motion is lost in it.
+        growth: the members that grew by fixed steps beyond their stability limit, or None.
     """
 
     results: Results
@@ -151,7 +151,7 @@ def prepared(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]
     system = task.system if isinstance(task.system, System) else task.system(**parameters)
     system = a_system(system).for_state_shapes(options.get("v"), options["y"])
     if set(values) == {"dt"}:
-        # Nothing else has an axis of members; a chunk of one dt has one.
+        # Without another argument that has an axis of members, v gets one; a chunk has one dt.
         block = checks.block("y", options["y"], system.y_shape, system.axes)
         if block.shape == system.y_shape:
             options["y"] = block[..., np.newaxis]
@@ -160,7 +160,7 @@ def prepared(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]
 
 def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], bool] | None = None) -> Done:
     """Compute a chunk of members."""
-    with _listening(stopped), np.errstate(all="ignore"):  # members that diverge are told of by their status
+    with _listening(stopped), np.errstate(all="ignore"):  # the status tells which members diverged
         system, options = prepared(task, values)
         start = options
         for each in _pieces(task, system, options, members, task.transient, None, stopped):
@@ -190,7 +190,7 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
 def _growth_of(task: Task, options: dict[str, Any], last: Run) -> Growth | None:
     """The members that grew by their steps alone, from the start of the sweep to the end of the last piece of its run."""
     if any(event.then for event in options.get("events", ())):
-        return None  # what an event makes of a state tells nothing of the steps
+        return None  # events may change states, so growth says nothing about the steps
     system, batch = last.system, last.status.shape
     blocks = (("v", velocities(system, options.get("v")), system.v_shape), ("y", options["y"], system.y_shape))
     v, y = (spread(checks.block(name, block, shape, system.axes), shape, batch) for name, block, shape in blocks)
@@ -200,7 +200,7 @@ def _growth_of(task: Task, options: dict[str, Any], last: Run) -> Growth | None:
 def _reduced(
     task: Task, system: System, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
 ) -> tuple[Run, list[Results]]:
-    """The last piece of the run, and what the reductions found in it."""
+    """The last piece of the run, and the results of the reductions."""
     between, reductions = task.between, [(each, each.begin()) for each in task.reductions]
     at, last = 0, None
     if task.at is not None:
@@ -220,7 +220,7 @@ def _reduced(
 
 
 def _thinned(task: Task, outcome: Outcome, piece: Run, first: int, since: int) -> Piece:
-    """The states of a piece that an outcome asks for: every so many, counted from the first of all, and the very last."""
+    """The states of a piece for an outcome: at its interval, counted from the first of all states, and the very last one."""
     interval = task.observe if outcome.observes else (task.every or 0) if isinstance(outcome, History) else 0
     step = interval // (task.between or 1)
     if step <= 1:
@@ -241,9 +241,9 @@ def _pieces(
     between: int | None,
     stopped: Callable[[], bool] | None,
 ) -> Iterator[Run]:
-    """So many steps in pieces; a piece ends where a state is saved."""
+    """A run of ``steps`` fixed steps in pieces; a piece ends where a state is saved."""
     length = max(1, MAX_STEPS_OF_MEMBERS // members)
-    if "events" in start:  # a member that an event stopped does not go on
+    if "events" in start:  # a member that an event stopped cannot be resumed
         length = steps
     elif between is not None:
         length = between * max(1, min(length // between, task.states_at_once(system, members) - 1))
@@ -261,7 +261,7 @@ def _pieces(
 def _pieces_between_times(
     task: Task, system: System, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
 ) -> Iterator[Run]:
-    """A run with a tolerance in pieces, each of some of its times; its steps do not depend on them."""
+    """A run with a tolerance in pieces, each with some of its times; its steps do not depend on the pieces."""
     assert task.at is not None
     length = task.at.size if "events" in start else task.states_at_once(system, members)
     going_on = start
@@ -275,13 +275,13 @@ def _pieces_between_times(
 
 
 def _going_on(options: dict[str, Any], run: Run) -> dict[str, Any]:
-    """Arguments with which a run goes on; what it does not carry, such as threads, is given again."""
+    """The arguments that resume a run; those that it does not carry, such as threads, are repeated."""
     return {"resume": run} | {name: value for name, value in options.items() if name in ("threads", "backend", "max_steps")}
 
 
 @contextmanager
 def _listening(stopped: Callable[[], bool] | None) -> Iterator[None]:
-    """Everything that this thread steps ends when the sweep is stopped; Ctrl-C reaches the main thread alone."""
+    """Within this context, runs of this thread end when the sweep is stopped, since Ctrl-C reaches only the main thread."""
     _core.ask(partial(_stop, stopped))
     try:
         yield
@@ -304,9 +304,9 @@ def _as_many(run: Run, members: int) -> None:
 
 
 class Probed(NamedTuple):
-    """What the first steps of a member tell: the system, the state after them, and the names of what is found piece by piece.
+    """The results of the first steps of a member: the system, the state after them, and the names of the results of reductions.
 
-    ``findings`` are of its control, which chunks do not check.
+    ``findings`` are those of its control, which chunks do not check.
     """
 
     system: System
@@ -316,7 +316,7 @@ class Probed(NamedTuple):
 
 
 def probed(task: Task, values: dict[str, Any]) -> Probed:
-    """The first steps of one member: errors in what was given show here, before any work, and so does what is computed."""
+    """The first steps of one member: they show errors in arguments before any work, and the results that will be computed."""
     system, options = prepared(task, values)
     for each in task.outcomes:
         each.check(system)
@@ -336,7 +336,7 @@ def probed(task: Task, values: dict[str, Any]) -> Probed:
 
 
 def _names(task: Task, run: Run) -> set[str]:
-    """The names of results, but for those of functions and of exponents; raise if two of them are the same."""
+    """The names of results, except those of functions and of exponents; raise if two are equal."""
     parts: list[Results] = []
     with np.errstate(all="ignore"):
         for outcome in task.reductions:
@@ -346,5 +346,5 @@ def _names(task: Task, run: Run) -> set[str]:
     return set(together([*parts, dict.fromkeys(("status", "first_bad_step"), Variable((), np.array(run.status), ""))]))
 
 
-#: Of so many steps the bits tell one sweep from another.
+#: The number of steps whose bits distinguish one sweep from another.
 PROBED_STEPS = 3
