@@ -194,11 +194,11 @@ class Branched:
         if (sides := self._sides(line)) is None:
             return False, False
         path = self._paths[line]
-        dear = []
+        sides_expensive = []
         for of, side in zip(sides[1:], (True, False), strict=True):
             begin = (*path, *self._side(line, side)[:1])
-            dear.append(len(begin) > len(path) and of in self._paths and self._paths[of][: len(begin)] == begin)
-        return dear[0], dear[1]
+            sides_expensive.append(len(begin) > len(path) and of in self._paths and self._paths[of][: len(begin)] == begin)
+        return sides_expensive[0], sides_expensive[1]
 
     def _split(self) -> None:
         """Replace each choice that a branch makes by choices within each other, each by a single condition."""
