@@ -39,7 +39,7 @@ def chosen(method: Any) -> Method:
     if not isinstance(name, (str, Method)):
         raise DTypeError(f"method: expected a name, got {checks.short(method)} ({type(method).__name__})")
     try:
-        method = find_method(name)
+        solver = find_method(name)
     except UnknownNameError:
         absent = next((each for each in ABSENT if each.lower() == str(name).lower()), None)
         if absent is None:
@@ -50,12 +50,12 @@ def chosen(method: Any) -> Method:
             else "for another method that chooses its steps,"
         )
         raise UnknownNameError(f"method: {absent} is {ABSENT[absent]}; {advice} write one of these: {_able()}") from None
-    if method.error_order is None:
+    if solver.error_order is None:
         raise UnsupportedError(
-            f"method: {method.name} does not estimate its error, so it cannot choose its steps; write one of these: {_able()}; "
+            f"method: {solver.name} does not estimate its error, so it cannot choose its steps; write one of these: {_able()}; "
             f"or use stepwell.integrate with dt= and steps="
         )
-    return method
+    return solver
 
 
 def _able() -> str:

@@ -42,7 +42,7 @@ EVERY = 10
 #: About the most operations of a step before it is differentiated: as many as for a step by a series.
 MAX_OPERATIONS = 100_000
 
-#: The least operations between two orthonormalisations for which a thread is worthwhile; and the most between two looks for an
+#: The least operations between two orthonormalisations for which a thread is worthwhile; and the most between two checks for an
 #: interruption.
 OPERATIONS_OF_A_THREAD, OPERATIONS_AT_ONCE = 2_000_000, 1 << 26
 
