@@ -111,12 +111,12 @@ def test_no_thread_is_started_with_the_last_of_the_memory() -> None:
     """A second one while there are 60 MB, none where there are 8: it might find nothing to allocate, and end the process."""
     said = aside("""
         import contextlib, os
-        from stepwell.runs import integration
+        from stepwell.base import progress
         threads = []
         @contextlib.contextmanager
         def bar(title):
             yield lambda done: threads.append(len(os.listdir("/proc/self/task")))
-        integration.bar_of = bar
+        progress.bar = bar
         system, given = sw.Oscillator(np.linspace(1, 2, 5000)), dict(v=0.0, y=1.0, dt=0.1, threads=2, progress=True)
         runs = []
         for left in (60_000_000, 8_000_000):

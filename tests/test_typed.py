@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from stepwell import integrate
 from stepwell.base import literals
 from stepwell.model import controls, surfaces
 from stepwell.model.systems import aircraft, nbody, oscillator
+from stepwell.runs import request
 from stepwell.source import exports
 from stepwell.studies.advice import COSTS
 
@@ -76,8 +76,8 @@ def test_mypy_finds_what_is_written_wrongly(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "known"),
     [
-        (literals.RunForm, integrate.__globals__["FORMS"]),
-        (literals.Backend, integrate.__globals__["BACKENDS"]),
+        (literals.RunForm, request.FORMS),
+        (literals.Backend, request.BACKENDS),
         (literals.OscillatorForm, oscillator.FORMS),
         (literals.AttitudeForm, aircraft.FORMS),
         (literals.BodyForce, nbody.FORCES),
