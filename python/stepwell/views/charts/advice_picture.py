@@ -1,4 +1,4 @@
-"""The picture of advice: what the methods that are good enough cost, and how large their errors are."""
+"""The picture of advice: the costs and the errors of the methods that are good enough."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ...studies.advice.result import Advice
     from ...studies.advice.rows import Row
 
-#: Room around the points, as a factor of cost, of error above what was asked for, and below the least.
+#: The margins around the points, as factors: of cost, of error above the allowed one, and of error below the least.
 WIDER, HIGHER, LOWER = 1.8, 2.5, 12.0
 
 

@@ -1,4 +1,4 @@
-"""Control charts: what a control does to what it keeps and to the state, over its gain, and what a projection does (§12)."""
+"""Control charts: the errors of the controlled quantity and of the state over the gain, and with projection (§12)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .control_runs import LENGTH_KINDS, Exact, Held, Runs
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Default methods: one that adds energy, one that keeps it, and two more accurate ones.
+#: Default methods: one that adds energy, one that conserves it, and two more accurate ones.
 METHODS = ("standard_euler", "false_euler", "standard_heun", "rk4")
 
 #: Default gains: h·C·K at the start of bodies, six decades; c of rods, from 0.01 to 4, past the limits of most methods.
@@ -42,11 +42,11 @@ WAYS: tuple[str, ...] = controls.WAYS
 
 @dataclass(frozen=True, eq=False)
 class ControlSweep(Drawn, Table, ValueEquality):
-    """Errors of what a control keeps, and of the state, against its gain: a row for each method, kind and gain.
+    """Errors of the controlled quantity and of the state against the gain: a row for each method, kind and gain.
 
     Attributes:
         title: title of the picture.
-        system: the system: bodies, whose energy is kept, or rods, whose lengths are.
+        system: the system: bodies with a control of the energy, or rods with a control of the lengths.
         horizon: the time of each run.
         evaluations: function (rate) evaluations of a run, one or several numbers; each is another step.
         lines: one for each method and kind that can be combined, and each number of evaluations.
@@ -64,15 +64,15 @@ class ControlSweep(Drawn, Table, ValueEquality):
 
     @property
     def keeps_lengths(self) -> bool:
-        """Whether the control keeps the lengths of rods, and not an energy."""
+        """Whether the lengths of rods are controlled, and not an energy."""
         return self.system.constraint == "length"
 
     def line(self, method: Method | str, kind: str, evaluations: int | None = None) -> Held:
-        """The line of that method and kind, with so many evaluations; the first number of them if None.
+        """The line of that method and kind, with this number of evaluations; the first number if None.
 
         Raises:
-            UnknownNameError: if there is none.
-            ArgumentError: if there are no runs of so many evaluations.
+            UnknownNameError: if there is no such line.
+            ArgumentError: if there are no runs with this number of evaluations.
         """
         name = find_method(method).name
         count = self.evaluations[0] if evaluations is None else evaluations
@@ -87,9 +87,9 @@ class ControlSweep(Drawn, Table, ValueEquality):
 
     @property
     def better(self) -> dict[str, tuple[bool, ...]]:
-        """Of rods: for each method and each number of evaluations, whether control is better than resetting at most gains.
+        """For rods: for each method and each number of evaluations, whether control is better than resetting at most gains.
 
-        Better is the smaller error of the last state; gains at which the run diverged are left out.
+        Better means a smaller error of the last state; gains at which the run diverged do not count.
         """
         by_method: dict[str, tuple[bool, ...]] = {}
         for name in dict.fromkeys(line.method.name for line in self.lines if line.kind == LENGTH_KINDS[1] and self.exact):
@@ -102,7 +102,7 @@ class ControlSweep(Drawn, Table, ValueEquality):
 
     @property
     def answer(self) -> str:
-        """Of rods, in a sentence: for which methods control is better than resetting, as the document supposes (§12)."""
+        """For rods, in a sentence: the methods for which control is better than resetting, as the document supposes (§12)."""
         titles: dict[str, list[str]] = {"control": [], "resetting": [], "depends": []}
         for name, better in self.better.items():
             titles["control" if all(better) else "depends" if any(better) else "resetting"].append(find_method(name).title)
@@ -116,7 +116,7 @@ class ControlSweep(Drawn, Table, ValueEquality):
         return figure
 
     def summary(self) -> list[dict[str, Any]]:
-        """A row for each method, kind and step: the gains with the least errors, and from which gain on some diverged."""
+        """A row for each method, kind and step: the gains with the least errors, and the least gain at which a run diverged."""
         rows = []
         for line in self.lines:
             least = [_least(line.relative, errors) for errors in (line.energy_error, line.state_error)]
@@ -167,13 +167,13 @@ def control(
 ) -> ControlSweep:
     """Run bodies or rods by several methods without control, under control with many gains, and projected; measure the errors.
 
-    What is kept is the energy of bodies or the lengths of rods. All methods make the same number of function evaluations, so a
+    The energy of bodies or the lengths of rods are controlled. All methods make the same number of function evaluations, so a
     method with k evaluations a step makes a k-th of the steps, each k times as long. All gains of a method and a form are one
     batch.
 
     Args:
-        scene: a scene of bodies or of rods or its name, or a system ``NBody``, ``Rods`` or ``Pendulum3D`` for which ``v``,
-            ``y``, ``horizon`` and ``evaluations`` are given.
+        scene: a scene of bodies or of rods or its name, or a system ``NBody``, ``Rods`` or ``Pendulum3D``, which needs ``v``,
+            ``y``, ``horizon`` and ``evaluations``.
         methods: names, or what ``stepwell.method`` returns.
         v: velocities at the start, of the shape of the block; those of the scene if None.
         y: coordinates at the start, likewise.
@@ -186,7 +186,7 @@ def control(
         forms: forms of the control: those of ``EnergyControl``, or ``"control"`` for ``LengthControl``; all if None.
         ways: ways of ``Projection``: ``"scaling"`` and ``"nacozy"``, or ``"length"``; all if None.
         title: title of the picture; if None, the scene's title or the system.
-        progress: is called with the fraction that is done.
+        progress: a function that is called with the fraction that is done.
 
     Returns:
         A ``ControlSweep``. Methods that cannot be controlled are in its ``refused``, with the reason.

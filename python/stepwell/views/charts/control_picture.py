@@ -20,20 +20,21 @@ FORMS: dict[str, dict[str, Any]] = {
     "printed": {"linestyle": (0, (1, 1.2)), "linewidth": 1.4, "fillstyle": "none", "markersize": 6.0},
 }
 
-#: Marks of what has no gain, and what they are called.
+#: Marks of the runs without a gain, and their names.
 MARKS: dict[str, tuple[str, str]] = {
     "none": ("o", "without control"),
     "scaling": ("s", "velocities scaled"),
     "nacozy": ("D", "Nacozy's projection"),
 }
 
-#: Height of the strip of diverged runs, as a share of that of the panel below it.
+#: Height of the strip of diverged runs, as a fraction of that of the panel below it.
 STRIP = 0.1
 
-#: Names at the ends of the curves are so far apart, as a share of the panel's height.
+#: The distance of names at the ends of the curves, as a fraction of the panel's height.
 ROOM = 0.065
 
-#: What is exact has no place on a logarithmic axis; an error below this is rounding, and stands at the edge of the picture.
+#: The smallest error on the logarithmic axis, on which 0 has no place; and the error below which it is rounding, drawn at the
+#: edge.
 LEAST_DRAWN, ROUNDING = 1e-17, 1e-12
 
 
@@ -60,7 +61,7 @@ def draw(chart: ControlSweep) -> Figure:
 
 
 def finding(chart: ControlSweep) -> str:
-    """In how many runs control at the median gain lowers the energy error, and by which factor."""
+    """The number of methods whose energy error the control lowers at the median gain, and the factor, as a title."""
     factors = []
     for line in chart.lines:
         if line.kind != "limited":
@@ -93,7 +94,7 @@ def _methods(chart: ControlSweep) -> list[Method]:
 
 
 def _before_and_after(axes: Axes, chart: ControlSweep, what: str, name: str, *, named: bool) -> None:
-    """A row for each method: what an error is without control, and what it becomes."""
+    """A row for each method: an error without control and with it."""
     methods = _methods(chart)
     values = np.concatenate([getattr(line, what) for line in chart.lines] or [np.ones(1)])
     values = values[np.isfinite(values) & (values > ROUNDING)]
@@ -134,7 +135,7 @@ def _before_and_after(axes: Axes, chart: ControlSweep, what: str, name: str, *, 
 
 
 def _over_gains(axes: Axes, chart: ControlSweep, what: str, name: str) -> None:
-    """The errors over the gain, and above them what diverged."""
+    """The errors over the gain, and above them the diverged runs."""
     from matplotlib.patches import Rectangle
 
     gains = np.unique(np.concatenate([line.relative[np.isfinite(line.relative)] for line in chart.lines] or [np.ones(1)]))

@@ -25,7 +25,7 @@ SAVED_STATES = 1000
 #: Number of times at which the exact solution is evaluated for its scale.
 SCALE_SAMPLES = 1001
 
-#: What may keep the lengths of rods: ``LengthControl``, and resetting, ``Projection("length")``.
+#: The kinds of control of the lengths of rods: ``LengthControl``, and resetting, ``Projection("length")``.
 LENGTH_KINDS = ("control", "length")
 
 Whole = np.ndarray[Any, np.dtype[np.int64]]
@@ -38,17 +38,17 @@ class Held(ValueEquality):
 
     Attributes:
         method: the method.
-        kind: ``"none"``; a form of ``EnergyControl`` or a way of ``Projection``; of rods ``"control"`` for ``LengthControl`` and
+        kind: ``"none"``; a form of ``EnergyControl`` or a way of ``Projection``; for rods ``"control"`` for ``LengthControl`` and
             ``"length"`` for ``Projection("length")``.
         dt: the step, in units of time.
-        steps: how many steps were made.
-        relative: the gains, h·C·K at the start, or c of rods, shape (gains,); one NaN if the kind has no gain.
+        steps: the number of steps.
+        relative: the gains, h·C·K at the start, or c for rods, shape (gains,); one NaN if the kind has no gain.
         energy_error: the largest |E − E₀| of the saved states, divided by the kinetic energy at the start, or where that is zero
             by the largest of the exact motion, shape (gains,).
-        state_error: how far the last state is from the exact one, of the same shape; NaN if no exact one is known.
-        largest: the largest coordinate of the saved states, of the same shape.
-        length_error: the largest relative error of a rod's length in the saved states, of the same shape; NaN without rods.
-        first_bad_step: the first step that was not finite, or −1, of the same shape.
+        state_error: the distance of the last state from the exact one, shape (gains,); NaN without an exact solution.
+        largest: the largest coordinate of the saved states, shape (gains,).
+        length_error: the largest relative error of a rod's length in the saved states, shape (gains,); NaN without rods.
+        first_bad_step: the first step that was not finite, or −1, shape (gains,).
     """
 
     method: Method
@@ -107,7 +107,7 @@ class Runs:
         return np.stack([self.v, pair[0]]), np.stack([self.y, pair[1]])
 
     def line(self, method: Method, kind: str, gains: Array, evaluations: int) -> Held:
-        """Run a method under one kind of control, all gains at once, with so many function evaluations."""
+        """Run a method under one kind of control, all gains at once, with this number of function evaluations."""
         steps = max(1, round(evaluations / engine.evaluations(method, self.system)))
         dt = self.horizon / steps
         relative = np.array([np.nan])
@@ -121,7 +121,7 @@ class Runs:
         shape = (*self.system.v_shape, len(relative))
         v, y = (np.broadcast_to(block[..., np.newaxis], shape) for block in (self.v, self.y))
         with np.errstate(all="ignore"):
-            # That much gain is too much is what the chart shows.
+            # No warnings: the chart shows which gains are too large.
             run = quietly(self.system, method, v=v, y=y, dt=dt, steps=steps, every=max(1, steps // SAVED_STATES), control=control)
             energy = np.abs(run.energy - self.energy).max(axis=0) / self.kinetic
             largest = np.abs(run.y).max(axis=tuple(range(run.y.ndim - 1)))

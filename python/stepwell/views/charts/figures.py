@@ -34,7 +34,7 @@ MAX_STEPS = 100_000
 
 #: The angles Ψ of a step, in degrees, of which §4 draws the harmonic cases: 12, 4 and 2.4 samples a period.
 HARMONIC_CASES = (30, 90, 150)
-#: So many periods of these are drawn: after two, 150° a step begins again.
+#: The number of periods of these that are drawn: after two, the samples of 150° a step repeat.
 HARMONIC_PERIODS = 2
 
 #: The document starts Verlet with y₋₁ = y₀ (Appendix B), which is this for v₀ = 0.
@@ -47,11 +47,11 @@ class Samples(ValueEquality):
 
     Attributes:
         method: the method.
-        start: how it was started, the document's way where it has several; None for one way.
+        start: how it was started, as in the document if it has several ways; None if it has one way.
         t: times in units of 1/ω₀: k·Φ.
         v: velocities, divided by ω₀.
         y: coordinates.
-        r1_squared: r₁², what the square of the amplitude is multiplied by in a step.
+        r1_squared: r₁², the factor of the square of the amplitude in a step.
         ratio: Ψ/Φ, the frequency of the samples divided by the true one.
         kind: what the samples do, in the document's words.
         limit: below this Φ the method is stable; 0 for never.
@@ -85,7 +85,7 @@ class Samples(ValueEquality):
 
 @dataclass(frozen=True, eq=False)
 class HarmonicCase(ValueEquality):
-    """Samples that turn by the same angle in every step and keep their amplitude (§4), made by Verlet; shape (steps + 1,).
+    """Samples by Verlet that turn by the same angle in every step and keep their amplitude (§4); shape (steps + 1,).
 
     Attributes:
         degrees: the angle Ψ of a step.
@@ -106,7 +106,7 @@ class HarmonicCase(ValueEquality):
 
     @property
     def exact(self) -> Array:
-        """The function g of which these are samples, at their times."""
+        """The sampled function g at the times of the samples."""
         return np.asarray(np.cos(np.radians(float(self.degrees) * np.arange(len(self.y)))))
 
     @property
@@ -170,7 +170,7 @@ class Figures(Table, ValueEquality):
         The numbers are ``figures.csv`` and ``figures.json``. Returns the paths, in that order.
 
         Args:
-            folder: where to; it is made if it is not there.
+            folder: the folder, which is created if it does not exist.
 
         Raises:
             ArgumentError: if nothing can be written there.
@@ -182,7 +182,7 @@ class Figures(Table, ValueEquality):
         others: dict[str, Any] = {HARMONIC_FILE: self.plot_harmonic} if self.harmonic else {}
         others |= {"figures.csv": self.to_csv, "figures.json": self.to_json}
         place = checks.folder("folder", folder, [*names, *others])
-        new_figure(1.0, 1.0)  # before the folder is made: it may be that nothing can be drawn
+        new_figure(1.0, 1.0)  # raises before the folder is created if nothing can be drawn
         place.mkdir(parents=True, exist_ok=True)
         paths = [place / name for name in names]
         for path, method in zip(paths, [None, *(samples.method for samples in self.samples)], strict=True):

@@ -39,16 +39,16 @@ SETTLED = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Settled(ValueEquality):
-    """One method: where the norm settles under control, and what the angle of a step is there.
+    """One method: the norm at which its quaternion settles under control, and the error of the angle of a step there.
 
     Attributes:
         method: the method.
         gains: h·k, shape (gains,).
         norm_error: q·q − 1 when it has settled, shape (gains,); NaN where it does not.
         angle_error: the error of the angle of a step, as a fraction of it, of the same shape; NaN likewise.
-        growth: what a step adds to q·q, as a fraction of it, if nothing keeps it.
-        angle_error_reset: the error of the angle if q is reset to the length 1 after every step, as a fraction; that without
-            anything is the same.
+        growth: the relative growth of q·q in a step without control.
+        angle_error_reset: the relative error of the angle if q is reset to the length 1 after every step; it is the same without
+            resetting.
     """
 
     method: Method
@@ -124,7 +124,7 @@ def norm(
         methods: names, or what ``stepwell.method`` returns.
         phi: Φ = ½h|ω|, the angle of a true step of the quaternion, in rad, above 0 and below 1.
         gains: h·k of the control, shape (gains,), without a unit.
-        progress: is called with the fraction that is done.
+        progress: a function that is called with the fraction that is done.
 
     Returns:
         A ``NormSweep``.
@@ -160,7 +160,7 @@ def _line(body: RigidBody, method: Method, phi: float, gains: Array) -> Settled:
     """Steps of the length 1 at |ω| = 2Φ, so that a gain is its own k."""
 
     def run(steps: int, **options: Any) -> Run:
-        # That a gain is too large is what the chart shows.
+        # No warnings: the chart shows which gains are too large.
         return quietly(body, method, v=[0.0, 0.0, 2.0 * phi], y=[1.0, 0.0, 0.0, 0.0], dt=1.0, steps=steps, **options)
 
     once = run(1, record="norm_error")

@@ -10,13 +10,13 @@ from .labels import title
 from .norm import NormSweep, Settled
 from .style import GREY, Axes, Figure, look, page
 
-#: The least and largest ratio that is drawn: a thirtieth is as good as none.
+#: The least and the largest ratio that are drawn: below a thirtieth, ratios do not matter.
 LEAST_RATIO, LARGEST_RATIO = 0.03, 30.0
 
-#: Errors of angles that differ by less than this share are alike: it is what rounding leaves of the smallest.
+#: Errors of angles that differ by less than this fraction count as equal: it is the rounding of the smallest.
 ALIKE = 1e-3
 
-#: What is exact has no place on a logarithmic axis.
+#: The smallest error on the logarithmic axis, on which 0 has no place.
 LEAST_NORM = 1e-17
 
 #: The name of a line stands at its left end if no other name is there, within this factor.

@@ -13,7 +13,7 @@ from .run_panels import Points, on_plane
 from .runs import LARGEST, RunPicture
 from .style import BOTTOM, EXACT, FAMILIES, GREY, LONG_CURVE, TOP, Axes, Figure
 
-#: Hues, lines and marks of bodies. The hues are those of ``FAMILIES``, told apart in grey, too. More bodies are drawn alike.
+#: Hues, lines and marks of bodies. The hues are those of ``FAMILIES``, which differ in grey, too. Further bodies look alike.
 BODIES: tuple[dict[str, Any], ...] = (
     {"color": FAMILIES["Runge-Kutta"], "linestyle": "-", "marker": "o"},
     {"color": FAMILIES["Heun"], "linestyle": (0, (6, 2)), "marker": "s"},
@@ -24,13 +24,13 @@ BODIES: tuple[dict[str, Any], ...] = (
 #: The exact curve where it lies above the others.
 DASHED: dict[str, Any] = {"color": "black", "linewidth": 1.5, "linestyle": (0, (3, 1.5))}
 
-#: Paths longer than so many sides of the picture are drawn thin.
+#: Paths longer than this many sides of the picture are drawn thin.
 CROWDED = 20.0
 
-#: Curves nearer to each other than this share of their size are one.
+#: Curves closer to each other than this fraction of their size are one.
 ONE_CURVE = 0.01
 
-#: What is seen of the run without control is at most so many times as wide as the run with it.
+#: The view of the run without control is at most this many times as wide as the run with it.
 BEFORE_FACTOR = 2.5
 
 
@@ -96,7 +96,7 @@ def turning(chart: RunPicture) -> bool:
 
 
 def radii(axes: Axes, chart: RunPicture) -> None:
-    """The distance of each body from the centre over the angle that it has turned: orbits that lie on each other, spread out."""
+    """The distance of each body from the centre over the angle that it has turned, which separates coinciding orbits."""
     y = np.clip(chart.places[chart.finite], -LARGEST, LARGEST)
     exact = chart.exact_places
     assert exact is not None
@@ -140,7 +140,7 @@ def crowded(chart: RunPicture, size: float) -> bool:
 
 
 def square(axes: Axes, view: Points, half: float, plane: tuple[int, int] = (0, 1)) -> None:
-    """Equal scales, and from where it is seen."""
+    """Equal scales, and the name of the view."""
     (x, y) = view.centre
     axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half))
     axes.set_aspect("equal", adjustable="box", anchor="N")

@@ -21,7 +21,7 @@ from .style import FAMILIES
 
 WEB = Path(__file__).parent / "web"
 
-#: The last of the codes of 16 bits stands for what is not known.
+#: The last of the codes of 16 bits stands for an unknown number.
 NONE = 2**16 - 1
 
 #: Bytes of codes that states and links may take, most states, and points of an exact curve: the page stays below 200 KB, since
@@ -52,7 +52,7 @@ def page(chart: RunPicture, seconds: float, fps: float) -> str:
 
 
 def data(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
-    """What the page is filled with: titles, the times of the states that are shown, and panels."""
+    """The data of the page: titles, the times of the shown states, and panels."""
     good = np.flatnonzero(chart.finite)
     each = 2 * (2 * chart.places.shape[1] if chart.kind == "orbits" else 9 + int(np.prod(chart.run.y.shape[1:]))) + 12
     room = BYTES - (4 * len(chart.links) if chart.kind == "orbits" else 0)
@@ -78,7 +78,7 @@ def data(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
 
 
 def encoded(values: Array) -> dict[str, Any]:
-    """Numbers as 16 bits each, off by half of ``step`` at most; what is not finite is not known."""
+    """Numbers as codes of 16 bits, with an error of at most half of ``step``; numbers that are not finite are unknown."""
     flat = np.asarray(values, dtype=np.float64).ravel()
     finite = np.isfinite(flat)
     low, high = (float(flat[finite].min()), float(flat[finite].max())) if finite.any() else (0.0, 0.0)
@@ -97,7 +97,7 @@ def _letters(codes: Any) -> str:
 
 
 def _orbits(chart: RunPicture, shown: Array) -> list[Panel]:
-    """Points with trails, springs and rods as lines, and what is fixed."""
+    """Points with trails, springs and rods as lines, and fixed points."""
     links, count = chart.links, chart.places.shape[1]
     hanging = chart.places.shape[2] == 3 and (len(links) or chart.fixed_points)
     view = falling(chart) if hanging else on_plane(chart)
@@ -131,7 +131,7 @@ def _orbits(chart: RunPicture, shown: Array) -> list[Panel]:
 
 
 def _swing(chart: RunPicture, shown: Array) -> list[Panel]:
-    """Coordinate and velocity as they grow."""
+    """Coordinate and velocity as curves that grow."""
     panels, exact = swings(chart), chart.exact_at(shown)
     height = 0.4 if len(panels) > 1 else 0.88
     return [
@@ -189,7 +189,7 @@ def _solid(chart: RunPicture, shown: Array) -> Panel:
 
 
 def _errors(chart: RunPicture, shown: Array) -> list[Panel]:
-    """The errors that are known; beside an aircraft there are its angles."""
+    """The known errors; for an aircraft its angles."""
     if chart.kind == "attitude":
         return []
     return [

@@ -1,4 +1,4 @@
-"""Several scenes side by side: which method is the cheapest on which."""
+"""Several scenes side by side, with the cheapest method of each."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] 
 
     Args:
         scenes: scenes, or their names.
-        progress: is called with the fraction that is done.
-        **options: of ``work_precision``: ``methods``, ``steps``, ``tolerances``, ``peers``.
+        progress: a function that is called with the fraction that is done.
+        **options: arguments of ``work_precision``: ``methods``, ``steps``, ``tolerances``, ``peers``.
 
     Raises:
         ArgumentError: what was given and what was expected.

@@ -13,24 +13,24 @@ from .style import GREY, Figure, page
 
 #: Subplots in a row, and the height of one, and of the title, in inches.
 ACROSS, EACH, HEAD = 3, 4.3, 1.35
-#: Where each scene has two.
+#: Subplots in a row if each scene has two.
 ACROSS_PAIRS = 4
 
 WIDTH = 16.0
 
-#: What is not named.
+#: The note on curves without a name.
 PALE_IS = "Pale: never the cheapest."
 
-#: Who is the cheapest in fewer cases than this share leads by luck.
+#: A method that is the cheapest in less than this fraction of the cases leads by luck.
 HALF = 0.5
 
-#: Errors for which it is counted who is the cheapest.
+#: The numbers of digits for which the cheapest method is counted.
 DIGITS = range(1, 13)
 
 
 def draw(panel: Panel, error: str) -> Figure:
     """Draw the charts on a new figure."""
-    # A right energy does not make a motion right: the energy error has the state error beside it.
+    # A correct energy does not imply a correct motion, so the energy error has the state error beside it.
     kinds = ("energy_error", "state_error") if error == "energy_error" else (error,)
     each = [(chart, kind) for chart in panel.charts for kind in kinds]
     across = min(ACROSS_PAIRS if len(kinds) > 1 else ACROSS, len(each))

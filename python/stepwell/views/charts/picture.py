@@ -21,13 +21,13 @@ from .style import GREY, PALE, Axes, Figure, look, page, peer_look
 #: Orders for which a slope is drawn.
 SLOPES = (1, 2, 4)
 
-#: Letters in a line below the panels.
+#: The most letters of a line below the panels.
 NOTE = 190
 
-#: The strip of runs without a right digit, as a share of the height of the panels.
+#: The height of the strip of runs without a correct digit, as a fraction of that of the panels.
 STRIP = 0.1
 
-#: What the errors are called on an axis.
+#: The names of the errors on an axis.
 ERRORS = {
     "state_error": "largest state error of the run, relative",
     "end_error": "state error at the end of the run, relative",
@@ -57,9 +57,10 @@ def draw(chart: WorkPrecision, error: str, time: str) -> Figure:
 
 
 def look_of(chart: WorkPrecision, curve: Curve) -> dict[str, Any]:
-    """Keywords for a line: by tolerance a method's marker is hollow and its line dash-dotted; fused it is dotted, and small.
+    """Keywords for a line.
 
-    In float32 it is dashed.
+    With a tolerance a method's marker is hollow and its line dash-dotted; with fused multiply-adds the line is dotted and the
+    marker small; in float32 the line is dashed.
     """
     if isinstance(curve.method, Peer):
         others = [each.method.name for each in chart.curves if isinstance(each.method, Peer)]
@@ -73,10 +74,10 @@ def look_of(chart: WorkPrecision, curve: Curve) -> dict[str, Any]:
 
 
 def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> list[str]:
-    """Below, what has a digit right: error against cost. Above, one row for each method, what has none.
+    """The panels: below, error against cost of points with a correct digit; above, a row for each method, of those without one.
 
-    A right energy does not make a motion right, so the energy error has the state error beside it, and not the measured time.
-    Returns the names for which there was no room.
+    A correct energy does not imply a correct motion, so the energy error has the state error beside it, and not the measured
+    time. Returns the names for which there was no space.
     """
     beside = error == "energy_error"
     other_error, other_cost = ("state_error", "evaluations") if beside else (error, time)
@@ -126,7 +127,7 @@ def draw_errors(axes: Axes, chart: WorkPrecision, error: str, cost: str) -> None
     front = chart.front(error, cost)
     for i, curve in enumerate(chart.curves):
         y = [point.error(error) if point.usable else math.nan for point in curve.points]
-        # Markers at different rungs, so that curves that fall together are still seen to be two.
+        # Markers at different rungs, so that two curves that coincide remain visible.
         axes.plot(curve.costs(cost), y, markevery=(2 * i % 5, 5), **muted(chart, curve, front))
     axes.plot([row["cost"] for row in front], [row["error"] for row in front], **FRONT)
     errors = [point.error(error) for curve in chart.curves for point in curve.usable if point.error(error) > 0.0]
@@ -147,7 +148,7 @@ def muted(chart: WorkPrecision, curve: Curve, front: list[dict[str, Any]]) -> di
 
 
 def name_curves(axes: Axes, chart: WorkPrecision, error: str, cost: str, size: float, *, all_of_them: bool = True) -> list[str]:
-    """The names of the curves of the front, or of all, beside them; returned are those for which there was no room."""
+    """Write the names of the curves of the front, or of all, beside them; returns those for which there was no space."""
     front = chart.front(error, cost)
     leading = {row["method"] for row in front}
     labels = []
@@ -180,12 +181,12 @@ def finding(chart: WorkPrecision, error: str = "state_error") -> str:
 
 
 def family_of(name: str) -> str:
-    """The name of a curve's method, without how its steps were chosen."""
+    """The name of a curve's method alone."""
     return name.split(",")[0]
 
 
 def with_way(cheapest: Sequence[str], ways: Sequence[str]) -> str:
-    """The title of a method; with how its steps were chosen if the chart has several ways and these curves share one."""
+    """The title of a method, with the choice of its steps if the chart has several and these curves share one."""
     first = cheapest[0]
     title = title_of(family_of(first))
     if len(set(ways)) < 2 or set(cheapest) != {first}:
@@ -209,7 +210,7 @@ def _spreads(axes: Axes, chart: WorkPrecision, time: str) -> None:
 
 
 def _wrong(strip: Axes, chart: WorkPrecision, cost: str) -> None:
-    """A mark at each step that leaves no digit right, and the method's own marker where it becomes unstable."""
+    """A mark at each step without a correct digit, and the method's own marker where it becomes unstable."""
     for row, curve in enumerate(chart.curves):
         style = look_of(chart, curve) | {"linestyle": "", "markersize": 5.0}
         costs = list(zip(curve.costs(cost), curve.points, strict=True))
@@ -280,5 +281,5 @@ def _text(figure: Figure, chart: WorkPrecision, error: str, time: str, unnamed: 
 
 
 def known_to(chart: WorkPrecision) -> str:
-    """The words that a chart ends where the true motion is no longer known, if it does."""
+    """The note that a chart ends where the true motion is no longer known, if it does."""
     return ", as far as the true motion is known" if chart.cut else ""

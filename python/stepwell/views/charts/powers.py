@@ -1,4 +1,4 @@
-"""Powers against steps: cost and error of n steps of a linear system, made one by one or by a power of P (§4)."""
+"""Powers against steps: cost and error of n steps of a linear system, one by one or by a power of P (§4)."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from ...model.systems.base import a_system
 from ...runs.integration import integrate
 from ...runs.result import Run
 
-#: Forms that are compared, in the order of the legend.
+#: The compared forms, in the order of the legend.
 FORMS: tuple[RunForm, ...] = ("direct", "matrix", "power")
 
 #: Numbers of steps, by default.
 STEPS = tuple(10**k for k in range(8))
 
-#: Each run is repeated so often, and the median taken.
+#: The number of repeats of each run, whose median counts.
 REPEATS = 5
 
-#: Digits after the point, in bits, of the numbers in which the exact states are computed.
+#: The binary digits after the point of the numbers in which the exact states are computed.
 BITS = 320
 
 
@@ -56,7 +56,7 @@ class Powers(Drawn, Table, ValueEquality):
         seconds: measured median of the repeats, by form, each of shape (n,).
         errors: distance from the method's exact state after as many steps, divided by the longest exact state so far, by
             form, each of shape (n,).
-        isa: the CPU level at which it was measured.
+        isa: the CPU level of the measurements.
     """
 
     system: System
@@ -107,12 +107,12 @@ def powers(
 
     Args:
         method: its name, or what ``stepwell.method`` returns.
-        system: a linear system of one member, whose inputs are left out; the undamped oscillator if None.
+        system: a linear system of one member, whose inputs are omitted; the undamped oscillator if None.
         v: velocity block at the start.
         y: coordinate block at the start.
         dt: the step, in units of time, above zero.
         steps: numbers of steps.
-        progress: is called with the fraction that is done.
+        progress: a function that is called with the fraction that is done.
 
     Returns:
         A ``Powers``.
@@ -193,7 +193,7 @@ class _Exact:
         return self.states[n]
 
     def length(self, n: int) -> float:
-        """The length of the exact coordinates and velocities, or of their replacement."""
+        """The length of the exact slots, which are coordinates and velocities, or what the method carries in their place."""
         return _length(self.state(n))
 
     def distance(self, n: int, run: Run) -> float:

@@ -1,4 +1,4 @@
-"""The picture of an analysis: where the eigenvalues of a step are, and where those of the exact solution are."""
+"""The picture of an analysis: the eigenvalues of a step and those of the exact solution."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .style import FAMILIES, GREY, Figure, family, page
 if TYPE_CHECKING:
     from ...analysis.stability.analysis import Analysis
 
-#: The z-plane is shown up to this distance from 0, and no less of it than that.
+#: The largest and the smallest distance from 0 up to which the z-plane is shown.
 FARTHEST, NEAREST = 3.0, 1.25
 
-#: Up to so many members the exact eigenvalues are drawn, too.
+#: The most members for which the exact eigenvalues are drawn, too.
 EXACT_UP_TO = 200
 
 
@@ -72,7 +72,7 @@ def finding(analysis: Analysis) -> str:
 
 
 def _notes(analysis: Analysis, z: np.ndarray[Any, Any], reach: float) -> list[str]:
-    """The largest eigenvalue in numbers, and how many are outside the picture."""
+    """The largest eigenvalue in numbers, and the number of eigenvalues outside the picture."""
     inside = "Eigenvalues z of a step. Inside the grey unit circle a mode decays, outside it grows."
     if np.asarray(analysis.stable).ndim:
         text = "Exact: e^(λ·dt)." if z.shape[1] <= EXACT_UP_TO else ""

@@ -1,4 +1,4 @@
-"""What the picture of a run shows, as data: series over time, points on a plane, and coordinates side by side.
+"""The panels of the picture of a run as data: series over time, points on a plane, and coordinates side by side.
 
 The picture, the frames of an animation and the page each draw these.
 """
@@ -16,7 +16,7 @@ from .kinds import FixedPoint
 from .runs import LARGEST, RunPicture
 from .solids import viewed
 
-#: How many saved states a curve may have to be drawn with a mark at each: of a swing, of an angle.
+#: The most saved states of a curve with a mark at each state: of a swing, and of an angle.
 MOST_MARKED, MOST_MARKED_ANGLES = 150, 250
 
 #: The angular velocities: name, colour and dashes.
@@ -36,7 +36,7 @@ FARTHEST_BEFORE = 1e14
 #: The view ends at this many times the size of the exact motion; without one, at this many times that of the start.
 VIEW_FACTOR, VIEW_FACTOR_FROM_START = 4.0, 30.0
 
-#: From where points that fall are seen: degrees from the first axis, and above the horizontal.
+#: The direction from which falling points are seen: degrees from the first axis, and above the horizontal.
 FALLING = viewed(-60.0, 15.0)
 
 
@@ -91,7 +91,7 @@ def _swing(chart: RunPicture, name: str, block: Array, exact: Array | None) -> S
 
 
 def seen_size(values: Array, known: Array) -> float:
-    """The size up to which values are shown: of those that are known to be right, or up to three times as much."""
+    """The size up to which values are shown: between that of the known exact values and three times as much."""
     right, size = float(np.nanmax(np.abs(known))), float(np.nanmax(np.abs(values)))
     return min(3.0 * right, max(right, size)) or size
 
@@ -179,7 +179,7 @@ def _error(chart: RunPicture, name: str, error: Array | None, before: Array | No
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points on a plane, and the square of it that is seen."""
+    """Points on a plane, and the visible square."""
 
     places: Array  # of the saved states, shape (saved, points, 2)
     exact: Array | None  # at the times of RunPicture.exact
@@ -189,7 +189,7 @@ class Points:
     name: str = ""  # from where it is seen, in space
 
     def leave(self, half: float) -> bool:
-        """Whether a point goes farther from the centre than that."""
+        """Whether a point goes further from the centre than half the side of the square."""
         return bool((np.abs(self.places - self.centre) > half).any())
 
 

@@ -68,7 +68,7 @@ def draw_body(figure: Figure, chart: RunPicture) -> list[str]:
 
 
 def _about_body(chart: RunPicture, axis: int) -> str:
-    """What is drawn, and which way is up."""
+    """The note on the drawn axis, and on which way is up."""
     system: Any = chart.run.system
     free = system.centre is None
     drawn = "A box with the body's moments of inertia" if free else "A top, not to scale"
@@ -98,7 +98,7 @@ def draw_angles(figure: Figure, chart: RunPicture, place: Place) -> list[Axes]:
 
 
 def draw_solid(axes: Axes, solid: Solid) -> Turn:
-    """The body on a panel without scales, and what turns it by a rotation matrix: nearer parts cover the others."""
+    """Draw the body on a panel without scales, near parts above others; returns the function that turns it by a matrix."""
     from matplotlib.patches import Polygon
 
     screen = solid.screen
@@ -140,7 +140,7 @@ def _horizon(axes: Axes, screen: Screen) -> float:
 
 
 def _draw_axis(axes: Axes, solid: Solid) -> Turn:
-    """The axis of a body, and what turns it by a rotation matrix."""
+    """Draw the axis of a body; returns the function that turns it by a rotation matrix."""
     from matplotlib.patheffects import withStroke
 
     around = [withStroke(linewidth=4.6, foreground="white")]  # seen on a dark face, too
@@ -148,7 +148,7 @@ def _draw_axis(axes: Axes, solid: Solid) -> Turn:
     screen, reach = solid.screen, solid.reach
 
     def turn(matrix: Array) -> None:
-        # The rod ends at the body, whichever end that is, and is before or behind it.
+        # The rod ends at the body, at either end, and is before or behind it.
         tip = np.copysign(1.0, reach) * matrix[:, solid.axis]
         near = float(tip @ screen.near) > 0.0
         rod.set_data(*screen.flat(np.stack([abs(reach) * tip, REACH * tip])).T)
@@ -178,7 +178,7 @@ def _path(axes: Axes, screen: Screen, path: Array, colour: str | None, *, long: 
     """A path on the sphere, dashed where it is behind it; without a colour the exact one, below the others."""
     flat, front = screen.flat(path), path @ screen.near >= 0.0
     for side, dashes in ((front, "-"), (~front, (0, (2, 2)))):
-        # The point after a side's last belongs to it, too, so that there is no gap.
+        # The point after the last one of a side belongs to it, too, so that there is no gap.
         shown = side | np.append(False, side[:-1])
         line = np.where(shown[:, np.newaxis], flat, np.nan)
         if colour is None:
@@ -192,7 +192,7 @@ def _path(axes: Axes, screen: Screen, path: Array, colour: str | None, *, long: 
 
 
 def animate_aircraft(figure: Figure, chart: RunPicture) -> tuple[Callable[[int], None], list[Axes]]:
-    """What shows the aircraft of a saved state; and the panels of the angles beside it."""
+    """The function that shows the aircraft of a saved state, and the panels of the angles beside it."""
     solid = solid_of(chart)
     axes = figure.add_axes((0.012, 0.06, 0.5, 0.8))
     turn = draw_solid(axes, solid)
@@ -202,7 +202,7 @@ def animate_aircraft(figure: Figure, chart: RunPicture) -> tuple[Callable[[int],
 
 
 def animate_body(figure: Figure, chart: RunPicture) -> tuple[Callable[[int], None], list[Axes]]:
-    """What shows the body of a saved state with the trail of its axis; and the panels over time beside it."""
+    """The function that shows the body of a saved state with the trail of its axis, and the panels over time beside it."""
     solid = solid_of(chart)
     axes = figure.add_axes((0.012, 0.06, 0.5, 0.8))
     _sphere(axes, solid.screen)

@@ -28,7 +28,7 @@ FAMILIES = {
     "Dormand-Prince": "#10123a",
 }
 COLOURS = tuple(FAMILIES.values())
-#: What is not the finding.
+#: The colour of curves that are not the finding.
 PALE = "#b8b8b8"
 #: For a second, third and fourth method of one family.
 SECOND = ("#111111", "#666666", "#999999")
@@ -40,7 +40,7 @@ GREY = "#666666"
 #: The exact motion of a run, below all else.
 EXACT: dict[str, Any] = {"color": "#d4d4d4", "linewidth": 5.0, "zorder": 1, "solid_capstyle": "round"}
 
-#: A curve of more states than this is drawn thin and without dashes, and as pixels in files of lines.
+#: A curve of more states than this is drawn thin and without dashes, and as pixels in vector files.
 LONG_CURVE = 3000
 
 #: Where the panels of a run's picture are, as shares of width and height.
@@ -52,7 +52,7 @@ FONT: Any = {"font.size": 14.0, "axes.labelsize": 14.0, "legend.fontsize": 12.0}
 
 @contextmanager
 def page(width: float = 16.0, height: float = 9.0, **options: Any) -> Iterator[Figure]:
-    """A new figure, and what is drawn on it in the sizes of ``FONT``; options are matplotlib's."""
+    """A new figure, on which text has the sizes of ``FONT``; options are matplotlib's."""
     figure = new_figure(width, height)
     from matplotlib import rc_context
 
@@ -87,7 +87,7 @@ def apart(methods: Iterable[Method], method: Method) -> dict[str, Any]:
 
 
 def family(method: Method) -> str:
-    """Which of ``FAMILIES`` a method belongs to; one of which nothing else is known is a Runge-Kutta method."""
+    """The one of ``FAMILIES`` to which a method belongs; the default is the Runge-Kutta methods."""
     known = {"verlet": "leapfrog", "pefrl": "PEFRL", "dop853": "Dormand-Prince"}
     last = method.name.rsplit("_", 1)[-1]
     return {"euler": "Euler", "heun": "Heun", "leapfrog": "leapfrog"}.get(last, known.get(method.name, "Runge-Kutta"))

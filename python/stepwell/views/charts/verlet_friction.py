@@ -1,7 +1,7 @@
-"""What is not to be done: Verlet with friction, whose velocity it does not have (§8).
+"""Verlet with friction, a mistake: friction needs a velocity, and Verlet has none (§8).
 
-The document says that friction needs v and that Verlet has none. Its difference (y − y_prev)/h is a velocity of half a step ago.
-Stepwell refuses such systems for Verlet, so the steps of this figure are written here, and nowhere else.
+The difference (y − y_prev)/h is the velocity of half a step ago. Stepwell refuses such systems for Verlet, so the steps of this
+figure are written only here.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Block(ValueEquality):
     """A block that friction stops; arrays are of shape (steps + 1,).
 
     Attributes:
-        name: what moves.
+        name: its name.
         t: times.
         exact: true coordinates.
         false_euler: coordinates by False Euler.
@@ -52,7 +52,7 @@ class Block(ValueEquality):
 
 @dataclass(frozen=True, eq=False)
 class VerletFriction(Drawn, Table, ValueEquality):
-    """Verlet with the velocity of the secant, beside what is right.
+    """Verlet with the velocity of the secant, beside False Euler and the exact motion.
 
     A row for each time of each block.
 
@@ -70,7 +70,7 @@ class VerletFriction(Drawn, Table, ValueEquality):
     _painter = "draw_verlet_friction"
 
     def summary(self) -> list[dict[str, Any]]:
-        """A row for each block: where it is at the end, and how fast it still moves, in the mean over the last tenth."""
+        """A row for each block: its coordinate at the end, and its mean speed over the last tenth."""
         rows = []
         for block in self.blocks:
             tenth = max(1, len(block.t) // 10)
@@ -90,9 +90,9 @@ class VerletFriction(Drawn, Table, ValueEquality):
 
 
 def verlet_friction(dt: Any = 1 / 60) -> VerletFriction:
-    """Step Verlet with friction by the velocity of its secant, which is not to be done: it never comes to rest (§8).
+    """Step blocks with friction by Verlet and the velocity of its secant, a mistake: they never come to rest (§8).
 
-    The blocks are those of the scenes ``sliding_block`` and ``sticking_block``. False Euler, which has a velocity, stands beside.
+    The blocks are those of the scenes ``sliding_block`` and ``sticking_block``. False Euler, which has a velocity, is compared.
 
     Args:
         dt: the step in units of time, above zero and at most 0.1.
@@ -101,7 +101,7 @@ def verlet_friction(dt: Any = 1 / 60) -> VerletFriction:
         A ``VerletFriction``: ``.plot()`` draws it.
 
     Raises:
-        ArgumentError: what is wrong with ``dt``.
+        ArgumentError: what was given and what was expected.
 
     Example:
         >>> chart = sw.charts.verlet_friction()
@@ -129,7 +129,7 @@ def _block(name: str, scene: Any, until: float, dt: float) -> Block:
 
 
 def secant_verlet(acceleration: Any, v: float, y: float, dt: float, steps: int) -> Array:
-    """Verlet, with an acceleration of y and of y − y_prev, which is not to be done; coordinates of shape (steps + 1,).
+    """Coordinates by Verlet with an acceleration of y and y − y_prev, the mistake of this figure; shape (steps + 1,).
 
     It starts as Verlet does in second order, y_prev = y − h·v + ½h²·a, with the true velocity in a.
     """

@@ -1,4 +1,4 @@
-"""The picture of Verlet with friction by the secant: where blocks end, and how much of its stability is left with drag."""
+"""The picture of Verlet with friction by the secant: the ends of the motions, and the stability limit with drag."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LINES: dict[str, Any] = {
     "verlet": {"color": FAMILIES["leapfrog"], "linewidth": 1.8, "label": "Verlet, v = (y − y_prev)/h"},
 }
 
-#: What is shown of each block: the end of its way.
+#: The part of each block's motion that is shown: its end.
 VIEWS: Any = ({"xlim": (0.3, 5.0), "ylim": (0.78, 0.94)}, {"xlim": (8.0, 40.0), "ylim": (-0.1, 0.1)})
 TITLES = ("y of a block that slides", "y of a block on a spring")
 

@@ -26,13 +26,13 @@ from ...model.systems import Oscillator
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: The default grid has so many angles in each unit of Φ, so that round values are among them.
+#: The number of angles in each unit of Φ of the default grid, so that it has round values.
 RUNGS = 200
 
 #: The largest Φ, in rad: it is far past every limit, and a picture of a wider range would show nothing.
 MAX_PHI = 100.0
 
-#: It goes past the largest limit by at least this factor.
+#: The default grid goes past the largest limit by at least this factor.
 LIMIT_MARGIN = 1.1
 
 #: The kinds of pictures.
@@ -73,12 +73,12 @@ class Locus(ValueEquality):
 
     @property
     def samples_per_period(self) -> float:
-        """More steps per period than this are needed, 2π/limit; infinite for never."""
+        """The least steps per period, 2π/limit; infinite if it is never stable."""
         return 2.0 * math.pi / self.limit if self.limit else math.inf
 
     @property
     def leaves(self) -> str | None:
-        """What the samples do past the limit, or None if there is none."""
+        """The behaviour of the samples past the limit, or None without a limit."""
         return None if self.limit.mode is None else self.limit.mode.kind
 
     @property
@@ -180,14 +180,14 @@ def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None)
 
 
 def within(argument: str, phi: float) -> float:
-    """Return an angle per step that is small enough to be drawn."""
+    """An angle per step, checked to be small enough for a picture."""
     if phi > MAX_PHI:
         raise ArgumentError(f"{argument}: expected {MAX_PHI:g} rad a step or less, which is far past every limit, got {phi:g}")
     return phi
 
 
 def largest(limits: Sequence[float]) -> float:
-    """A round angle past all limits, and past 2, to which every Euler method is worth seeing."""
+    """A round angle past all limits, and past 2, up to which every Euler method is interesting."""
     return math.ceil(2.0 * LIMIT_MARGIN * max([2.0, *filter(math.isfinite, limits)])) / 2.0
 
 
