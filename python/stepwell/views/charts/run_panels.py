@@ -91,7 +91,7 @@ def _swing(chart: RunPicture, name: str, block: Array, exact: Array | None) -> S
 
 
 def seen_size(values: Array, known: Array) -> float:
-    """The size up to which values are shown: between that of the known exact values and three times as much."""
+    """The size up to which values are shown: their own, but at least that of the exact values and at most three times that."""
     right, size = float(np.nanmax(np.abs(known))), float(np.nanmax(np.abs(values)))
     return min(3.0 * right, max(right, size)) or size
 
@@ -189,7 +189,7 @@ class Points:
     name: str = ""  # from where it is seen, in space
 
     def leave(self, half: float) -> bool:
-        """Whether a point goes further from the centre than half the side of the square."""
+        """Whether a point leaves the square whose sides have this distance from the centre."""
         return bool((np.abs(self.places - self.centre) > half).any())
 
 

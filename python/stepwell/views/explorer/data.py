@@ -1,4 +1,4 @@
-"""A scene as the page has it: numbers and texts, and its steps by every method, packed."""
+"""The data of a scene for the page: numbers and texts, and its steps by every method, packed."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from ...source.exports import export
 from ..charts.style import look
 from . import sliders, systems
 
-#: The methods that may make the run with small steps that errors are measured by, the first that can step the scene.
+#: The methods for the run with small steps that is the reference for errors; the first that can step the scene is used.
 TRUTH_METHODS = ("dop853", "rk4", "standard_heun")
 
 #: The class in an exported module; what the page needs from all of them.
 CLASS = "step"
 
-#: How many states give the size of a motion, the most steps of the run that finds them, and the share of extreme values to
-#: either side for which pictures have no room.
+#: The number of states that give the size of a motion, the most steps of their run, and the fraction of extreme values on either
+#: side that pictures leave out.
 SAMPLES, MAX_SIZE_STEPS, SHARE_LEFT_OUT = 1000, 20_000, 0.005
 
 #: The longest step that goes into a page, in characters.
@@ -44,7 +44,7 @@ def of_method(method: Method) -> dict[str, Any]:
 
 
 def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
-    """What the page has of a scene.
+    """The data of a scene for the page.
 
     Raises:
         UnsupportedError: if none of the methods can step it, or its steps are too long for a page.
@@ -144,7 +144,7 @@ def packed(sources: list[str]) -> str:
 
 
 def sizes(scene: Scene) -> dict[str, Any]:
-    """How large the motion is: of the exact solution where there is a formula, else of a run by Runge-Kutta.
+    """The size of the motion, from the exact solution where there is a formula, else from a run by Runge-Kutta.
 
     ``scales`` are the largest lengths of v and y, in which errors are measured; ``ranges`` the least and largest value of each
     number of a block, for the axes of pictures.

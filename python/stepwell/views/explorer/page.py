@@ -63,12 +63,12 @@ def explore(scenes: Any = None, *, methods: Any = None) -> Explorer:
         'kepler.html'
     """
     page = Explorer(tuple(_scenes(scenes)), tuple(chosen_methods(methods)))
-    _ = page.data  # so that what cannot be shown is an error here
+    _ = page.data  # raises here for a scene that cannot be shown
     return page
 
 
 def offered() -> list[Scene]:
-    """The scenes of a page for which none are named."""
+    """The scenes of a page by default."""
     known = {each.name: each for each in (*scenes(), sliders.rope())}
     return [known[name] for name in sliders.OFFERS]
 
@@ -92,7 +92,7 @@ class Explorer(ValueEquality):
     """A page with scenes and methods. ``save`` it, ``open`` it, or let a notebook show it.
 
     Attributes:
-        scenes: the scenes that it offers, the first is shown at first.
+        scenes: the scenes that it offers; it begins with the first.
         methods: the methods that it offers.
 
     Example:
@@ -106,7 +106,7 @@ class Explorer(ValueEquality):
 
     @cached_property
     def data(self) -> dict[str, Any]:
-        """What the page is filled with: its methods, and its scenes with their steps, as numbers and texts.
+        """The data of the page: its methods, and its scenes with their steps, as numbers and texts.
 
         Raises:
             UnsupportedError: if no method steps one of the scenes, or its steps are too long for a page.

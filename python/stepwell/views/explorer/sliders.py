@@ -1,4 +1,4 @@
-"""What the page offers of each built-in scene: sliders, speed, the exact solution if the page has its formula.
+"""The controls that the page offers for each built-in scene: sliders, speed, the exact solution if the page has its formula.
 
 A slider sets numbers by their *paths*: ``m.omega`` a parameter of the exported step, ``m.Gm[1]`` an element of one, ``m.mass[*]``
 all of one; ``e.`` likewise of the energy, ``v`` and ``y`` of the start. Each is set to the slider's value times a factor.
@@ -22,11 +22,11 @@ class Slider:
 
     Attributes:
         name: its name in a link and in formulas of the page.
-        label: what is written beside it.
+        label: the text beside it.
         low: its least value.
         high: its largest value.
         targets: the paths of the numbers that it sets, each with a factor.
-        relative: whether it multiplies what these numbers are in the scene; it is 1 then at first.
+        relative: whether it multiplies the numbers of the scene; it then begins at 1.
         about: a sentence, shown as a hint.
     """
 
@@ -41,14 +41,14 @@ class Slider:
 
 @dataclass(frozen=True)
 class Offer:
-    """What the page offers of a scene.
+    """The controls that the page offers for a scene.
 
     Attributes:
-        sliders: what may be changed.
+        sliders: the sliders.
         rate: units of time that pass in a second; None for a twentieth of the horizon.
         truth: the exact solution among those that the page has formulas for, or None: a run with small steps.
         limit: how the page finds the stability limit: "oscillator" and "chain" by the method's own, "scan" by the roots; or None.
-        phase: which phase plane is shown at first.
+        phase: the phase plane with which the page begins.
     """
 
     sliders: tuple[Slider, ...] = ()
@@ -196,14 +196,14 @@ LINKS: dict[str, dict[str, tuple[tuple[str, float], ...]]] = {
     "springs": {name: ((f"e.{name}{{}}", 1.0),) for name in ("stiffness", "rest", "masses", "gravity")},
 }
 
-#: The longest list of which each element has a slider, and the most sliders that are made without being asked for.
+#: The longest list whose elements have a slider each, and the most sliders by default.
 MAX_ELEMENTS, MAX_SLIDERS = 4, 12
 
 
 def generic(system: Any, parameters: Mapping[str, Any], controlled: bool) -> tuple[Slider, ...]:
     """Sliders for the parameters of any step: numbers, elements of short lists, and long lists as a whole.
 
-    Under a control only its gain can be slid: the energy that it keeps is that of the start with the other parameters as they
+    Under a control only its gain has a slider, since its target energy is that of the start with the other parameters as they
     are.
     """
     links = _links(system)

@@ -1,4 +1,4 @@
-"""What the page draws of a system: its motion, its energy, and the pairs of numbers that span a phase plane."""
+"""The pictures of a system on the page: its motion, its energy, and the pairs of numbers that span a phase plane."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_PHASE_POINTS = 6
 
 
 def motion(system: System) -> dict[str, Any]:
-    """How the page draws the motion: a kind, and what that kind needs."""
+    """The picture of the motion: its kind, and the data that this kind needs."""
     match system.kernel:
         case "oscillator" if not system.v_shape:
             return {"kind": "spring" if float(system.omega) else "block"}  # type: ignore[attr-defined]
@@ -96,7 +96,7 @@ def energy(system: Any) -> dict[str, Any] | None:
     return None
 
 
-#: What the points or numbers of a block are called, by the system's kernel.
+#: The names of the points or numbers of a block, by the system's kernel.
 OWNERS = {"nbody": "body", "chain": "mass"}
 
 #: Systems of a single point whose blocks have no axis for points.
@@ -104,7 +104,7 @@ SINGLE_POINTS = ("pendulum_3d", "restricted_three_body")
 
 
 def phase_planes(system: System) -> list[dict[str, Any]]:
-    """The pairs that a phase plane may have: a label, and block, index and symbol of what goes to the right and up."""
+    """The possible pairs of a phase plane: a label, and for each axis the block, the index and the symbol of its number."""
     v_shape, y_shape = system.v_shape, system.y_shape
     if system.kernel == "rigid_body":
         return [_plane(f"ω{a}", ("v", a - 1), f"ω{b}", ("v", b - 1)) for a, b in ((1, 2), (2, 3), (3, 1))]

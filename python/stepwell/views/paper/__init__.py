@@ -24,10 +24,10 @@ KINDS = ("demand", "formula", "algorithm", "program", "figure", "advice", "warni
 
 
 class Finding(NamedTuple):
-    """What running a statement gives.
+    """The result of running a statement.
 
     Attributes:
-        holds: whether stepwell gives what the entry says; where the document is wrong, what the entry says instead.
+        holds: whether stepwell confirms the entry, or its correction where the document is wrong.
         numbers: the numbers that show it, in a few words.
     """
 
