@@ -85,13 +85,13 @@ class Variational(System):
 
     def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
         """The operations of all rates, and the parameters of the system."""
-        values = {name: value for name, value in self.equation_parameters(batch).items() if name != RATES and not callable(value)}
+        values = {name: value for name, value in self.own_parameters(batch).items() if name != RATES and not callable(value)}
         return [(RATES, self._core), *flat(values, batch)]
 
     def reference_at_step(self, h: float, batch: Shape) -> Any:
         """The rates by NumPy."""
         tracer = Tracer(self.of, _core.Tape())
-        for value in self.equation_parameters(batch).values():
+        for value in self.own_parameters(batch).values():
             tracer.symbols(value, batch)  # which collects their numbers
         evaluation = Evaluation(self._tape, self._rates, dict(enumerate(tracer.numbers)), tracer.tables)
         return _Rates(h, evaluation, maps.size(self.of)[0])
