@@ -113,7 +113,7 @@ class Batch:
 
 
 def in_turns(runs: Mapping[str, Timed], effort: Effort, members: int) -> dict[str, list[float]]:
-    """Nanoseconds per step and member of each run, several times; the first time is of when its number of steps was chosen."""
+    """Nanoseconds per step and member of each run, of all repeats; the first is from the choice of its number of steps."""
     begun = time.perf_counter()
     sizes: dict[str, int] = {}
     times: dict[str, list[float]] = {}

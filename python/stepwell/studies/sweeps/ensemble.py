@@ -52,9 +52,9 @@ WORDS: dict[str, type[Outcome]] = {
 }
 #: Default of ``memory``, in bytes.
 MEMORY = 64 * 2**20
-#: Most members of a chunk by default: enough that a call costs little beside their steps.
+#: The most members of a chunk by default: enough that a call costs little beside their steps.
 MAX_MEMBERS = 1 << 14
-#: Likewise with a tolerance, where a chunk is made in pieces between the times of ``at`` only, so that Ctrl-C waits for it.
+#: Likewise with a tolerance, where a chunk has pieces only between the times of ``at``, and Ctrl-C waits for a piece.
 MAX_ADAPTIVE_MEMBERS = 1 << 11
 #: The least number of chunks for each worker, as long as each chunk has at least MIN_MEMBERS members.
 CHUNKS_OF_A_WORKER, MIN_MEMBERS = 4, 256

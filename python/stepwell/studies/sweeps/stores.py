@@ -22,9 +22,9 @@ from .outcomes import Results
 
 #: The group and the array of a store with the hashes of finished chunks.
 PROGRESS, HASHES = "progress", "hashes"
-#: Attributes of a store: what it is a sweep of, and the shape of its chunks.
+#: Attributes of a store: the description of its sweep, the shape of its chunks, and the hash of its results.
 SWEEP, CHUNK_SHAPE, BITS = "sweep", "chunk_shape", "bits"
-#: And, for xarray, which arrays are coordinates, and the order of the others.
+#: Attributes for xarray: the names of the coordinates, and the order of the results.
 COORDINATES, RESULTS = "coordinates", "results"
 
 #: The least numbers of a member, 8 bytes each: its status takes a byte, its first bad step eight, and there is at least one

@@ -10,7 +10,7 @@ WRONG = 2
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that says in words what it expected, and where that is explained."""
+    """A parser whose errors say what it expected, and where to find help."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)

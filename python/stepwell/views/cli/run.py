@@ -27,7 +27,7 @@ from . import options, show
 from .settings import scene_with
 from .verdict import verdict
 
-#: Without --every, about so many states are kept; more for a picture, whose curves are to be smooth.
+#: About how many states are saved without --every; more for a picture, whose curves should be smooth.
 KEPT, KEPT_TO_DRAW = 1000, 20_000
 
 #: With a tolerance the state is saved so often; more for a picture.
@@ -36,7 +36,7 @@ ADAPTIVE, ADAPTIVE_TO_DRAW = 100, 2000
 #: Digits of a number on the screen, and the most numbers of a block there.
 DIGITS, DIGITS_OF_AN_ERROR, MOST_SHOWN = 8, 3, 12
 
-#: What a number of the report is called on the screen, if not by its name.
+#: Names of numbers of the report on the screen that differ from those in JSON.
 NAMES = {"kept": "saved states"}
 
 NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")

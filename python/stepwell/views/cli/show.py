@@ -18,7 +18,7 @@ from .table import lines_of, width_of_terminal
 
 
 def print_json(value: Any) -> None:
-    """Print a value for other programs; what is not finite is null."""
+    """Print a value as JSON; numbers that are not finite become null."""
     print(json_text(value))
 
 
@@ -100,7 +100,7 @@ class Written:
         return [f"written: {', '.join(self.files)}"] if self.files else []
 
     def close(self) -> None:
-        """Raise the error that was kept."""
+        """Raise the stored error."""
         if self.error is not None:
             raise self.error
 

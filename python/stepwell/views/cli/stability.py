@@ -67,7 +67,7 @@ def command(args: argparse.Namespace) -> None:
 
 
 def _write(chart: Stability, folder: Path, kinds: list[str], top: float | None, written: show.Written) -> dict[str, str]:
-    """Write what was asked for; returns which methods have no map and why."""
+    """Write the drawings; returns the methods without a map, and why."""
     folder.mkdir(parents=True, exist_ok=True)
     for kind in kinds:
         if kind in KINDS:

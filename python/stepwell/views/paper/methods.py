@@ -20,7 +20,7 @@ from . import Finding, Section
 #: The angles per step at which closed forms are compared.
 ANGLES = np.linspace(0.05, 1.95, 39)
 
-#: What closed forms and analysis may differ by: some roundings of numbers of the size of Φ⁴.
+#: The largest difference between closed forms and analysis: some roundings of numbers of the size of Φ⁴.
 ROUNDING = 1e-13
 
 
@@ -178,7 +178,7 @@ figure(section_7, "false_euler", "Harmonic samples, a little too fast.", "harmon
     '`verlet`, with `start="first_order"`',
 )
 def verlet() -> Finding:
-    """The samples of both from the same start."""
+    """The samples of both methods from the same start."""
     options: dict[str, Any] = {"v": 0.4, "y": 1.0, "dt": 0.3, "steps": 200, "every": 1}
     one = quietly(Oscillator(), "verlet", start="first_order", **options).y
     other = quietly(Oscillator(), "false_euler", **options).y
@@ -325,7 +325,7 @@ def false_heun_equation() -> Finding:
     "From Φ = 1.2695 to √2 they are monotonic and stable.",
 )
 def false_heun_kinds() -> Finding:
-    """What they do in the three ranges."""
+    """The behaviour of the samples in the three ranges."""
     kinds = [str(at("false_heun", phi).kind) for phi in (1.2, 1.35, 1.45)]
     limit = float(stability_limit(Oscillator(), "false_heun"))
     holds = kinds == ["damped oscillation", "monotonic stable", "monotonic unstable"] and abs(limit - math.sqrt(2)) < 1e-9

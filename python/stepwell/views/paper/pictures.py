@@ -18,7 +18,7 @@ def paths(path: Path, title: str, about: str, panels: Sequence[tuple[str, Array]
 
     Args:
         path: the file.
-        title: what is to be seen.
+        title: its title.
         about: how it was made.
         panels: for each its title and the places, shape (saved, bodies, 2).
         reach: how far from the middle a panel shows.
