@@ -53,8 +53,8 @@ MISTAKES = [
     ("turn, lift = change.speed - speed, change.distance", "turn, lift = -change.speed - speed, change.distance"),
     # friction
     ("self.friction * turn", "self.friction * change.speed"),
-    ("kept = bits.where(sticks, 0.0, 1.0 - grip / fast)", "kept = 1.0 - grip / fast"),
-    ("kept = bits.where(sticks, 0.0, 1.0 - grip / fast)", "kept = bits.where(sticks, 0.0, 1.0 + grip / fast)"),
+    ("remaining = bits.where(sticks, 0.0, 1.0 - grip / fast)", "remaining = 1.0 - grip / fast"),
+    ("remaining = bits.where(sticks, 0.0, 1.0 - grip / fast)", "remaining = bits.where(sticks, 0.0, 1.0 + grip / fast)"),
     ("half = 0.5 * self.h", "half = self.h"),
     ("share = half * bits.where(bits.less(0.0, fast), fast / grip, 0.0)", "share = half"),
     ("shift = bits.where(sticks, way[i] - through * n, ", "shift = bits.where(sticks, 0.0 * n, "),
@@ -66,7 +66,7 @@ MISTAKES = [
     ("np.sqrt(most / square), 1.0)", "np.sqrt(square / most), 1.0)"),
     # what a method carries
     ("v0, v1 = steps.finish(s, choice, t, *before), steps.finish(s, choice, end, slot, y1)", "v0, v1 = before[0], slot"),
-    ("anew = steps.start(s, choice, end, v, y)", "anew = v"),
+    ("started = steps.start(s, choice, end, v, y)", "started = v"),
 ]
 
 #: One method of each kind: carried, on the parabola, the two kinds of the Euler family.

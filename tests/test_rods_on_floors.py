@@ -211,7 +211,7 @@ MISTAKES = [
     ("share = bits.where(sticks[k], 1.0, most / size)", "share = bits.where(sticks[k], 0.0, most / size)"),
     ("v = added(v, slide, p - shears[k][r])", "v = added(v, slide, p)"),
     # places
-    ("bits.where(held, at + half * (a + b), to)", "to"),
+    ("bits.where(at_rest, at + half * (a + b), to)", "to"),
     ("bits.where(each.change.rests, half, each.change.since)", "self.h"),
     ("y = added(y, slide, since * shear)", "pass"),
     ("for _ in range(ROUNDS):", "for _ in range(0):"),

@@ -73,11 +73,11 @@ def test_forces_are_those_of_the_formula_and_of_the_energy(given: dict[str, Any]
 #: What to replace in the reference, and by what.
 MUTANTS = [
     ("places[self.j] - places[self.i]", "places[self.i] - places[self.j]"),
-    ("push = self.held / divisor", "push = self.rest / divisor"),
-    ("push = (self.held - (self.damping", "push = (self.held + (self.damping"),
+    ("push = self.force_at_rest / divisor", "push = self.rest / divisor"),
+    ("push = (self.force_at_rest - (self.damping", "push = (self.force_at_rest + (self.damping"),
     ("(self.damping * along) * inverse) * inverse", "self.damping * along) * inverse"),
     ("(self.damping * along) * inverse) * inverse", "(self.damping * along) * inverse)"),
-    ("self.held = stiffness * rest", "self.held = rest"),
+    ("self.force_at_rest = stiffness * rest", "self.force_at_rest = rest"),
     ("along = along + w[:, c] * d[:, c]", "along = along + w[:, c] * w[:, c]"),
     ("(self.stiffness - push)[:, np.newaxis] * d", "(self.stiffness + push)[:, np.newaxis] * d"),
     ("sums[pushed] - forces[back]", "sums[pushed] + forces[back]"),

@@ -462,14 +462,14 @@ def run(
                 while pace.outlook(budget).runs.any():
                     before = pace.accepted
                     pace, v, y = attempt(pace, budget, v, y)
-                    if every and (kept := (pace.accepted > before) & (pace.accepted % every == 0.0)).any():
-                        steps.append((kept, pace.t, v, y))
+                    if every and (due := (pace.accepted > before) & (pace.accepted % every == 0.0)).any():
+                        steps.append((due, pace.t, v, y))
                     if jumps is not None:
                         pace = jumps.crossed(pace, series=series)
-                held = (pace.held > 0.0) & ~there
-                extra = pace._replace(extra=where(held, target - pace.t, 0.0))
-                pace, v1, y1 = attempt(extra, budget, v, y) if held.any() else (pace, v, y)
-                arrives = ~there & where(held, pace.held > 0.0, pace.t >= target)
+                waits = (pace.held > 0.0) & ~there
+                extra = pace._replace(extra=where(waits, target - pace.t, 0.0))
+                pace, v1, y1 = attempt(extra, budget, v, y) if waits.any() else (pace, v, y)
+                arrives = ~there & where(waits, pace.held > 0.0, pace.t >= target)
                 at_target = where(arrives, v1, at_target[0]), where(arrives, y1, at_target[1])
                 there |= arrives
                 if not pace.outlook(budget).runs.any():  # after an extra step that was rejected there are shorter ones
@@ -497,8 +497,8 @@ def attempt(
     An extra step that is accepted leaves the pace as it is. ``order`` is the one in which the error is estimated.
     """
     outlook = pace.outlook(budget)
-    made = tried(pair, system, pace.t, outlook.step, v, y)
-    return judged(pace, outlook, order, block_axes, acceptance, v, y, made)
+    trial = tried(pair, system, pace.t, outlook.step, v, y)
+    return judged(pace, outlook, order, block_axes, acceptance, v, y, trial)
 
 
 class Tried(NamedTuple):
@@ -538,19 +538,19 @@ def judged(
     acceptance: Acceptance,
     v: Array,
     y: Array,
-    made: Tried,
+    trial: Tried,
     *,
     rounding: float = ROUNDING,
 ) -> tuple[Pace, Array, Array]:
     """The pace after an attempt, and the state: the new one if the error is tolerated, and if there was a step to try."""
-    step, groups, v1, y1 = outlook.step, acceptance.groups, made.v, made.y
+    step, groups, v1, y1 = outlook.step, acceptance.groups, trial.v, trial.y
     old, new = sizes(v, y, block_axes, groups), sizes(v1, y1, block_axes, groups)
     least, bound = tolerated(pace, step, acceptance.counts(*numbers_in(v, y, block_axes)), old, new, rounding)
-    error = sizes(*made.errors[0], block_axes, groups)
+    error = sizes(*trial.errors[0], block_axes, groups)
     r = over(error, bound)
     # Of a coarse estimate e₃ of third order and one of fifth, the corrected one is e₅²/√(e₅² + 0.01·e₃²). Where rates jump, e₅
     # may be next to nothing by chance, so it is corrected only where the two are as of smooth rates: e₅ falls as e₃^(3/2).
-    for coarse in made.errors[1:]:
+    for coarse in trial.errors[1:]:
         second = sizes(*coarse, block_axes, groups)
         of_second, share = over(second, bound), over(second, longer(pace.longest, new))
         other = of_second / r
@@ -565,9 +565,9 @@ def judged(
         r = where(less(component(v1, y1, block_axes, row), 0.0), longer(r, OUTSIDE), r)
     rests = at_most(total(error) + total(absolute(new - old)), 0.0)
     following, goes_on = decided(pace, order > LOW, r, rests, least, outlook)
-    if made.work is not None:
-        following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + made.work, pace.work))
-    return following, *(where(goes_on, new, now) for new, now in zip(made.projected, (v, y), strict=True))
+    if trial.work is not None:
+        following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + trial.work, pace.work))
+    return following, *(where(goes_on, new, now) for new, now in zip(trial.projected, (v, y), strict=True))
 
 
 def decided(pace: Pace, high: bool, r: Any, rests: Any, new: Any, outlook: Outlook) -> tuple[Pace, Any]:

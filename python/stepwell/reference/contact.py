@@ -182,15 +182,15 @@ class Surface(ABC):
         slide = [v - speed * n for v, n in zip(v, normal, strict=True)]
         fast, grip = np.sqrt(dot(slide, slide)), self.friction * turn
         sticks = bits.at_most(fast, grip)
-        kept = bits.where(sticks, 0.0, 1.0 - grip / fast)
-        new_v = [kept * s + change.speed * n for s, n in zip(slide, normal, strict=True)]
+        remaining = bits.where(sticks, 0.0, 1.0 - grip / fast)
+        new_v = [remaining * s + change.speed * n for s, n in zip(slide, normal, strict=True)]
         new_y = [y + lift * n for y, n in zip(y, normal, strict=True)]
         if change.rests is None:
             return new_v, new_y
         half = 0.5 * self.h
         share = half * bits.where(bits.less(0.0, fast), fast / grip, 0.0)
         way = [(y0 - y) + share * v0 for y0, y, v0 in zip(step.y0, y, step.v0, strict=True)]
-        through, less = dot(way, normal), half * (1.0 - kept)
+        through, less = dot(way, normal), half * (1.0 - remaining)
         for i, n in enumerate(normal):
             shift = bits.where(sticks, way[i] - through * n, -(less * slide[i]))
             new_y[i] = bits.where(change.rests, new_y[i] + shift, new_y[i])
@@ -384,6 +384,8 @@ def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any) -> Any
     end, (slot, y1) = t + h, after
     v0, v1 = steps.finish(s, choice, t, *before), steps.finish(s, choice, end, slot, y1)
     touched, v, y = s.resolve((v0, before[1]), (v1, y1))
-    anew = steps.start(s, choice, end, v, y)
-    anew, kept = anew[s.free], slot[s.free]
-    return s.among(slot, bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], kept.shape), anew, kept)), y
+    started = steps.start(s, choice, end, v, y)
+    started, as_stepped = started[s.free], slot[s.free]
+    return s.among(
+        slot, bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], as_stepped.shape), started, as_stepped)
+    ), y

@@ -55,10 +55,10 @@ _active: ContextVar[Marks | None] = ContextVar("marks", default=None)
 @contextmanager
 def recording(marks: Marks | None = None) -> Iterator[Marks]:
     """Note functions that are called with symbols, in a new table or in this one. All symbols must be of one tape."""
-    kept: Marks = {} if marks is None else marks
-    before = _active.set(kept)
+    table: Marks = {} if marks is None else marks
+    before = _active.set(table)
     try:
-        yield kept
+        yield table
     finally:
         _active.reset(before)
 

@@ -67,13 +67,13 @@ class Drive:
 
     def power(self, step: Leap, n: int) -> Leap:
         """The leap of n steps, by repeated squaring."""
-        square, made = step, step if n & 1 else None
+        square, result = step, step if n & 1 else None
         while n := n >> 1:
             square = self.join(square, square)
             if n & 1:
-                made = square if made is None else self.join(made, square)
-        assert made is not None
-        return made
+                result = square if result is None else self.join(result, square)
+        assert result is not None
+        return result
 
 
 def one_step(p: Array, q: Array, inputs: Sequence[Constant | Sine], nodes: Sequence[float], drive: Drive) -> Leap:
@@ -81,12 +81,12 @@ def one_step(p: Array, q: Array, inputs: Sequence[Constant | Sine], nodes: Seque
     total = np.zeros((len(p), 1 + 2 * len(drive.waves), p.shape[-1]))
     for at_node, node in zip(q, nodes, strict=True):
         columns, wave = np.zeros_like(total), 1
-        for effect, given in zip(at_node, inputs, strict=True):
-            if isinstance(given, Sine):
-                columns[:, wave] = effect * given.amplitude
+        for effect, signal in zip(at_node, inputs, strict=True):
+            if isinstance(signal, Sine):
+                columns[:, wave] = effect * signal.amplitude
                 wave += 2
             else:
-                columns[:, 0] = columns[:, 0] + effect * given.value
+                columns[:, 0] = columns[:, 0] + effect * signal.value
         total = total + drive.later(columns, node * drive.h)
     return Leap(1, p, total)
 

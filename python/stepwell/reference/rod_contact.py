@@ -123,14 +123,14 @@ class RodContacts:
             v = self.consistent(contacts, impulses, turned, v)
             for points in self.groups:
                 self.limit(points, contacts, (v0, y0), (v1, y1), (v, y))
-        made = ((np.stack([x for each in block for x in each]), old) for block, old in zip((v, y), after, strict=True))
-        new_v, new_y = (new.reshape(*old.shape[: self.axes], *new.shape[1:]) for new, old in made)
+        pairs = ((np.stack([x for each in block for x in each]), old) for block, old in zip((v, y), after, strict=True))
+        new_v, new_y = (new.reshape(*old.shape[: self.axes], *new.shape[1:]) for new, old in pairs)
         return new_v, new_y
 
     def contacts(self, joined: Joined, factors: Factors, before: Any, after: Any) -> list[Contact]:
         """Each point with each surface."""
         (v0, y0), (v1, y1) = before, after
-        found, n, inverse = [], len(y0), self.rods.inverse
+        contacts, n, inverse = [], len(y0), self.rods.inverse
         for i in range(n):
             kick = [b - a for a, b in zip(v0[i], v1[i], strict=True)]
             lag = [(y1[i][c] - y0[i][c]) / self.h - 0.5 * (v0[i][c] + v1[i][c]) for c in range(len(kick))]
@@ -153,8 +153,8 @@ class RodContacts:
                     for row in rows:
                         row[-1] = row[-1] + HELD * inverse[i]
                     grip = factored(rows)
-                found.append(Contact(i, surface, place, change, touches, aim, low, column, give, yields, along, slides, grip))
-        return found
+                contacts.append(Contact(i, surface, place, change, touches, aim, low, column, give, yields, along, slides, grip))
+        return contacts
 
     def place(self, surface: Surface, i: int, y0: Vector, y1: Vector) -> Place:
         """Where a point is to a surface, with distances as exact as those of points that rods have moved."""
@@ -203,15 +203,16 @@ class RodContacts:
         y: list[Vector] = list(y1)
         half = 0.5 * self.h
         for points in self.groups:
-            held = None
+            at_rest = None
             for each, stuck in zip(contacts, sticks, strict=True):
                 if stuck is not None and each.point in points:
                     stays = each.touches & each.change.rests & stuck
-                    held = stays if held is None else held | stays
-            if held is not None:
+                    at_rest = stays if at_rest is None else at_rest | stays
+            if at_rest is not None:
                 for i in points:
                     y[i] = [
-                        bits.where(held, at + half * (a + b), to) for at, a, b, to in zip(y0[i], v0[i], v1[i], y[i], strict=True)
+                        bits.where(at_rest, at + half * (a + b), to)
+                        for at, a, b, to in zip(y0[i], v0[i], v1[i], y[i], strict=True)
                     ]
         for k, each in enumerate(contacts):
             since = bits.where(each.touches, bits.where(each.change.rests, half, each.change.since), 0.0)
@@ -256,12 +257,12 @@ class RodContacts:
                     v, impulses[k] = self.visit(each, impulses[k], v)
         return joined.corrected(factors, v, joined.closing(v))
 
-    def limit(self, points: list[int], contacts: list[Contact], before: Any, after: Any, made: Any) -> None:
+    def limit(self, points: list[int], contacts: list[Contact], before: Any, after: Any, state: Any) -> None:
         """No more energy of joined points than before the step, or after it without contact.
 
         What they have beyond is taken from their velocities. Where even at rest they would have more, they stay where they were.
         """
-        masses, (v, y) = self.rods.masses, made
+        masses, (v, y) = self.rods.masses, state
         fall = self.rods.gravity + self.rods.gravity
         touched = None
         for each in contacts:
@@ -283,6 +284,6 @@ class RodContacts:
         factor = bits.where(bits.less(most, square), np.sqrt(most / square), 1.0)
         for i in points:
             slowed = [bits.where(stays | rests, 0.0, factor * each) for each in v[i]]
-            kept = [bits.where(stays, at, each) for at, each in zip(before[1][i], y[i], strict=True)]
+            placed = [bits.where(stays, at, each) for at, each in zip(before[1][i], y[i], strict=True)]
             v[i] = [bits.where(touched, new, old) for new, old in zip(slowed, after[0][i], strict=True)]
-            y[i] = [bits.where(touched, new, old) for new, old in zip(kept, after[1][i], strict=True)]
+            y[i] = [bits.where(touched, new, old) for new, old in zip(placed, after[1][i], strict=True)]

@@ -36,10 +36,10 @@ def run(
     Returns:
         The slots at the end; both slots at ``saves``, step counts in ascending order; ``first_bad`` of this and earlier runs.
     """
-    kept = np.empty((len(saves), *v.shape), v.dtype), np.empty((len(saves), *y.shape), y.dtype)
+    saved = np.empty((len(saves), *v.shape), v.dtype), np.empty((len(saves), *y.shape), y.dtype)
     done = 0
     if saves[0] == 0:
-        kept[0][0], kept[1][0], done = v, y, 1
+        saved[0][0], saved[1][0], done = v, y, 1
     blocks = tuple(tuple(range(n)) for n in block_axes)
     with np.errstate(all="ignore"):
         for i in range(steps):
@@ -50,8 +50,8 @@ def run(
                 finite &= np.isfinite(velocity(t0 + (k + 1) * h, v, y)).all(axis=blocks[0])
             first_bad = np.where((first_bad < 0) & ~finite, k + 1, first_bad)
             if done < len(saves) and saves[done] == i + 1:
-                kept[0][done], kept[1][done], done = v, y, done + 1
-    return v, y, kept, first_bad
+                saved[0][done], saved[1][done], done = v, y, done + 1
+    return v, y, saved, first_bad
 
 
 def linear_step(

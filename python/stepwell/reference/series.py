@@ -43,15 +43,15 @@ class Book:
     """The numbers that change with time, each after those that it is made of, and the functions and branches among them."""
 
     def __init__(self) -> None:
-        self.made: list[Series] = []
+        self.series: list[Series] = []
         self.functions: dict[Any, Series] = {}
         self.branches: list[Branch] = []
 
     def advance(self, k: int) -> None:
         """The coefficients of order k of all, from those of lower orders and that of the state. Derivatives of functions join."""
         i = 0
-        while i < len(self.made):
-            each = self.made[i]
+        while i < len(self.series):
+            each = self.series[i]
             if k > 0 and each.rule is not None:
                 each.terms.append(each.rule(k))
             i += 1
@@ -71,7 +71,7 @@ class Series:
 
     def __init__(self, book: Book, start: Any, rule: Callable[[int], Term] | None, opposite: Series | None = None) -> None:
         self.book, self.terms, self.rule, self.opposite = book, [start], rule, opposite
-        book.made.append(self)
+        book.series.append(self)
 
     def __add__(self, other: Any) -> Any:
         if isinstance(other, np.ndarray):
@@ -153,15 +153,15 @@ class Series:
                 over.append(0.5 / root)
             pairs = None
             for j in range((k + 1) // 2 - 1, 0, -1):
-                pairs = _sum(pairs, _product(made.terms[j], made.terms[k - j]))
+                pairs = _sum(pairs, _product(series.terms[j], series.terms[k - j]))
             twice = _sum(pairs, pairs)
-            middle = None if k % 2 else _product(made.terms[k // 2], made.terms[k // 2])
+            middle = None if k % 2 else _product(series.terms[k // 2], series.terms[k // 2])
             rest = _difference(self.terms[k], _sum(middle, twice))
             return None if rest is None else rest * over[0]
 
-        made = Series(self.book, root, rule)
-        self.book.branches.append(Branch(made, 0.0, np.inf))
-        return made
+        series = Series(self.book, root, rule)
+        self.book.branches.append(Branch(series, 0.0, np.inf))
+        return series
 
     def __lt__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else Truth(self.book, self.terms[0] < _start(other))
@@ -239,12 +239,12 @@ def at_start(x: Any) -> Any:
     return _filled(numbers, x.shape)
 
 
-def among(given: Sequence[Any]) -> bool:
+def among(values: Sequence[Any]) -> bool:
     """Whether any of these is a series, or an array with one."""
     return any(
         isinstance(each, Series)
         or (isinstance(each, np.ndarray) and each.dtype == object and any(isinstance(item, Series) for item in each.flat))
-        for each in given
+        for each in values
     )
 
 
@@ -293,7 +293,7 @@ def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series, sign
     def rule(k: int) -> Term:
         known = None
         for j in range(1, k + 1):
-            known = _sum(known, _product(divisor.terms[j], made.terms[k - j]))
+            known = _sum(known, _product(divisor.terms[j], series.terms[k - j]))
         if sign:
             return None if known is None else -(known * start) if sign > 0 else known * start
         if not over:
@@ -301,21 +301,21 @@ def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series, sign
         rest = _difference(dividend(k), known)
         return None if rest is None else rest * over[0]
 
-    made = Series(divisor.book, start, rule)
-    return made
+    series = Series(divisor.book, start, rule)
+    return series
 
 
-def function(name: str, of_numbers: Callable[..., Any], plain: Callable[..., Any], given: Sequence[Any]) -> Any:
+def function(name: str, of_numbers: Callable[..., Any], plain: Callable[..., Any], arguments: Sequence[Any]) -> Any:
     """A marked function of series, number by number. ``plain`` is the function itself, ``of_numbers`` notes its marks."""
-    if any(isinstance(each, np.ndarray) for each in given):
-        return np.frompyfunc(lambda *each: function(name, of_numbers, plain, each), len(given), 1)(*given)
-    book = next((each.book for each in given if isinstance(each, Series)), None)
+    if any(isinstance(each, np.ndarray) for each in arguments):
+        return np.frompyfunc(lambda *each: function(name, of_numbers, plain, each), len(arguments), 1)(*arguments)
+    book = next((each.book for each in arguments if isinstance(each, Series)), None)
     if book is None:
-        return of_numbers(*given)
-    key = name, *map(_identity, given)
+        return of_numbers(*arguments)
+    key = name, *map(_identity, arguments)
     if key not in book.functions:
-        start = np.asarray(of_numbers(*map(_start, given)))[()]
-        book.functions[key] = of_function(Mark(name, tuple(given), plain), start, book)
+        start = np.asarray(of_numbers(*map(_start, arguments)))[()]
+        book.functions[key] = of_function(Mark(name, tuple(arguments), plain), start, book)
         if name in BRANCHES:
             book.branches.append(Branch(book.functions[key], *BRANCHES[name]))
     return book.functions[key]
@@ -367,7 +367,7 @@ def of_function(mark: Mark, start: Any, book: Book) -> Series:
 
     def rule(k: int) -> Term:
         if not by:
-            by.extend(factors(mark, made, [isinstance(each, Series) for each in mark.arguments]))
+            by.extend(factors(mark, series, [isinstance(each, Series) for each in mark.arguments]))
         total = None
         for argument, factor in zip(mark.arguments, by, strict=True):
             for j in range(1, k + 1) if factor is not None else ():
@@ -376,8 +376,8 @@ def of_function(mark: Mark, start: Any, book: Book) -> Series:
                 total = _sum(total, _product(slope, of_factor))
         return None if total is None else (1.0 / k) * total
 
-    made = Series(book, start, rule)
-    return made
+    series = Series(book, start, rule)
+    return series
 
 
 def coefficients(s: Any, order: int, t: Any, h: Any, v: Any, y: Any) -> list[tuple[Any, Any]]:
@@ -399,11 +399,11 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
     clocks = [(each, length) for each, length in np.broadcast(times, h)]
     rates = s.dv(times, *blocks), s.dy(times, *blocks)
     seeds = [each for block in blocks for each in block.flat]
-    found = [
+    slopes = [
         each for rate, block in zip(rates, blocks, strict=True) for each in np.broadcast_to(_objects(rate), block.shape).flat
     ]
     zero = t.number(0.0) if hasattr(t, "number") else 0.0
-    made = []
+    result = []
     for k in range(order):
         book.advance(k)
         by = None if k == 0 and _is(unit, 1.0) else unit * (1.0 / (k + 1))
@@ -411,30 +411,30 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
         if by is not None and np.ndim(by):
             by_each = [each for block in blocks for each in np.broadcast_to(by, block.shape).flat]
         terms = []
-        for seed, rate, factor in zip(seeds, found, by_each, strict=True):
+        for seed, rate, factor in zip(seeds, slopes, by_each, strict=True):
             known = rate.terms[k] if isinstance(rate, Series) else (None if k else rate)
             terms.append(known if known is None or factor is None else factor * known)
             seed.terms.append(terms[-1])
         for time, length in clocks:
             time.terms.append(length if k == 0 else None)
         numbers = [zero if term is None else term for term in terms]
-        made.append((_filled(numbers[: v.size], v.shape), _filled(numbers[v.size :], y.shape)))
-    return made, book.branches
+        result.append((_filled(numbers[: v.size], v.shape), _filled(numbers[v.size :], y.shape)))
+    return result, book.branches
 
 
 def _objects(x: Any) -> Any:
     """An array of objects."""
     if isinstance(x, np.ndarray):
         return x
-    made = np.empty((), dtype=object)
-    made[()] = x
-    return made
+    array = np.empty((), dtype=object)
+    array[()] = x
+    return array
 
 
 def _filled(numbers: list[Any], shape: tuple[int, ...]) -> Any:
     """An array of that shape: of objects, unless all are numbers."""
     if all(isinstance(each, (float, complex, np.number)) for each in numbers):
         return np.array(numbers, dtype=np.result_type(np.float64, *{type(each) for each in numbers})).reshape(shape)
-    made = np.empty(len(numbers), dtype=object)
-    made[:] = numbers
-    return made.reshape(shape)
+    array = np.empty(len(numbers), dtype=object)
+    array[:] = numbers
+    return array.reshape(shape)

@@ -121,9 +121,9 @@ class Held:
 
     def scaled(self, factor: Array) -> Held:
         """The same input, times a factor."""
-        held = copy(self)
-        held.factor = factor
-        return held
+        other = copy(self)
+        other.factor = factor
+        return other
 
 
 class Stepped:
@@ -196,10 +196,10 @@ class Curve:
         """The value at time t."""
         since = t - self.times.at(t)
         *others, value = self.coefficients
-        made: Any = value.at(t)
+        result: Any = value.at(t)
         for each in reversed(others):
-            made = made * since + each.at(t)
-        return made if self.factor is None else np.asarray(self.factor * made)
+            result = result * since + each.at(t)
+        return result if self.factor is None else np.asarray(self.factor * result)
 
     def scaled(self, factor: Array) -> Curve:
         """The same input, times a factor."""

@@ -10,12 +10,12 @@ Increments = list[tuple[Array, Array]]
 
 def stages(nodes: Weights, rows: Sequence[Weights], s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
     """The increments of both blocks, one stage after the other."""
-    found: Increments = []
+    increments: Increments = []
     for node, row in zip(nodes, rows, strict=True):
         at = t + node * h if node not in (0.0, 1.0) else t + h if node else t
-        vi, yi = plus(v, y, row, found) if row else (v, y)
-        found.append((s.dv(at, vi, yi), s.dy(at, vi, yi)))
-    return found
+        vi, yi = plus(v, y, row, increments) if row else (v, y)
+        increments.append((s.dv(at, vi, yi), s.dy(at, vi, yi)))
+    return increments
 
 
 def plus(v: Array, y: Array, weights: Weights, increments: Increments) -> Blocks:

@@ -157,10 +157,10 @@ class Tracer:
         """
         v, y, more = self.state()
         t, step, (self._values, more) = next(more), next(more), tee(more)
-        made = adaptive.tried(method.steps, self.attempted(backward=backward), t, step, v, y)
+        trial = adaptive.tried(method.steps, self.attempted(backward=backward), t, step, v, y)
         values = [next(more) for _ in self.tables]
-        results = [block for pair in ((made.v, made.y), *made.errors, made.projected) for block in pair]
-        return self.flat(v, y, t, step, *values, *results, 0.0 if made.work is None else made.work)
+        results = [block for pair in ((trial.v, trial.y), *trial.errors, trial.projected) for block in pair]
+        return self.flat(v, y, t, step, *values, *results, 0.0 if trial.work is None else trial.work)
 
     def begin(self, method: Any, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state, and the pace at the start of a run with a tolerance."""

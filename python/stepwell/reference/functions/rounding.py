@@ -117,16 +117,16 @@ def where(condition: Any, x: Any, y: Any) -> Any:
         ShapeError: their shapes do not broadcast.
     """
     names = ("condition", "x", "y")
-    given = tuple(map(as_array, names, (condition, x, y)))
-    shape_of(names, given)
-    if one_by_one(given):
-        return np.frompyfunc(where, 3, 1)(*given)
-    condition, x, y = given
+    arguments = tuple(map(as_array, names, (condition, x, y)))
+    shape_of(names, arguments)
+    if one_by_one(arguments):
+        return np.frompyfunc(where, 3, 1)(*arguments)
+    condition, x, y = arguments
     if is_symbol(condition):
         return condition.choose(lifted(condition, "x", x), lifted(condition, "y", y))
     if np.asarray(condition).dtype != bool:
         raise DTypeError(f"condition: expected a comparison or truths, got {type(condition).__name__} {short(condition)}")
-    symbol = symbol_of(given)
+    symbol = symbol_of(arguments)
     if symbol is not None:
         return lifted(symbol, "x", x) if condition else lifted(symbol, "y", y)
     return np.where(condition, numbers("x", x, finite=False), numbers("y", y, finite=False))[()]

@@ -17,11 +17,11 @@ class Equations:
     1972); the limited form uses gain/(1 + h·gain), as backward Euler would, for which no gain is too large.
     """
 
-    def __init__(self, h: float, /, **given: Any) -> None:
+    def __init__(self, h: float, /, **parameters: Any) -> None:
         self.h = np.asarray(h)
-        self.equations = given.pop("equations()")
-        self.gain, self.target = given.pop("control.gain", None), given.pop("control.target", None)
-        self.given = given
+        self.equations = parameters.pop("equations()")
+        self.gain, self.target = parameters.pop("control.gain", None), parameters.pop("control.target", None)
+        self.parameters = parameters
 
     def stretched(self, h: Any) -> "Equations":
         """The same, scaled to another step, which may be one for each member: what a limited control pushes depends on it."""
@@ -31,7 +31,7 @@ class Equations:
 
     def rates(self, t: float, v: Array, y: Array) -> tuple[Array, Array]:
         """v̇ and ẏ."""
-        rates: tuple[Array, Array] = self.equations.rates(t, v, y, self.given)
+        rates: tuple[Array, Array] = self.equations.rates(t, v, y, self.parameters)
         if self.gain is None:
             return rates
         push, along = self._push(v, y), self.gradient(v, y)
@@ -43,7 +43,7 @@ class Equations:
         gain = self.gain[()]
         if self.equations.limited:
             gain = gain / (1.0 + self.h[()] * gain)
-        off = self._invariant().value(v, y, self.given) - self.target[()]
+        off = self._invariant().value(v, y, self.parameters) - self.target[()]
         return where(square > 0.0, (gain * off) / square, 0.0)
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
@@ -64,17 +64,17 @@ class Equations:
 
     def energies(self, v: Array, y: Array) -> tuple[Any, Any, Any]:
         """Zero for h·v̇ and for the kinetic energy, and the invariant that is kept, times h."""
-        return None, None, self.h * self._invariant().value(v, y, self.given)
+        return None, None, self.h * self._invariant().value(v, y, self.parameters)
 
     def gradient(self, v: Array, y: Array, dv: Any = None) -> tuple[Array, Array, Any]:
         """The derivatives of the invariant that is kept by v and y, and the square of their length."""
-        along_v, along_y, square = self._invariant().gradient(v, y, self.given)
+        along_v, along_y, square = self._invariant().gradient(v, y, self.parameters)
         (own_v, own_y), (batch_v, batch_y) = self.equations.shapes, self.equations.batches(v, y)
         return stacked(along_v, own_v, batch_v), stacked(along_y, own_y, batch_y), square
 
     def record(self, name: str, v: Array, y: Array) -> Array:
         """An invariant of a state."""
-        value: Array = self.equations.invariants[name].value(v, y, self.given)
+        value: Array = self.equations.invariants[name].value(v, y, self.parameters)
         return value
 
 

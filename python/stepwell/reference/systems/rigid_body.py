@@ -35,8 +35,8 @@ class RigidBody:
         differences = (inertia[1] - inertia[2], inertia[2] - inertia[0], inertia[0] - inertia[1])
         self.gyration = [by * difference for by, difference in zip(self.by_inertia, differences, strict=True)]
         self.drag = None if damping is None else self.by_inertia * damping
-        given = [None] * 3 if torque is None else torque
-        self.torque = [None if each is None else each.scaled(by) for each, by in zip(given, self.by_inertia, strict=True)]
+        components = [None] * 3 if torque is None else torque
+        self.torque = [None if each is None else each.scaled(by) for each, by in zip(components, self.by_inertia, strict=True)]
         self.space_torque = space_torque
         self.moment = None if weight is None or centre is None else [weight * each for each in centre]
         self.gain = None if keeps != "control" or strength is None else h * strength

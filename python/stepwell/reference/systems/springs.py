@@ -17,17 +17,17 @@ class Ends(NamedTuple):
     second: tuple[Any, Any]
 
 
-def numbers_of(given: bytes | None) -> Any:
+def numbers_of(indices: bytes | None) -> Any:
     """A list of whole numbers."""
-    return np.frombuffer(given or b"", "<u4").astype(np.intp)
+    return np.frombuffer(indices or b"", "<u4").astype(np.intp)
 
 
 def in_order(pairs: Any, fixed: Any) -> list[Ends]:
     """The ends of springs at free particles: of every particle its first spring, then of every particle its second, and so on."""
     particles, ends = pairs.reshape(-1), np.arange(pairs.size)
-    held = np.zeros(particles.max() + 1, dtype=bool)
-    held[fixed[fixed < len(held)]] = True
-    ends = ends[~held[particles]]
+    is_fixed = np.zeros(particles.max() + 1, dtype=bool)
+    is_fixed[fixed[fixed < len(is_fixed)]] = True
+    ends = ends[~is_fixed[particles]]
     ends = ends[np.argsort(particles[ends], kind="stable")]  # particle by particle, each in the order of the springs
     _, begins, counts = np.unique(particles[ends], return_index=True, return_counts=True)
     turn = np.arange(len(ends)) - np.repeat(begins, counts)
@@ -65,7 +65,7 @@ class Springs:
     ) -> None:
         self.h = h
         self.masses, self.stiffness, self.rest, self.damping = masses, stiffness, rest, damping
-        self.held = stiffness * rest
+        self.force_at_rest = stiffness * rest
         ends = numbers_of(pairs).reshape(-1, 2)
         self.i, self.j = ends.T
         self.fixed = fixed_ones = numbers_of(fixed)
@@ -86,14 +86,14 @@ class Springs:
         length = np.sqrt(square(d))
         divisor = bits.where(bits.less(0.0, length), length, 1.0)
         if self.damping is None:
-            push = self.held / divisor
+            push = self.force_at_rest / divisor
         else:
             inverse = 1.0 / divisor
             w = self.across(v)
             along = w[:, 0] * d[:, 0]
             for c in range(1, d.shape[1]):
                 along = along + w[:, c] * d[:, c]
-            push = (self.held - (self.damping * along) * inverse) * inverse
+            push = (self.force_at_rest - (self.damping * along) * inverse) * inverse
         forces: Array = (self.stiffness - push)[:, np.newaxis] * d
         return forces
 

@@ -31,7 +31,7 @@ class Rewriting:
         for line in [*roots, *(line for operation in tape for line in operation.of)]:
             self.reads[line] += 1
         self.of_state, self.of_step = of_any(tape, "state"), of_any(tape, "step")
-        self.made: list[Operation] = []
+        self.lines: list[Operation] = []
         self.known: dict[Operation, int] = {}
         #: Of each line of the old tape its line on the new one, or the increment that it is.
         self.values: list[int | Increment] = []
@@ -40,8 +40,8 @@ class Rewriting:
         """A line of the new tape; one that is there already is not written again."""
         operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, extra)
         if operation not in self.known:
-            self.known[operation] = len(self.made)
-            self.made.append(operation)
+            self.known[operation] = len(self.lines)
+            self.lines.append(operation)
         return self.known[operation]
 
     def number(self, x: float) -> int:
@@ -105,12 +105,12 @@ class Rewriting:
             if isfinite(ratio) and ratio:
                 size = self.number(abs(ratio))
                 scaled = high.x if abs(ratio) == 1.0 else self.write("multiply", size, high.x)
-                made = self.write("add" if ratio > 0.0 else "subtract", low.x, scaled)
-                return Increment(-low.c if is_difference and turned else low.c, low.factor, made)
+                total = self.write("add" if ratio > 0.0 else "subtract", low.x, scaled)
+                return Increment(-low.c if is_difference and turned else low.c, low.factor, total)
         (minus_a, left), (minus_b, right) = self.signed(a), self.signed(b)
         if minus_a == (minus_b != is_difference):
-            made = self.write("add", left, right)
-            return self.write("negate", made) if minus_a else made
+            total = self.write("add", left, right)
+            return self.write("negate", total) if minus_a else total
         return self.write("subtract", right, left) if minus_a else self.write("subtract", left, right)
 
     def same(self, line: int) -> int:
@@ -143,15 +143,15 @@ def negated_sums(tape: Sequence[Operation]) -> tuple[list[Operation], list[int]]
 
     Of −x and −y a tape writes (−x) − y or (−y) − x, whichever it comes upon first. What is made of it must not depend on that.
     """
-    made: list[Operation] = []
+    lines: list[Operation] = []
     known: dict[Operation, int] = {}
     place: list[int] = []
 
     def write(name: str, of: tuple[int, ...], extra: int = 0) -> int:
         operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, extra)
         if operation not in known:
-            known[operation] = len(made)
-            made.append(operation)
+            known[operation] = len(lines)
+            lines.append(operation)
         return known[operation]
 
     for name, of, extra in tape:
@@ -160,7 +160,7 @@ def negated_sums(tape: Sequence[Operation]) -> tuple[list[Operation], list[int]]
             place.append(write("negate", (write("add", (x, y)),)))
         else:
             place.append(write(name, tuple(place[line] for line in of), extra))
-    return made, place
+    return lines, place
 
 
 def increments_last(
@@ -180,4 +180,4 @@ def increments_last(
     work = Rewriting(tape, roots, single)
     work.run()
     places = [work.plain(root) for root in roots]
-    return needed(work.made, places)
+    return needed(work.lines, places)

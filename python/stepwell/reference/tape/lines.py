@@ -73,5 +73,5 @@ def in_order(tape: Sequence[Operation], roots: Sequence[int]) -> dict[int, int]:
 def needed(tape: Sequence[Operation], roots: Sequence[int]) -> tuple[list[Operation], list[int]]:
     """What the roots need, and nothing else."""
     place = in_order(tape, roots)
-    kept = [tape[line]._replace(of=tuple(place[each] for each in tape[line].of)) for line in place]
-    return kept, [place[root] for root in roots]
+    lines = [tape[line]._replace(of=tuple(place[each] for each in tape[line].of)) for line in place]
+    return lines, [place[root] for root in roots]

@@ -164,7 +164,7 @@ class _Guard:
         """Where this or another holds."""
         return _Guard(None if self.truth is None or guard.truth is None else self.truth | guard.truth)
 
-    def held(self, value: Any) -> Any:
+    def where_needed(self, value: Any) -> Any:
         """The value where it is needed, else 0."""
         return value if self.truth is None else self.truth.choose(value, 0.0)
 
@@ -173,17 +173,17 @@ def _backward(listing: Listing, root: int, numbers: list[int]) -> list[Symbol]:
     """The derivatives of one line with respect to the symbols of these numbers."""
     tape = listing.tape
     changing = _changing(listing, numbers)
-    found: dict[int, tuple[Any, _Guard]] = {root: (tape.number(1.0), _Guard())}
+    adjoints: dict[int, tuple[Any, _Guard]] = {root: (tape.number(1.0), _Guard())}
 
     def pass_on(to: Any, share: Any, guard: _Guard) -> None:
         line = listing.place[to.id]
-        before = found.get(line)
-        found[line] = (share, guard) if before is None else (before[0] + share, before[1].other(guard))
+        before = adjoints.get(line)
+        adjoints[line] = (share, guard) if before is None else (before[0] + share, before[1].other(guard))
 
     for line in range(root, -1, -1):
-        if line not in found or not changing[line] or listing.symbols[line].id in numbers:
+        if line not in adjoints or not changing[line] or listing.symbols[line].id in numbers:
             continue
-        share, guard = found[line]
+        share, guard = adjoints[line]
         reads = listing.reads(line)[0]
         wanted = [isinstance(each, Symbol) and changing[listing.place[each.id]] for each in reads]
         if listing.is_choice(line):
@@ -195,9 +195,9 @@ def _backward(listing: Listing, root: int, numbers: list[int]) -> list[Symbol]:
             continue
         for factor, each, want in zip(_factors(listing, line, wanted), reads, wanted, strict=True):
             if want and factor is not None:
-                pass_on(each, guard.held(_times(factor, share)), guard)
+                pass_on(each, guard.where_needed(_times(factor, share)), guard)
     places = [listing.place.get(each) for each in numbers]
-    return [_or_zero(tape, found[line][0] if line is not None and line in found else None) for line in places]
+    return [_or_zero(tape, adjoints[line][0] if line is not None and line in adjoints else None) for line in places]
 
 
 def _changing(listing: Listing, numbers: list[int]) -> list[bool]:

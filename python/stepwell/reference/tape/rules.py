@@ -29,10 +29,10 @@ def function(name: str, near: Callable[..., Any] | None = None) -> Callable[...,
     beside = getattr(inspect.unwrap(near), "__globals__", {}).get(name) if near is not None else None
     if callable(beside) and hasattr(beside, "__wrapped__"):
         return beside  # type: ignore[no-any-return]
-    found: Callable[..., Any] | None = getattr(_elementary(), name, None) or marks.FUNCTIONS.get(name)
-    if found is None:
+    marked: Callable[..., Any] | None = getattr(_elementary(), name, None) or marks.FUNCTIONS.get(name)
+    if marked is None:
         raise UnsupportedError(f"derivative: there is no function {name!r} here, of which it is made")
-    return found
+    return marked
 
 
 @cache
