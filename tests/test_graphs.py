@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell import _core
-from stepwell.reference import adaptive
+from stepwell.reference.adaptive import pace
 from stepwell.reference.traced import Tracer
 from support import own_systems
 from support.cases import ADAPTIVE, SYSTEMS, fits
@@ -107,7 +107,7 @@ def test_another_start_is_noticed() -> None:
     tape = _core.Tape()
     core = tape.trace(model(system, ABLE[0]), "begin")
     with pytest.MonkeyPatch.context() as wrong:
-        wrong.setattr(adaptive, "FIRST", 0.02)
+        wrong.setattr(pace, "FIRST", 0.02)
         with pytest.raises(pytest.fail.Exception, match=r"the core has .* where the reference has"):
             assert_one_graph(tape, core, Tracer(system, tape).begin(ABLE[0]))
 

@@ -1,0 +1,49 @@
+"""Adaptive steps: each member has steps of its own, as long as the estimate of their error stays within a tolerance.
+
+The files are named as the core's in ``step/``: ``sizes`` of components, the ``controller``, ``attempts``, and ``pace``, which
+decides after them. ``runs`` goes from one saved time to the next. What is tolerated is in ``reference/acceptance.py``.
+"""
+
+from .attempts import Attempted, Backward, Pair, Stretched, Tried, tried
+from .controller import MAX_FACTOR, MIN_FACTOR, MOVES, SINGLE_MOVES, Outlook, Pace
+from .pace import ONSET, OUTSIDE, ROUNDING, SINGLE_ROUNDING, attempt, begin, decided, judged, over
+from .runs import BUDGET, NOT_FINITE, OK, UNDERFLOW, Jumps, Outcome, run, waiting
+from .sizes import largest, longer, numbers_in, sizes, stacked, total
+
+__all__ = [
+    "BUDGET",
+    "MAX_FACTOR",
+    "MIN_FACTOR",
+    "MOVES",
+    "NOT_FINITE",
+    "OK",
+    "ONSET",
+    "OUTSIDE",
+    "ROUNDING",
+    "SINGLE_MOVES",
+    "SINGLE_ROUNDING",
+    "UNDERFLOW",
+    "Attempted",
+    "Backward",
+    "Jumps",
+    "Outcome",
+    "Outlook",
+    "Pace",
+    "Pair",
+    "Stretched",
+    "Tried",
+    "attempt",
+    "begin",
+    "decided",
+    "judged",
+    "largest",
+    "longer",
+    "numbers_in",
+    "over",
+    "run",
+    "sizes",
+    "stacked",
+    "total",
+    "tried",
+    "waiting",
+]

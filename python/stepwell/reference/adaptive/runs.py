@@ -1,0 +1,156 @@
+"""Runs with a tolerance: from one saved time to the next, and across jumps of the inputs."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from ...base.arrays import Array, Whole
+from ..bits import where
+from .controller import MAX_FACTOR, MIN_FACTOR, MOVES, Pace
+
+OK, BUDGET, UNDERFLOW, NOT_FINITE = 0, 2, 3, 4
+
+
+def waiting(
+    t0: Any, first: Any, tolerance: tuple[Any, Any, float], samples: tuple[float, float], most_step: Any = np.inf, groups: int = 2
+) -> Pace:
+    """The pace of a member that has not begun: ``begin`` finds what depends on its state.
+
+    ``first`` is the step to try first; below zero it is to be chosen, and is minus this number where the state tells nothing.
+    ``tolerance`` is ``relative``, ``absolute`` and ``lasts`` of a ``Pace``, ``samples`` its ``interval`` and ``until``.
+    """
+    counts = *tolerance, t0, *samples, most_step, np.inf, 1.0, MAX_FACTOR
+    return Pace(t0, first, t0, 0.0, 0.0, *counts, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(groups))
+
+
+class Jumps(NamedTuple):
+    """The times that no step crosses: each is between two, just before and just after it.
+
+    Attributes:
+        before: those times, ascending along the first axis, the same for all members or of each.
+        after: the times from which members go on.
+    """
+
+    before: Array
+    after: Array
+
+    @classmethod
+    def around(cls, times: Array, t0: Any, in_single: Any = None) -> Self:
+        """Some roundings before and after each; t0 is the start, before which no jump counts. An infinite one is none.
+
+        Times of stages are rounded to the larger of the times at both ends of a step, so they stay on their side. ``in_single``
+        are the jumps that rates compare with times of float32.
+        """
+        size = np.maximum(np.abs(times), np.abs(t0))
+        rounding = np.spacing(size)
+        if in_single is not None:
+            with np.errstate(over="ignore", invalid="ignore"):
+                rounding = np.where(in_single, np.spacing(size.astype(np.float32)), rounding)
+        margin = np.where(np.isfinite(times), 4.0 * rounding, 0.0)
+        before, after = times - margin, times + margin
+        gone = after < t0
+        return cls(np.where(gone, -np.inf, before), np.where(gone, -np.inf, after))
+
+    def begun(self, t0: Any) -> Any:
+        """The time of the start: behind a jump that is there."""
+        there = (self.before <= t0) & (t0 <= self.after)
+        return np.where(there, self.after, t0).max(axis=0)
+
+    def passed(self, t: Any) -> Any:
+        """How many jumps are at or before t."""
+        if self.before.ndim == 1:
+            return np.searchsorted(self.before, t, side="right")
+        return np.count_nonzero(self.before <= t, axis=0)
+
+    def wall(self, t: Any) -> Any:
+        """The next time at which a step from t must end, infinite if there is none."""
+        return self._of_each(t, self.before, self.passed(t))
+
+    def crossed(self, pace: Pace, *, series: bool) -> Pace:
+        """Where members stand that have come to a wall: behind it, with a step that is chosen anew."""
+        there = pace.t >= pace.wall
+        if not np.any(there):
+            return pace
+        passed = self.passed(pace.t)
+        t = np.where(there, self._of_each(pace.t, self.after, np.maximum(passed - 1, 0)), pace.t)
+        least = MOVES * np.abs(t)
+        first = MIN_FACTOR * pace.h
+        return pace._replace(
+            t=t,
+            wall=np.where(there, self.wall(t), pace.wall),
+            h=pace.h if series else np.where(there, np.where(first < least, least, first), pace.h),
+            before=np.where(there, MIN_FACTOR * pace.before if series else 1.0, pace.before),
+            most=np.where(there, MAX_FACTOR, pace.most),
+        )
+
+    @staticmethod
+    def _of_each(t: Any, times: Array, place: Any) -> Any:
+        """The time at a place of each member; infinite behind the last."""
+        shape = np.shape(t)
+        rows = np.broadcast_to(times.reshape(len(times), *(times.shape[1:] or len(shape) * (1,))), (len(times), *shape))
+        ended = np.concatenate([rows, np.full((1, *shape), np.inf)])
+        return np.take_along_axis(ended, np.asarray(place, dtype=np.intp)[np.newaxis], 0)[0]
+
+
+class Outcome(NamedTuple):
+    """Saved states, and the state, pace and status of each member at the end.
+
+    Of the attempts after which a step was kept, ``steps`` has which members made it, the times, v and y.
+    """
+
+    v: Array
+    y: Array
+    last_v: Array
+    last_y: Array
+    pace: Pace
+    status: Whole
+    steps: list[tuple[Any, Any, Array, Array]]
+
+
+def run(
+    attempt: Callable[[Pace, int, Array, Array], tuple[Pace, Array, Array]],
+    v: Array,
+    y: Array,
+    pace: Pace,
+    *,
+    at: Array,
+    budget: int,
+    jumps: Jumps | None = None,
+    series: bool = False,
+    every: int = 0,
+) -> Outcome:
+    """Continue all members and save their states at each time of ``at``, ascending. Members that stop before have NaN.
+
+    ``attempt(pace, budget, v, y)`` is one attempt of all members. Every ``every``-th accepted step is kept; 0 for none.
+    """
+    one = np.ones(pace.t.shape)
+    saved_v, saved_y, steps = [], [], []
+    if jumps is not None:
+        pace = pace._replace(wall=jumps.wall(pace.t))
+    with np.errstate(all="ignore"):
+        for target in at:
+            within = (pace.held > 0.0) & (target < pace.reach()[0])
+            pace = pace._replace(target=target * one, held=where(within, 1.0, 0.0))
+            there, at_target = np.zeros(pace.t.shape, dtype=bool), (np.full(v.shape, np.nan), np.full(y.shape, np.nan))
+            while True:
+                while pace.outlook(budget).runs.any():
+                    before = pace.accepted
+                    pace, v, y = attempt(pace, budget, v, y)
+                    if every and (due := (pace.accepted > before) & (pace.accepted % every == 0.0)).any():
+                        steps.append((due, pace.t, v, y))
+                    if jumps is not None:
+                        pace = jumps.crossed(pace, series=series)
+                waits = (pace.held > 0.0) & ~there
+                extra = pace._replace(extra=where(waits, target - pace.t, 0.0))
+                pace, v1, y1 = attempt(extra, budget, v, y) if waits.any() else (pace, v, y)
+                arrives = ~there & where(waits, pace.held > 0.0, pace.t >= target)
+                at_target = where(arrives, v1, at_target[0]), where(arrives, y1, at_target[1])
+                there |= arrives
+                if not pace.outlook(budget).runs.any():  # after an extra step that was rejected there are shorter ones
+                    break
+            saved_v.append(at_target[0])
+            saved_y.append(at_target[1])
+    spent = pace.accepted + pace.rejected >= budget
+    status = np.where(there, OK, np.where(spent, BUDGET, np.where(pace.error < np.inf, UNDERFLOW, NOT_FINITE)))
+    return Outcome(np.stack(saved_v), np.stack(saved_y), v, y, pace, status.astype(np.int64), steps)
