@@ -17,20 +17,12 @@ from .around import Around, whole_step
 from .signal import of_step, over
 
 #: A distance is known to within so many times the numbers that it is computed from: eight roundings.
-ROUNDING = 2.0**-50
-
-#: The same for float32.
-SINGLE_ROUNDING = 2.0**-21
+ROUNDING = bits.PerPrecision(double=2.0**-50, single=2.0**-21)
 
 #: The bits of a number but for its sign.
 MAGNITUDE = 0x7FFF_FFFF_FFFF_FFFF
 
 Vector = list[Any]
-
-
-def rounding(y: Any) -> float:
-    """``ROUNDING`` of numbers of the precision of these."""
-    return SINGLE_ROUNDING if bits.is_single(y[0]) else ROUNDING
 
 
 def dot(a: Any, b: Any) -> Any:
@@ -208,7 +200,7 @@ class Plane(Surface):
     def place(self, y0: Vector, y: Vector) -> Place:
         """By the plane itself."""
         distance = dot(y, self.normal) - self.offset
-        slack = rounding(y) * (magnitudes(y, self.normal) + bits.and_bits(self.offset, MAGNITUDE))
+        slack = ROUNDING.of(y[0]) * (magnitudes(y, self.normal) + bits.and_bits(self.offset, MAGNITUDE))
         before = dot(y0, self.normal) - self.offset
         return Place(bits.at_most(distance, slack), self.normal, distance, before, slack)
 
@@ -252,7 +244,7 @@ class Sphere(Surface):
         a, b, square = dot(move, move), dot(from0, move), dot(from0, from0)
         c = square - self.radius * self.radius
         disc = b * b - a * c
-        slack = rounding(y) * (self.radius + magnitudes(self.centre, [1.0] * len(self.centre)))
+        slack = ROUNDING.of(y[0]) * (self.radius + magnitudes(self.centre, [1.0] * len(self.centre)))
         root = np.sqrt(bits.where(bits.less(0.0, disc), disc, 0.0))
         if self.is_inside:
             part = bits.where(bits.less(b, 0.0), (root - b) / a, -(c / (b + root)))

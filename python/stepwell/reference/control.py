@@ -11,7 +11,7 @@ from ..base.arrays import Array, Blocks, Scaled
 from . import bits
 from .around import Around
 
-#: The square of what velocities are multiplied by is held between these, the factor between ½ and 2.
+#: The bounds of the square of the factor of velocities, which is between ½ and 2.
 MIN_SQUARE, MAX_SQUARE = 0.25, 4.0
 
 
@@ -29,7 +29,7 @@ class Conserving(Scaled, Protocol):
 
 
 class EnergyKeeping(Around):
-    """What both have: the target, and the sum of what was changed of the energy."""
+    """What both have: the target, and the sum of the changes of the energy."""
 
     #: h times that sum.
     work: Any = 0.0
@@ -41,7 +41,7 @@ class EnergyKeeping(Around):
 
 
 class Controlled(EnergyKeeping):
-    """As printed g = h·C·ΔE; limited, 1 − g is the root of 1 − 2hC·ΔE/(1 + 2hC·K), held in ½ … 2."""
+    """As printed g = h·C·ΔE; limited, 1 − g is the root of 1 − 2hC·ΔE/(1 + 2hC·K), limited to ½ … 2."""
 
     def __init__(self, s: Conserving, h: Any, form: str, gain: Array, target: Array, *, between: bool = False) -> None:
         super().__init__(s, h, target)
@@ -57,7 +57,7 @@ class Controlled(EnergyKeeping):
         return np.asarray(dv - self.push(kinetic, energy) * v)
 
     def project(self, v: Array, y: Array) -> Blocks:
-        """The state after a step, pushed if that is done there."""
+        """The state after a step, pushed if the push comes between steps."""
         if not self.between:
             return v, y
         _, kinetic, energy = self.s.energies(v, y)

@@ -5,7 +5,7 @@ changes the velocities by P·M⁻¹·p, where P·M⁻¹ = M⁻¹ − M⁻¹Jᵀ(
 impulse along the normal of a contact does is the ``column`` of that contact, and normal·column is 1/m of the point as the surface
 feels it, its effective mass m being at least that of the point alone.
 
-After a step of the method each point is looked at as if it were free (contact.py): how fast it hit, how long ago, whether it
+After a step of the method each point is treated as if it were free (contact.py): how fast it hit, how long ago, whether it
 rests. Then for the points of each connected group of rods:
 
 1. Impulses λ ≥ 0 along the normals, so that each point leaves with at least the velocity of its bounce: one contact after the
@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import bits
-from .contact import Change, Place, Step, Surface, Vector, dot, magnitudes, rounding
+from .contact import ROUNDING, Change, Place, Step, Surface, Vector, dot, magnitudes
 from .elimination import Factors, factored, solved
 from .joined import Column, Joined, added, groups
 
@@ -162,7 +162,7 @@ class RodContacts:
         for ends, length in zip(self.rods.rods, self.rods.lengths, strict=True):
             if i in ends:
                 size = size + length
-        slack = place.slack + rounding(y1) * size
+        slack = place.slack + ROUNDING.of(y1[0]) * size
         return place._replace(slack=slack, near=place.near | bits.at_most(place.distance, slack))
 
     def struck(self, contacts: list[Contact], v: list[Vector]) -> tuple[list[Vector], list[Any], list[Any], list[Any]]:

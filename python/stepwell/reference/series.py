@@ -1,7 +1,7 @@
 """Taylor series of the solution of a system, order after order: the specification of the core's ``series.rs``.
 
-The rates are run once, with numbers that remember how they were made. From these operations and the coefficients of the state up
-to order k follow those of the rates, and from these the coefficients k + 1 of the state, by the recurrences of Jorba and Zou
+The rates are run once, with numbers that record their operations. From these and the coefficients of the state up to
+order k follow those of the rates, and from these the coefficients k + 1 of the state, by the recurrences of Jorba and Zou
 (Experimental Mathematics 14 (2005) 99). Sums over products begin with the terms that are known longest.
 """
 
@@ -40,7 +40,7 @@ BRANCHES = {
 
 
 class Book:
-    """The numbers that change with time, each after those that it is made of, and the functions and branches among them."""
+    """The numbers that change with time, each after its operands, and the functions and branches among them."""
 
     def __init__(self) -> None:
         self.series: list[Series] = []
@@ -61,9 +61,9 @@ class Series:
     """A number that changes with time, by the coefficients of its Taylor series that are known so far.
 
     Attributes:
-        book: where it stands.
+        book: the book that lists it.
         terms: the coefficients, in powers of the share of the step.
-        rule: gives the coefficient of an order above 0; None for the state and the time, which are told theirs.
+        rule: gives the coefficient of an order above 0; None for the state and the time, whose coefficients are appended.
         opposite: the series of which it is the negative.
     """
 
@@ -270,7 +270,7 @@ def _product(a: Term, b: Term) -> Term:
 
 
 def _convolved(a: Sequence[Term], b: Sequence[Term], k: int) -> Term:
-    """Σ aⱼ·bₖ₋ⱼ. Those with the newest coefficients come last: it is these that everything waits for.
+    """Σ aⱼ·bₖ₋ⱼ. Those with the newest coefficients come last, since everything waits for these.
 
     The others are two sums: those with the older of a apart from those with the older of b. Of a square both are equal.
     """
@@ -325,7 +325,7 @@ KINDS.append((among, function))
 
 
 def _identity(x: Any) -> Any:
-    """What tells an argument of a function from others: symbols cannot be hashed, and 0 and −0 are equal but not the same."""
+    """The key of an argument in a table: symbols cannot be hashed, and 0 and −0 are equal but not the same."""
     if hasattr(x, "xor_bits"):
         return "symbol", x.id
     return repr(x) if isinstance(x, (int, float, complex, np.number)) else id(x)

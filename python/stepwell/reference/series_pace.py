@@ -1,7 +1,7 @@
-"""Adaptive steps by the series of a solution: how far it reaches, and what comes after a step.
+"""Adaptive steps by the Taylor series of a solution: the length of a step, and the decision after it.
 
-The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2). With ‖cⱼ‖ the size of a group of
-coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The step is the least of
+The last two coefficients give the length of a step beforehand (Jorba and Zou 2005, §3.2). With ‖cⱼ‖ the size of a group of
+coefficients and τ its tolerated error, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The step is the least of
 these for j = p − 1 and p and all groups, times exp(−0.7/(p − 1)), but at most half of the radius of convergence. It is rejected
 only if a function might leave its branch within it, if a number is not finite or if it does not move the time.
 """
@@ -19,7 +19,7 @@ import numpy as np
 from ..base.arrays import Array
 from .acceptance import Acceptance
 from .adaptive import MAX_FACTOR, ONSET, ROUNDING, Attempted, Pace, largest, longer, numbers_in, over, sizes, stacked, total
-from .bits import add_bits, and_bits, at_most, clamp, less, shift_up, where
+from .bits import DOUBLE, add_bits, and_bits, at_most, clamp, less, shift_up, where
 from .log import split
 from .series import Branch, expanded
 
@@ -29,7 +29,7 @@ MAX_GROWTH = 1024.0
 BOUNDS = (1e-280, 1e280)
 #: The margin of a step of order p is 2^(−MARGIN/(p − 1)): exp(−0.7/(p − 1)).
 MARGIN = 0.7 * 1.4426950408889634
-#: The most that a step is of the radius of convergence. Beyond it the last terms say nothing of those that follow, however small.
+#: The most that a step is of the radius of convergence. Beyond it the last terms do not bound those that follow, however small.
 SHARE = 0.5
 #: A step that failed is tried again with this part of its length. Three more of these come before steps grow again, at first
 #: twofold: so many are left before what it met.
@@ -45,8 +45,6 @@ DEFECT = 8.0
 #: Some roundings of the time, which is the difference of larger ones in rates that are about to end in a pole.
 TIME_ROUNDING = 1.0 / (1 << 46)
 
-#: 1.5·2⁵², to which a whole number is added that stands in the low bits of the sum.
-MAGIC = 6755399441055744.0
 #: 2^r on [−½, ½], and log₂(1 + f)/f for 1 + f between √½ and √2: fitted at Chebyshev's nodes, wrong by 3.5e-6 and, times f, by
 #: 2.9e-5.
 ROUGH_EXP2 = (1.0, 0.693121045203, 0.24022349038, 0.0559219758423, 0.00966636851538)
@@ -137,10 +135,10 @@ def reach(
     y: Array,
     terms: Sequence[tuple[Array, Array]],
 ) -> tuple[Any, Any, Any]:
-    """How far the series is as good as is tolerated, the motion in a unit of time over the tolerated error, what a step may err.
+    """The step that is tolerated, the motion in a unit of time over the tolerated error, and the tolerated defect times the step.
 
-    That is of each group the defect times the step: by how much the series and the rates at its end differ. It is p + 1 times the
-    first term that is left out.
+    The defect of a group is by how much the series and the rates at the end of the step differ. Times the step it is p + 1 times
+    the first term that is left out.
 
     In ``before`` the pace has the length of the last step that was taken, at the start that of a step to try first. A held one
     does not count, for it is made once more and must be the same.
@@ -193,7 +191,7 @@ def on_branches(branches: Sequence[Branch], share: Any, moved: Any) -> Any:
 
 
 def furthest(terms: Sequence[Any], share: Any, part: Callable[[Any], Any]) -> Any:
-    """How far the terms to one side alone would take a value within a step: no further can it be."""
+    """How far the terms to one side alone would take a value within a step, which bounds the value."""
     total = None
     for term in reversed(terms[1:]):
         beyond = None if total is None else share * total
@@ -203,8 +201,8 @@ def furthest(terms: Sequence[Any], share: Any, part: Callable[[Any], Any]) -> An
 
 def rough_exp2(x: Any) -> Any:
     """2ˣ to five digits, which is enough for a step: 2ᵏ·2^r, |r| ≤ ½."""
-    magic = x + MAGIC
-    return rough(x - (magic - MAGIC), ROUGH_EXP2) * add_bits(shift_up(magic, 52), ONE)
+    magic = x + DOUBLE.magic
+    return rough(x - (magic - DOUBLE.magic), ROUGH_EXP2) * add_bits(shift_up(magic, 52), ONE)
 
 
 def rough_log2(x: Any) -> Any:
@@ -226,7 +224,7 @@ def decided(
     """The pace after a step, and whether the state advances.
 
     Args:
-        pace: where members stand.
+        pace: the one before the step.
         reach: the step, and whether it ends at the wall.
         new: the sizes that the state would have.
         validity: whether the end agrees with the rates; whether functions stay on their branch, None if there are none; and a

@@ -19,7 +19,7 @@ HOLD_SLACK = 1.0 + 2.0**-44
 #: The two ends of a stretch of time, and its length.
 Window = tuple[Any, Any, Any]
 
-#: Over what samples are averaged that are held; None where they are looked up at a time.
+#: The times over which samples that are held are averaged; None where a time selects one of them.
 _WINDOW: ContextVar[Window | None] = ContextVar("window", default=None)
 
 

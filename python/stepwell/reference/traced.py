@@ -53,8 +53,8 @@ class Tracer:
     """A system of symbols, for one member, and what can be traced of it; a force from outside is of shape (*block, *batch).
 
     Attributes:
-        numbers: what stands behind the parameters: of each symbol its number for every member.
-        tables: what stands behind the sampled inputs.
+        numbers: the values of the parameters: of each symbol its number for every member.
+        tables: the sampled inputs themselves.
         times: the numbers of those whose values are the times at which samples begin.
     """
 
@@ -64,7 +64,7 @@ class Tracer:
         self.numbers: list[Any] = []
         self.tables: list[Held] = []
         self.times: set[int] = set()
-        #: The values of sampled inputs, where these are known and no time is asked for.
+        #: The values of sampled inputs, where these are known and do not depend on a time.
         self._values: Iterator[Any] | None = None
 
     def state(self) -> tuple[Any, Any, Any]:
@@ -153,7 +153,7 @@ class Tracer:
     def tried(self, method: Any, *, backward: bool = False) -> list[Any]:
         """The first part of an attempt of float32, before the decision: see ``adaptive.Tried``.
 
-        Its state is v, y, the time, the step, and the value of each sampled input in the step; the results stand behind these.
+        Its state is v, y, the time, the step, and the value of each sampled input in the step; the results come behind these.
         """
         v, y, more = self.state()
         t, step, (self._values, more) = next(more), next(more), tee(more)

@@ -36,9 +36,8 @@ ONSET = 1.0 / (1 << 40)
 #: have made in this part of the time since the start: it must be long beside the roundings of time, and short beside the motion
 #: that follows.
 PUSHED = 1.0 / 64.0
-#: A step in which nothing moves and no stage saw a rate has an estimate of zero that says nothing. The next is then no longer
-#: than QUIET times the time since the start, or than this one; so what begins later is not stepped over, unless it lasts for less
-#: than that.
+#: Where nothing moves and all rates are zero, the estimate of zero means nothing. The next step is then no longer than QUIET
+#: times the time since the start, or than this one: so it does not step over what begins later, unless that lasts for less.
 QUIET = 1.0 / 32.0
 #: The most by which a coarse estimate e₃ may exceed a finer one, times √e₃, e₃ relative to the size. Where rates are smooth, that
 #: is a constant of the motion and not of the step: 5 to 20 in nine of ten steps of eight motions at tolerances of 1e-3 to 1e-12.
@@ -66,10 +65,10 @@ def begin(
     series: bool = False,
     moves: float = MOVES,
 ) -> Pace:
-    """Where members stand at the start, from their time and tolerance; a step to try first that is below zero is chosen here.
+    """The pace at the start, from the time and the tolerance. A first step that is below zero is chosen here.
 
     It is a share of the shortest time in which a group changes by its size: |v|/|v̇|, |y|/|ẏ| and, from rest, √(|y|/|v̇|), times
-    that do not depend on the units of v and y. As the rates at one time may be small by chance, they are looked at twice more,
+    that do not depend on the units of v and y. As the rates at one time may be small by chance, they are evaluated twice more,
     in the middle and at the end of the step. ``s`` is scaled to a step of 1; ``series`` says whether the method is one; ``moves``
     is ``MOVES`` or that of float32.
     """

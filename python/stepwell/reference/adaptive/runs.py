@@ -15,9 +15,9 @@ OK, BUDGET, UNDERFLOW, NOT_FINITE = 0, 2, 3, 4
 def waiting(
     t0: Any, first: Any, tolerance: tuple[Any, Any, float], samples: tuple[float, float], most_step: Any = np.inf, groups: int = 2
 ) -> Pace:
-    """The pace of a member that has not begun: ``begin`` finds what depends on its state.
+    """The pace of a member that has not begun: ``begin`` adds what depends on its state.
 
-    ``first`` is the step to try first; below zero it is to be chosen, and is minus this number where the state tells nothing.
+    ``first`` is the step to try first. Below zero it is to be chosen, and is minus this number if all rates are zero.
     ``tolerance`` is ``relative``, ``absolute`` and ``lasts`` of a ``Pace``, ``samples`` its ``interval`` and ``until``.
     """
     counts = *tolerance, t0, *samples, most_step, np.inf, 1.0, MAX_FACTOR
@@ -68,7 +68,7 @@ class Jumps(NamedTuple):
         return self._of_each(t, self.before, self.passed(t))
 
     def crossed(self, pace: Pace, *, series: bool) -> Pace:
-        """Where members stand that have come to a wall: behind it, with a step that is chosen anew."""
+        """The pace of members that have come to a wall: behind it, with a new step."""
         there = pace.t >= pace.wall
         if not np.any(there):
             return pace

@@ -87,7 +87,7 @@ class NBody:
         x + −0 is x, also where x is a zero.
         """
         n = len(y)
-        dv = np.full_like(y, -0.0)  # whatever y is made of
+        dv = np.full_like(y, -0.0)  # of y's type, which may be objects
         twice, strength = np.concatenate([y, y]), np.concatenate([self.strength, self.strength])
         for slab in partners(n):
             after, before, wells = np.full_like(y, -0.0), np.full_like(twice, -0.0), np.full_like(y[:, 0], 0.0)

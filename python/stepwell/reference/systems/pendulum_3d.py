@@ -45,7 +45,7 @@ class Pendulum3D:
         return d / self.h
 
     def project(self, v: Array, y: Array) -> Blocks:
-        """The state after a step, with a rod of its length and no velocity along it, if that is asked for."""
+        """The state after a step, with a rod of its length and no velocity along it, if the system projects."""
         if not self.projects:
             return v, y
         y = y * (self.length / np.sqrt(dot(y, y)))

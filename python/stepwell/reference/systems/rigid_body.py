@@ -89,7 +89,7 @@ class RigidBody:
         return np.stack(dy)
 
     def project(self, v: Array, y: Array) -> Blocks:
-        """The state after a step, q divided by its length if that is asked for."""
+        """The state after a step, q divided by its length if the system projects."""
         return (v, y / np.sqrt(square(y))) if self.projects else (v, y)
 
     def record(self, name: str, v: Array, y: Array) -> Array:

@@ -133,7 +133,7 @@ class Rods:
         return [minus * each for minus, each in zip(self.minus, sums, strict=True)]
 
     def project(self, v: Array, y: Array) -> Blocks:
-        """The state after a step, with rods of their lengths and no velocity along them, if that is asked for.
+        """The state after a step, with rods of their lengths and no velocity along them, if the system projects.
 
         Each correction moves the points by the least sum of m·(distance)², and so do the velocities: momentum stays.
         """

@@ -141,7 +141,7 @@ class Rewriting:
 def negated_sums(tape: Sequence[Operation]) -> tuple[list[Operation], list[int]]:
     """The same tape with −(x + y) in place of (−x) − y, and the place of each line.
 
-    Of −x and −y a tape writes (−x) − y or (−y) − x, whichever it comes upon first. What is made of it must not depend on that.
+    Of −x and −y a tape writes (−x) − y or (−y) − x, whichever comes first. The result must not depend on that.
     """
     lines: list[Operation] = []
     known: dict[Operation, int] = {}

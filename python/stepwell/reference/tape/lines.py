@@ -27,7 +27,7 @@ def listed(tape: Any, symbols: Sequence[Any]) -> tuple[list[Operation], list[int
 
 
 def ranks(tape: Sequence[Operation]) -> list[int]:
-    """A number for each line, which says nothing of the order in which the tape was written.
+    """A number for each line that does not depend on the order in which the tape was written.
 
     Values of fewer operations one after the other come before those of more; equally deep ones are sorted by the name of the
     operation, by what else it takes, and by the ranks of its operands, the lower one first where they may change places.

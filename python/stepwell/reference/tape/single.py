@@ -1,8 +1,8 @@
 """Steps of float32: the specification of the core's, as ``fused`` is that of steps with fused multiply-adds.
 
 The tape of a step is traced by the reference itself; its constants are rounded to float32. Every operation on it is NumPy's on
-float32, rounded once. Only which sample holds at a time, and what is made of the times of samples, is float64, rounded where
-another operation reads it: a time divided by an interval takes more digits than float32 has.
+float32, rounded once. Only which sample holds at a time, and what is computed from the times of samples, is float64, rounded
+where another operation reads it: a time divided by an interval takes more digits than float32 has.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .lines import Operation, listed, needed
 
 
 class Clock:
-    """What of a step is float64: the lines of samples, and those that the times of samples are made of.
+    """The lines of a step that are float64: those of samples, and those that the times of samples are computed by.
 
     Args:
         tape: the operations of the step.
@@ -65,7 +65,7 @@ class Steps:
 
     Args:
         tape: a tape that lists its operations.
-        symbols: what is asked for.
+        symbols: the values to compute.
         numbers: of each parameter, by its number on the tape, what it is for every member; it is rounded here.
         fuse: whether sums with a product in them are fused multiply-adds.
         tables: the sampled inputs.
