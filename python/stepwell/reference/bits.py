@@ -71,7 +71,6 @@ class Precision:
 DOUBLE = Precision(np.float64, np.uint64, 52, ("<d", "<Q"))
 SINGLE = Precision(np.float32, np.uint32, 23, ("<f", "<I"))
 
-
 T = TypeVar("T")
 
 

@@ -1,8 +1,11 @@
 """Elementary functions, written once: the same bits on NumPy's arrays and, by a tape, in the core.
 
-Each takes numbers, arrays of float64, symbols of a tape, and arrays of symbols, mixed, and broadcasts as NumPy does. What it
-makes of a symbol is a straight line of additions, multiplications, divisions, square roots, comparisons and operations on bits,
-which are exact or correctly rounded everywhere. ``docs/theory/functions.md`` says how accurate each is and what it costs.
+Each takes numbers, arrays of float64, symbols of a tape, and arrays of symbols, mixed, and broadcasts as NumPy does. Of a symbol
+it writes a straight line of additions, multiplications, divisions, square roots, comparisons and operations on bits, which are
+exact or correctly rounded everywhere. ``docs/theory/functions.md`` lists errors and costs.
+
+Symbols of float32 take the same formulas. The ``CONSTANTS`` of each file are a record for either precision; where the two differ
+in their operations, the formula asks ``is_single``.
 """
 
 from .comparisons import equal, greater, greater_equal, less, less_equal, not_equal
