@@ -262,7 +262,7 @@ class OwnSystem(System):
         quantities = [(name, *tracer.flat(s.record(name, v, y))) for name in self.quantities if not single]
         projected = None
         if equations.kept is not None and not equations.pushed:
-            value = equations.invariants[equations.kept].value(v, y, s.given)
+            value = equations.invariants[equations.kept].value(v, y, s.parameters)
             along_v, along_y, square = s.gradient(v, y)
             projected = (*tracer.flat(value), tracer.flat(along_v), tracer.flat(along_y), *tracer.flat(square))
         own_dv, own_dy = dv if equations.v_shape != (0,) else [], None if equations.second_order else dy
