@@ -154,7 +154,7 @@ def increments_last(tracer: Named, roots: Sequence[Any], single: bool = False) -
     work.run()
     tape = _core.Tape(single=single)
     symbols: list[Any] = []
-    for name, of, extra in work.made:
+    for name, of, extra in work.lines:
         symbols.append(of_tape(tape, name, [symbols[each] for each in of], extra))
     names: dict[int, str] = {}
     left: dict[int, str] = {}
