@@ -202,7 +202,7 @@ def test_what_stopped_goes_on_with_more_steps() -> None:
         ({"at": [0.5]}, "at: expected times that ascend from the last time of the run that goes on, 1, on"),
         (
             {"method": "dop853"},
-            "method: expected 'merson', by which the run goes on and which carries more than",
+            "method: expected 'merson', the method of the run that goes on, which carries more than",
         ),
         ({"v": np.zeros(2)}, "resume: expected a run of batch"),
         ({"resume": 3}, "resume: expected a Run or a World that goes on, got 3"),

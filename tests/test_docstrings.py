@@ -14,7 +14,7 @@ import pytest
 import stepwell as sw
 from stepwell.analysis import stability
 from stepwell.model import quaternion
-from stepwell.runs.request import Options
+from stepwell.runs.options import Options
 from stepwell.views import charts
 
 #: Options of every example: arrays may be printed with other spaces by another NumPy.

@@ -350,7 +350,7 @@ def test_progress_is_told_up_to_the_end() -> None:
     told: list[float] = []
     plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=1000, progress=told.append)
     run = driver.Run([sw.Event(crossing)], np.array(0.0), np.array(1.0), None, False)
-    run.made(plan)
+    run.advance(plan)
     assert told == sorted(told)
     assert told[-1] == 1.0
 

@@ -12,7 +12,8 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
 from stepwell.runs.integration import noticing, quietly
-from stepwell.runs.request import Options, Request
+from stepwell.runs.options import Options
+from stepwell.runs.request import Request
 
 PACKAGE = Path(sw.__file__).parent
 SILENCED = re.compile(r"simplefilter|filterwarnings|catch_warnings")

@@ -45,7 +45,7 @@ def test_another_step_is_refused(method: str) -> None:
 def test_what_one_method_carries_is_not_for_another(method: str, other: str) -> None:
     """Leapfrog took Verlet's last y for its v half a step on, without a word."""
     half = piece(method, 10)
-    with pytest.raises(ArgumentError, match=f"method: expected '{method}', by which the run goes on and which carries more"):
+    with pytest.raises(ArgumentError, match=f"method: expected '{method}', the method of the run that goes on, which carries"):
         piece(other, 10, resume=half)
     with pytest.raises(ArgumentError, match="resume: expected a run with adaptive steps, since tolerance= or at= was given"):
         sw.integrate(chain(), "merson", at=[2.0], resume=half)
@@ -261,7 +261,7 @@ def test_events_that_change_the_state_are_asked_for(first: Any, second: Any, who
     """Without them another motion would follow without a word; ``[]`` says that this is meant."""
     run = sw.integrate(drug(), "dop853", y=1.0, events=dose, **first)
     for resume in (run, filed(run, tmp_path, system=drug)):
-        with pytest.raises(ArgumentError, match=r"events: .* of which dose changed the state so far, got None; give them again"):
+        with pytest.raises(ArgumentError, match=r"events: .* whose state was changed by dose, got None; give them again"):
             sw.integrate(drug(), "dop853", **second, resume=resume)
         again = sw.integrate(drug(), "dop853", events=dose, **second, resume=resume)
         assert again.y[-1] == sw.integrate(drug(), "dop853", y=1.0, events=dose, **whole).y[-1]
@@ -274,5 +274,5 @@ def test_events_that_change_the_state_are_asked_for(first: Any, second: Any, who
 def test_a_world_asks_for_them_too() -> None:
     world = sw.World(drug(), "rk4", v=np.zeros((0, 2)), y=np.ones(2), dt=0.1, events=dose)
     world.step(40)
-    with pytest.raises(ArgumentError, match=r"events: .* of which dose changed the state so far"):
+    with pytest.raises(ArgumentError, match=r"events: .* whose state was changed by dose"):
         sw.World(drug(), "rk4", resume=world)

@@ -200,9 +200,9 @@ def test_what_is_kept_is_counted_as_it_is() -> None:
     for steps in (1, 2, 7, 9):
         for every in (None, 1, 2, 3, 9, 100):
             plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=steps, every=every)
-            assert plan.kept == len(plan.saves)
+            assert plan.save_count == len(plan.saves)
             run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=steps, every=every)
-            assert len(run.t) == plan.kept
+            assert len(run.t) == plan.save_count
             np.testing.assert_array_equal(run.t, 0.1 * plan.saves)
 
 

@@ -14,10 +14,10 @@ from .result import AdaptiveState, Paces, Run
 
 
 def adaptive_run(request: Request) -> Run:
-    """Make the run; its diagnostics are for others."""
+    """Make the run, without its diagnostics."""
     assert request.step_control is not None
-    plan, (pacing, paces, t0, times, going_on, every, start), how = request.plan, request.step_control, request.plan.method
-    ended, adapt, keeper = None, engine.adapt, None
+    plan, (pacing, paces, t0, times, going_on, every, start), method = request.plan, request.step_control, request.plan.method
+    with_events, adapt, keeper = None, engine.adapt, None
     if every is not None:
         from .kept_steps import StepKeeper  # only such runs need it
 
@@ -26,18 +26,18 @@ def adaptive_run(request: Request) -> Run:
     if request.events is not None:
         from .events import adaptive  # only such runs need it
 
-        ended = adaptive.AdaptiveRun(request.events, None if keeper is None else keeper.adapt)
-        adapt = ended.adapt
+        with_events = adaptive.AdaptiveRun(request.events, None if keeper is None else keeper.adapt)
+        adapt = with_events.adapt
     shown: Any = nullcontext(None)
     if request.progress:
         from ..base.progress import bar
 
-        shown = bar(f"{how.title} to t = {times[-1].max():g}")
+        shown = bar(f"{method.title} to t = {times[-1].max():g}")
     with shown as progress:
         out = adapt(plan if progress is None else plan._replace(progress=progress), pacing, paces, request.v, request.y)
     accepted, rejected, extra_steps = out.paces[engine.COUNTS].astype(np.int64)
-    # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
-    again = out.paces[engine.HELD] > 0.0 if how.has_series and not plan.fused else extra_steps
+    # A series needs no further evaluation for the states within a step, unless operations are fused.
+    again = out.paces[engine.HELD] > 0.0 if method.has_series and not plan.fused else extra_steps
     evaluations = out.evaluations * (accepted + rejected + again)
     stopped, sign = np.count_nonzero(out.status) > 0, -1.0 if plan.backward else 1.0
     control = request.system.control
@@ -53,29 +53,31 @@ def adaptive_run(request: Request) -> Run:
         first_bad_step=np.where(out.status == 0, -1, accepted + 1) if stopped else np.full(plan.batch, -1),
         carry=None,
         system=request.system,
-        method=how,
+        method=method,
         dt=1.0,
         t0=t0 if t0.ndim else t0.item(),
         start_step=0,
         steps=0,
         start=None,
         paces=Paces(sign * out.paces[engine.TIME], sign * out.paces[engine.STEP], accepted, rejected, evaluations),
-        controller_state=AdaptiveState(out.last_v, out.last_y, _aimed(out.paces, pacing.at[-1]), times[-1], how.name, going_on),
+        controller_state=AdaptiveState(
+            out.last_v, out.last_y, _with_target(out.paces, pacing.at[-1]), times[-1], method.name, going_on
+        ),
         fused=plan.fused,
         force=plan.force,
-        work=None if control is None else out.paces[engine.WORK] / engine.pushes(control, how.attempt_evaluations),
+        work=None if control is None else out.paces[engine.WORK] / engine.pushes(control, method.attempt_evaluations),
     )
     for name in request.record:
         run.recorded[name] = run.quantity(name)
     if stopped:
         run.stopped_at = np.where(out.status == 0, np.nan, sign * out.paces[engine.TIME])
-    if ended is not None:
-        ended.tell(run)
+    if with_events is not None:
+        with_events.write_to(run)
     return run
 
 
-def _aimed(paces: Array, target: float) -> Array:
-    """The same with another output time."""
+def _with_target(paces: Array, target: float) -> Array:
+    """The paces with another next output time."""
     paces = paces.copy()
     paces[engine.TARGET] = target
     return paces

@@ -1,7 +1,6 @@
-"""How a run or a world goes on: what it is known by, what its method carries, and for which system and state that holds.
+"""How a run or a world goes on: its state, what its method carries, and whether that still holds.
 
-A carry is of one system and one state: the step that it holds was made by them. Of another system, or from another state, a run
-begins anew at the saved state.
+A carry holds for one system and one state. With another system, or from another state, a run begins anew at the saved state.
 """
 
 from __future__ import annotations
@@ -29,14 +28,14 @@ class Continuation(NamedTuple):
 
     Attributes:
         system: what was stepped, with its control.
-        method: by which.
+        method: the method.
         v: velocities of all members, shape (*block, *batch).
         y: coordinates, likewise.
-        options: further arguments of ``integrate`` by which it goes on, for those that are not given again.
-        carry: what the method carries in place of v; of adaptive steps the state of the step-size controller; or None.
+        options: further arguments of ``integrate``, for those that are not given again.
+        carry: what the method carries in place of v; with adaptive steps the state of the step-size controller; or None.
         first_bad_step: the step at which each member diverged, −1 for none; None if no member did.
         changed_by: names of the events that changed the state.
-        adaptive: whether its steps are.
+        adaptive: whether its steps are adaptive.
     """
 
     system: System
@@ -55,9 +54,9 @@ class Continuation(NamedTuple):
         return self.y.shape[len(self.system.y_shape) :]
 
     def holds(self, system: System, batch: Shape, v: Array, y: Array, force: Array | None = None) -> bool:
-        """Whether what is carried holds for a system and a state: if all of their bits are those of this.
+        """Whether the carry holds for a system and a state, which it does if all of their bits are the same as here.
 
-        With adaptive steps the ``force`` counts, too: the step that is held was made under it.
+        With adaptive steps ``force`` counts, too, since it acted in the held step.
         """
         before = self.options["force"] if self.adaptive else None
         one, other = _bits_of(self.system, self.batch, self.v, self.y, before), _bits_of(system, batch, v, y, force)
@@ -68,7 +67,7 @@ def of(resume: Any) -> Continuation:
     """Where a run or a world stands, from which another goes on.
 
     Raises:
-        DTypeError: if it is none.
+        DTypeError: if it is neither.
         UnsupportedError: if a terminal event stopped a member, which has a time of its own.
     """
     if isinstance(resume, Run):
@@ -99,7 +98,7 @@ def _of_run(run: Run) -> Continuation:
     carry = None if run.carry is None else np.require(run.carry, requirements="A")
     options = {"fused": run.fused, "dtype": run.dtype, "control": run.system.keeper, "force": run.force, "t0": run.t0}
     if (state := run.controller_state) is not None:
-        # Members that stopped have no state at the last time but where they stopped.
+        # Members that stopped have no state at the last time; theirs is that of the stop.
         there = is_there(state.pace)
         state = state._replace(**{name: np.require(getattr(state, name), requirements="A") for name in ("v", "y", "pace")})
         v, y = (np.where(there, saved, last) for saved, last in ((v, state.v), (y, state.y)))
@@ -110,7 +109,7 @@ def _of_run(run: Run) -> Continuation:
 
 
 def _bits_of(system: System, batch: Shape, v: Array, y: Array, force: Array | None) -> Iterator[Any]:
-    """By what a system, with its control, and a state of a batch are known."""
+    """All bits that identify a system with its control and a state of a batch."""
     yield system.kernel
     yield batch
     for name, value in system.parameters(batch):
@@ -125,7 +124,7 @@ def _bits_of(system: System, batch: Shape, v: Array, y: Array, force: Array | No
 
 
 def _bits(rows: Array) -> bytes:
-    """The numbers of each member; those of one where all have the same, since it does not matter how they were given."""
+    """The bits of each member's numbers; of one member if all have the same, however they were given."""
     bits = np.ascontiguousarray(rows).view(np.int64)
     if bits.shape[1] > 1 and (bits == bits[:, :1]).all():
         bits = bits[:, :1]
@@ -140,33 +139,33 @@ def _word(system: System, value: Any) -> bytes:
 
 
 def goes_on_alike(before: Continuation, method: Method, dt: float | None = None) -> None:
-    """Raise if a run goes on by another method, whose carry means something else, or by another step."""
+    """Raise if a run goes on with another method, whose carry means something else, or another step."""
     if dt is not None and dt != before.options["dt"]:
         raise ArgumentError(f"dt: expected the step of the run that goes on, {before.options['dt']!r}, got {dt!r}; {ANEW}")
     if before.carry is not None and before.method is not method:
         raise ArgumentError(
-            f"method: expected {before.method.name!r}, by which the run goes on and which carries more than its state, got "
-            f"{method.name!r}; {ANEW}"
+            f"method: expected {before.method.name!r}, the method of the run that goes on, which carries more than its state, "
+            f"got {method.name!r}; {ANEW}"
         )
 
 
 def changes_on(before: Continuation, events: Any) -> None:
-    """Raise if a run goes on without the events that changed the state so far: another motion would follow, without a word."""
+    """Raise if a run goes on without the events that changed the state so far, since another motion would follow silently."""
     if events is None and before.changed_by:
         raise ArgumentError(
-            f"events: expected the events of the run that goes on, of which {', '.join(before.changed_by)} changed the state so "
-            f"far, got None; give them again, or events=[] to go on without"
+            f"events: expected the events of the run that goes on, whose state was changed by {', '.join(before.changed_by)}, "
+            f"got None; give them again, or events=[] to go on without"
         )
 
 
 def taken_up(
     plan: engine.Plan, pacing: engine.Pacing, before: Continuation, v: Array, y: Array
 ) -> tuple[Array, Array, Array, bool]:
-    """Where members go on, their states there, and whether they begin anew: of another system, or from another state."""
+    """The step-size controllers and states of members, and whether they begin anew, as with another system or state."""
     assert isinstance(before.carry, AdaptiveState)
     pace, state = before.carry.pace.copy(), before.carry
     pace[engine.WORK] = 0.0  # no control has done anything yet in this run
-    # A run that saved its start alone did not know of a time of the run, of which the first step from rest may be a part.
+    # A run that saved only its start did not know the length of the run, on which the first step from rest may depend.
     begins = not pace[engine.COUNTS].any() and not pace[engine.HELD].any() and bool((pace[engine.STEP] == engine.BLIND).any())
     if begins or not before.holds(plan.system, plan.batch, v, y, plan.force):
         return _begun_anew(plan, pacing, pace), v, y, True
@@ -174,19 +173,19 @@ def taken_up(
 
 
 def is_there(pace: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Members that reached the last output time; others stopped at a time of their own."""
+    """Which members reached the last output time; others stopped before."""
     there: np.ndarray[Any, np.dtype[np.bool_]] = (pace[engine.HELD] > 0.0) | (pace[engine.TIME] >= pace[engine.TARGET])
     return there
 
 
 def standing(pace: Array) -> Array:
-    """The times of the states with which members go on: the last output time, or that at which they stopped."""
+    """The times from which members go on: the last output time, or the time of their stop."""
     times: Array = np.where(is_there(pace), pace[engine.TARGET], pace[engine.TIME])
     return times
 
 
 def _begun_anew(plan: engine.Plan, pacing: engine.Pacing, pace: Array) -> Array:
-    """The pace of members that begin with the same tolerance where they were saved, or where they stopped before."""
+    """The step-size controllers of members that begin anew, with their tolerance, where they were saved or stopped."""
     time = standing(pace)
     groups = engine.groups_of(plan)
     own = pace[engine.PACE_NUMBERS + groups :]

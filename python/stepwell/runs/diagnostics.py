@@ -1,4 +1,4 @@
-"""What there is to notice of a run: members that diverged or stopped, and numbers that are finite and yet mean nothing."""
+"""Findings of a run: members that diverged or stopped, and numbers that are finite but mean nothing."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ from .tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance
 #: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
 DOUBTFUL_CHANGE = 0.5
 
-#: One member of at most so many bodies is summed in floats. That takes some microseconds, so a run of this many rate evaluations
-#: does not notice it.
+#: The energy of one member of at most FEW_BODIES bodies is summed in floats. That takes some microseconds, little beside a run of
+#: FEW_EVALUATIONS.
 FEW_BODIES, FEW_EVALUATIONS = 8, 100
 
-#: Other energies take NumPy: a run must make so many rate evaluations, and of so many pairs in all, not to notice it. States of
-#: more numbers than the last would take memory that was not counted.
+#: NumPy computes other energies, which is little beside a run of this many rate evaluations and pairs in all. States of more than
+#: MOST_NUMBERS would take memory that was not counted.
 EVALUATIONS, PAIRS, MOST_NUMBERS = 2000, 200_000, 1_000_000
 
-#: From so many bodies on the core has an energy, with a step that is not needed, sooner than NumPy.
+#: From this many bodies on the core computes an energy faster than NumPy, although it makes a step too.
 MIN_BODIES_BY_CORE = 24
 
-#: Pairs are looked at in so many saved states at most.
+#: Pairs are checked in at most this many saved states.
 STATES = 32
 
 State = tuple[Array, Array]
-#: What is to be said, and of which members.
+#: A message, and the members that it is about.
 About = tuple[str, Any]
 
 
@@ -56,9 +56,9 @@ class Ends(NamedTuple):
 
 
 def findings_of(run: Run, request: Request, heard: Callable[[type[Warning]], bool]) -> tuple[Finding, ...]:
-    """What is noticed of a run: how it ended, and what means nothing, as far as that is seen at little cost.
+    """Findings of a run: how it ended, and which numbers mean nothing, as far as that costs little.
 
-    What takes longer than to evaluate the end is computed only if its warning is ``heard``.
+    What takes longer than an evaluation of the last state is computed only if its warning is ``heard``.
     """
     noticed = list(run.findings)  # of events that it came to rest at
     if run.paces is None:
@@ -70,7 +70,7 @@ def findings_of(run: Run, request: Request, heard: Callable[[type[Warning]], boo
         noticed += of_stops(run)
         if (lost := _of_a_lost_motion(run, request)) is not None:
             noticed.append(lost)
-    # What an event makes of a state tells nothing of the steps, and what a method carries not where it began.
+    # The energy says nothing where events changed the state, nor where the run began from what a method carries.
     began = not request.carried and request.before is None
     if request.events is not None and any(event.then for event in request.events):
         began = False
@@ -82,12 +82,12 @@ def findings_of(run: Run, request: Request, heard: Callable[[type[Warning]], boo
 
 
 def _of_nonsense(run: Run, start: State | None, request: Request, heard: Callable[[type[Warning]], bool]) -> list[Finding]:
-    """What is finite and yet means nothing; ``start`` is None if it went on from what a method carries."""
+    """Findings of numbers that are finite but mean nothing; ``start`` is None if it is not known."""
     system = run.system
     if not isinstance(system, NBody):
         about = system.doubt(run.y)
         if about is None and start is not None:
-            about = known_energy.told(run, start, None if request.step_control is None else partial(_visited, request), heard)
+            about = known_energy.doubt_of(run, start, None if request.step_control is None else partial(_visited, request), heard)
         return [] if about is None else [Finding(AccuracyWarning, *about)]
     noticed = []
     if run.force is None:
@@ -107,7 +107,7 @@ def _of_nonsense(run: Run, start: State | None, request: Request, heard: Callabl
 
 
 def _visited(request: Request, index: Whole) -> tuple[Array, Array, Array]:
-    """Between which y some members have been at the ends of their steps, and how many attempts were rejected."""
+    """The least and the largest y of some members at the ends of their steps, and how many attempts were rejected."""
     from .events.attempts import extremes  # only runs beside a barrier need it
 
     assert request.step_control is not None
@@ -163,7 +163,7 @@ def _of_divergence(run: Run, request: Request) -> Finding | None:
 
 
 def _of_a_lost_motion(run: Run, request: Request) -> Finding | None:
-    """Members whose absolute tolerance is most of what a step may err, and much of the motion."""
+    """Members whose absolute tolerance is most of the tolerated error of a step, and much of the motion."""
     assert run.controller_state is not None
     pace = run.controller_state.pace
     if request.plan.acceptance.own or not (pace[engine.ABSOLUTE] > engine.LEAST).any():
@@ -181,9 +181,10 @@ def _of_a_lost_motion(run: Run, request: Request) -> Finding | None:
 
 
 def _of_a_control(run: Run, bodies: NBody, start: State | None) -> About | None:
-    """When h·C·K passed 1 under a control in the printed form, which overshoots from there on. At the start it was told before.
+    """When h·C·K passed 1 under a control in the printed form, which overshoots from there on.
 
-    It is looked at in saved states, and then in every state of the first such member, or of the first that diverged.
+    ``of_a_strong_control`` reports it at the start. Here the saved states are checked, then every state of the first such member,
+    or of the first that diverged.
     """
     control = bodies.control
     if not (isinstance(control, EnergyControl) and control.form == "printed"):
@@ -200,10 +201,10 @@ def _of_a_control(run: Run, bodies: NBody, start: State | None) -> About | None:
     if not over.any():
         return None
     index = tuple(np.argwhere(over)[0].tolist())
-    found = run.overshoots(index, encounters.MAX_RERUN)
-    if found is None:
+    overshoot = run.overshoots(index, encounters.MAX_RERUN)
+    if overshoot is None:
         return None
-    step, strength = found
+    step, strength = overshoot
     text = (
         f"gain: h·C·K = {strength:.3g} at step {step} (t = {time_of(run, step, index):g}){of_member(index)}, expected below 1: "
         f'from there on the printed form overshoots and may overflow; use a smaller gain or step, or form="limited"'
@@ -212,12 +213,12 @@ def _of_a_control(run: Run, bodies: NBody, start: State | None) -> About | None:
 
 
 def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: Shape | None) -> About | None:
-    """Two bodies that met within a step, if there is reason to look for them and it takes a moment.
+    """Two bodies that met within a step, if something suggests it and the search takes a moment.
 
     Args:
-        run: which.
+        run: the run.
         bodies: its system.
-        start: where it began; None if it went on.
+        start: its first state; None if that is not known.
         doubtful: a member whose energy is doubtful, or None.
     """
     suspects = [doubtful] if doubtful is not None else [] if start is None else _suspects(run, bodies, start)
@@ -227,7 +228,7 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: Shape
         if left <= 0.0:
             break
         if run.status[index]:
-            continue  # it diverged, which was told with the pair
+            continue  # it diverged, and that finding names the pair
         if (met := run.encounter(index, left)) is not None:
             i, j = met.bodies
             text = (
@@ -242,25 +243,25 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: Shape
 def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
     """Indices of members in which two bodies would pass each other within one step.
 
-    They would if the two went on alone from the start or from a saved state, or did so before the end.
+    The two are taken to move alone from the start, from a saved state, or backward from the end.
     """
-    n, members, made = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
-    # Where time runs back, bodies are looked at that go the other way.
+    n, members, evaluations = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
+    # Where time runs back, velocities are reversed.
     h, time, way = abs(run.dt), run.steps * abs(run.dt), 1.0 if run.dt > 0.0 else -1.0
-    # As many states as are little work against the run. Time runs back from the last.
+    # As many states as are little work beside the run. From the last one time runs back.
     few = run.status.ndim == 0 and n <= FEW_BODIES
-    looked = min(STATES, len(run.t) - 1, made // EVALUATIONS)
+    looked = min(STATES, len(run.t) - 1, evaluations // EVALUATIONS)
     between = np.linspace(1, len(run.t) - 1, looked, endpoint=False, dtype=int).tolist() if len(run.t) > 2 else []
     states = [(way * v, y) for v, y in (start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1]))]
     if few:
-        if made < FEW_EVALUATIONS:
+        if evaluations < FEW_EVALUATIONS:
             return []
         return (
             [()]
             if any(encounters.may_meet(bodies, h, time, *(_lists(block, bodies.y_shape) for block in state)) for state in states)
             else []
         )
-    if made < EVALUATIONS or made * members * n * n < 2 * PAIRS or members * n * n > MOST_NUMBERS:
+    if evaluations < EVALUATIONS or evaluations * members * n * n < 2 * PAIRS or members * n * n > MOST_NUMBERS:
         return []
     may = np.zeros(run.status.shape, dtype=bool)
     for v, y in (states[0], states[-1]):
@@ -269,7 +270,7 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
 
 
 def _of_energy(method: str, ends: Ends) -> tuple[str, Any, Shape] | None:
-    """What is to be said, of which members, and the first of them."""
+    """A message, its members, and the first of them."""
     first, last, _ = ends
     wrong = _changed(ends)
     if not wrong.any():
@@ -285,7 +286,7 @@ def _of_energy(method: str, ends: Ends) -> tuple[str, Any, Shape] | None:
 
 
 def _changed(ends: Ends) -> Any:
-    """Where an energy at the end is of another size than at the start."""
+    """Where the energy has another size at the end."""
     first, last, moved = ends
     with np.errstate(all="ignore"):
         wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
@@ -293,16 +294,16 @@ def _changed(ends: Ends) -> Any:
 
 
 def _of_massless(run: Run, bodies: NBody, start: State) -> tuple[str, Any, Shape] | None:
-    """What is to be said of bodies without mass around a single one with mass, of which members, and the first of them.
+    """A message about bodies without mass around a single body with mass, its members, and the first of them.
 
-    The energy of all bodies is blind to them. Relative to a single attractor each keeps its energy per unit of mass; several
-    attractors may take from it or add to it as much as they like.
+    The energy of all bodies does not depend on them. Relative to a single attractor each keeps its energy per unit of mass, which
+    several attractors may change.
     """
     if bodies.masses.all():
-        return None  # the usual case, which takes a microsecond
+        return None  # the usual case, checked in a microsecond
     alone = np.count_nonzero(bodies.masses, axis=0) == 1
-    made = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
-    if not alone.any() or made < FEW_EVALUATIONS or run.y[-1].size > MOST_NUMBERS:
+    evaluations = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
+    if not alone.any() or evaluations < FEW_EVALUATIONS or run.y[-1].size > MOST_NUMBERS:
         return None
     (v, y), batch = (run.v[-1], run.y[-1]), run.status.shape
     masses = np.broadcast_to(aligned(bodies.masses, 1, batch), (len(y), *batch))
@@ -333,7 +334,7 @@ def _of_massless(run: Run, bodies: NBody, start: State) -> tuple[str, Any, Shape
 
 
 def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
-    """What was recorded, or what is computed now where that costs little against the run; None where it would not."""
+    """The recorded energies, or energies computed now if that costs little beside the run, else None."""
     if "energy" in run.recorded and len(run.t) > 1:
         with np.errstate(all="ignore"):
             moved = np.maximum(bodies.kinetic(run.v[0]), bodies.kinetic(run.v[-1]))
@@ -343,10 +344,10 @@ def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
         return None
     end = run.v[-1], run.y[-1]
     n, members = len(end[1]), run.status.size
-    made = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
+    evaluations = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
     if run.status.ndim == 0 and n <= FEW_BODIES:
-        return _of_few(bodies, start, end) if made >= FEW_EVALUATIONS else None
-    if made < EVALUATIONS or made * members * n * n < 2 * PAIRS or prod(end[1].shape) > MOST_NUMBERS or not members:
+        return _of_few(bodies, start, end) if evaluations >= FEW_EVALUATIONS else None
+    if evaluations < EVALUATIONS or evaluations * members * n * n < 2 * PAIRS or prod(end[1].shape) > MOST_NUMBERS or not members:
         return None
     start = np.broadcast_to(start[0], end[0].shape), start[1]  # one number may have been given for all
     with np.errstate(all="ignore"):
@@ -355,7 +356,7 @@ def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
 
 
 def _energies(run: Run, bodies: NBody, v: Array, y: Array) -> Array:
-    """The energies of a state, which have the same bits either way."""
+    """The energies of a state, with the same bits by the core and by NumPy."""
     if len(y) < MIN_BODIES_BY_CORE:
         return bodies.energy(v, y)
     step = engine.Plan(bodies, method("false_euler"), run.status.shape, 1.0, every=1, threads=1, record=("energy",))
@@ -366,12 +367,12 @@ def _energies(run: Run, bodies: NBody, v: Array, y: Array) -> Array:
 
 
 def _least(counts: Any) -> int:
-    """The least of some counts."""
+    """The least count, huge without members."""
     return int(counts) if counts.ndim == 0 else int(counts.min(initial=2**62))
 
 
 def _of_few(bodies: NBody, start: State, end: State) -> Ends | None:
-    """The energies of one member, or None where they are not doubtful, which is told without an array."""
+    """The energies of one member; None if they are not doubtful, without making an array."""
     (first, moved_first), (last, moved_last) = (_summed(bodies, v.tolist(), y.tolist()) for v, y in (start, end))
     moved = max(moved_first, moved_last)
     if abs(last - first) <= DOUBTFUL_CHANGE * max(moved, abs(first), abs(last)):
@@ -381,12 +382,12 @@ def _of_few(bodies: NBody, start: State, end: State) -> Ends | None:
 
 def _lists(block: Array, shape: Shape) -> Any:
     """A block of one member as lists; one number may have been given for all."""
-    found = block.tolist()
-    return found if isinstance(found, list) else [[found] * shape[1]] * shape[0]
+    numbers = block.tolist()
+    return numbers if isinstance(numbers, list) else [[numbers] * shape[1]] * shape[0]
 
 
 def _summed(bodies: NBody, v: Any, y: Any) -> tuple[float, float]:
-    """The energy of one state, of lists or of one number for all of v, and its kinetic part, in floats; NaN if not finite."""
+    """The energy of one state and its kinetic part, in floats, NaN if not finite; ``v`` may be one number for all."""
     if not isinstance(v, list):
         v = [[v] * len(row) for row in y]
     masses, soft = bodies.masses.tolist(), float(bodies.softening) ** 2
@@ -399,6 +400,6 @@ def _summed(bodies: NBody, v: Any, y: Any) -> tuple[float, float]:
             for j in range(i):
                 square = sum((a - b) * (a - b) for a, b in zip(place, y[j], strict=True)) + soft
                 potential += m * masses[j] * (-1.0 / math.sqrt(square) if newton else 0.5 * math.log(square))
-    except (ValueError, ZeroDivisionError):  # two bodies in one place, or what is not finite
+    except (ValueError, ZeroDivisionError):  # two bodies in one place, or numbers that are not finite
         return math.nan, math.nan
     return kinetic + strength * potential, kinetic

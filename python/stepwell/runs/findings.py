@@ -1,4 +1,4 @@
-"""What a run noticed: data on the run, which the public functions turn into warnings."""
+"""Findings about a run, which the public functions turn into warnings."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Finding(NamedTuple):
 
 
 def is_heard(category: type[Warning]) -> bool:
-    """Whether a warning is not ignored altogether: what takes a while to look for need not be looked for then."""
+    """Whether a warning of this class may be shown; if not, a search that takes a while can be left out."""
     for action, message, ignored, module, _ in warnings.filters:
         if message is None and module is None and issubclass(category, ignored):
             return action != "ignore"

@@ -17,25 +17,26 @@ from .result import Run
 
 
 def fixed_run(request: Request) -> Run:
-    """Make the run; its diagnostics are for others."""
-    plan, v, y, carried, how = request.plan, request.v, request.y, request.carried, request.plan.method
+    """Make the run, without its diagnostics."""
+    plan, v, y, carried, method = request.plan, request.v, request.y, request.carried, request.plan.method
     make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=request.before, carried=carried)
-    ended = None
+    with_events = None
     if request.events is not None:
         from .events import driver  # only such runs need it
 
-        ended = driver.Run(request.events, v, y, request.before, carried)
-        make = ended.made
+        with_events = driver.Run(request.events, v, y, request.before, carried)
+        make = with_events.advance
     if request.progress:
         from ..base.progress import bar
 
-        with bar(f"{how.title}, {plan.steps} steps") as shown:
+        with bar(f"{method.title}, {plan.steps} steps") as shown:
             out = make(plan._replace(progress=shown))
     else:
         out = make(plan)
-    collides, alone = isinstance(request.system, NBody), plan.of_core()  # bodies know no time
+    collides, alone = isinstance(request.system, NBody), plan.of_core()  # the rates of bodies do not depend on the time
     if collides:
-        v, y = _kept(v), _kept(y)  # for ``collisions`` and ``encounters``; the arrays that were given are the user's to change
+        # ``collisions`` and ``encounters`` need the start later, and the user may change the arrays meanwhile.
+        v, y = _small_copy(v), _small_copy(y)
     run = Run(
         t=_times(plan),
         v=out.v,
@@ -43,9 +44,9 @@ def fixed_run(request: Request) -> Run:
         # Status.OK is 0 and Status.DIVERGED 1
         status=np.asarray(out.first_bad >= 0).view(np.int8) if out.diverged else np.zeros(plan.batch, np.int8),
         first_bad_step=out.first_bad,
-        carry=None if how.carry is None else out.slot,
+        carry=None if method.carry is None else out.slot,
         system=request.system,
-        method=how,
+        method=method,
         dt=plan.dt,
         t0=plan.t0,
         start_step=plan.first,
@@ -59,8 +60,8 @@ def fixed_run(request: Request) -> Run:
         work=out.work,
         force=plan.force,
     )
-    if ended is not None:
-        ended.tell(run)
+    if with_events is not None:
+        with_events.write_to(run)
     for name in request.record:
         if name not in run.recorded:
             run.recorded[name] = run.quantity(name)
@@ -68,15 +69,15 @@ def fixed_run(request: Request) -> Run:
 
 
 def _times(plan: engine.Plan) -> Array:
-    """t0 + k·dt of every saved state; there may be millions of them."""
+    """t0 + k·dt of every saved state."""
     if plan.every is None:
         return np.array([plan.t0 + (plan.first + plan.steps) * plan.dt])
-    t: Array = buffer_pool.empty((plan.kept,))
+    t: Array = buffer_pool.empty((plan.save_count,))
     _core.times(plan.of_core(), t)
     return plan.t0 + t.reshape(-1, *(1,) * len(plan.batch)) if isinstance(plan.t0, np.ndarray) else t
 
 
-def _kept(array: Array) -> Array:
-    """A copy that is as small as what it was spread from."""
+def _small_copy(array: Array) -> Array:
+    """A copy of the array that this one was broadcast from, broadcast again."""
     own = checks.once_of(array).copy()
     return own if own.shape == array.shape else np.broadcast_to(own, array.shape)

@@ -1,4 +1,4 @@
-"""What runs of float32 are checked for, before any work."""
+"""Checks of runs in float32."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def check(system: System, method: Method, form: str = "direct") -> None:
-    """Raise if nothing of float32 goes with what is asked for."""
+    """Raise if this system, method or form does not go with float32."""
     if form == "power":
         raise UnsupportedError(
             "dtype: float32 does not go with form='power': each squaring of a matrix doubles the error of the power, which is "
@@ -37,7 +37,7 @@ def check(system: System, method: Method, form: str = "direct") -> None:
 
 
 def step(system: System, method: Method, form: str, dt: float) -> float:
-    """The step in float32; raise if there is none, or nothing of float32 goes with what is asked for."""
+    """The step rounded to float32; raise if it is out of range, or if this system, method or form does not go with float32."""
     check(system, method, form)
     return rounded_step(dt)
 
@@ -48,7 +48,7 @@ LEAST_TOLERANCE = 2.0**-23
 
 
 def check_tolerance(relative: Array, absolute: Array | None, sizes: Array) -> None:
-    """Raise if a step tolerates an error that is less than its roundings.
+    """Raise if the tolerance is less than the roundings of a step.
 
     Args:
         relative: of all groups of components of the state, or of each along the first axis.
@@ -75,7 +75,7 @@ def _is_of_rods(system: System) -> bool:
 
 
 def rounded_step(dt: float) -> float:
-    """A step, rounded to float32; raise if nothing is left of it."""
+    """A step, rounded to float32; raise if it becomes zero or infinite."""
     rounded = float(np.float32(dt)) if abs(dt) <= LARGEST_SINGLE else np.inf
     if not 0.0 < abs(rounded) < np.inf:
         raise ArgumentError(f"dt: expected a number of size 1.4e-45 to 3.4e38 units of time in float32, got {dt!r}")
@@ -83,14 +83,14 @@ def rounded_step(dt: float) -> float:
 
 
 def rounded_state(*blocks: Array) -> tuple[Array, ...]:
-    """The numbers of float32 that are nearest to those of a start; raise if some are beyond its range."""
+    """A start, rounded to float32; raise if a number is out of range."""
     for name, block in zip("vy", blocks, strict=True):
         fits_single(name, block)
     return tuple(block.astype(np.float32).astype(np.float64) for block in blocks)
 
 
 def check_written(system: System, what: str) -> None:
-    """Raise if a step that is written out would need numbers of both widths."""
+    """Raise if an exported step would need numbers of both widths."""
     for name, each in system.all_inputs().items():
         if isinstance(each, Sampled) and not each.constant:
             raise UnsupportedError(
@@ -100,7 +100,7 @@ def check_written(system: System, what: str) -> None:
 
 
 def check_inputs(system: System, last: float) -> None:
-    """Raise if an input is not defined in float32 up to a time."""
+    """Raise if an input is not defined in float32 up to this time."""
     for name, each in system.all_inputs().items():
         if isinstance(each, Sinusoid):
             angle = float(np.abs(each.omega).max() * abs(last) + np.abs(each.phase).max())

@@ -12,7 +12,8 @@ from .adaptive import adaptive_run
 from .diagnostics import findings_of
 from .findings import is_heard, warn_of
 from .fixed import fixed_run
-from .request import Options, Request
+from .options import Options
+from .request import Request
 from .result import Run
 
 if TYPE_CHECKING:
@@ -159,12 +160,12 @@ def integrate(
 
 
 def step(request: Request) -> Run:
-    """The run that was asked for. It is not looked at what it means, and nothing is warned of."""
+    """The requested run, without findings and warnings."""
     return fixed_run(request) if request.step_control is None else adaptive_run(request)
 
 
 def noticing(request: Request, heard: Callable[[type[Warning]], bool] = lambda _: True) -> Run:
-    """The run that was asked for, with its findings; what takes a while to find is looked for if it is ``heard``."""
+    """The requested run with its findings; what takes a while to find is searched only if its warning is ``heard``."""
     run = step(request)
     if findings := findings_of(run, request, heard):
         run.findings = findings
@@ -172,5 +173,5 @@ def noticing(request: Request, heard: Callable[[type[Warning]], bool] = lambda _
 
 
 def quietly(system: System, method: str | Method, **options: Any) -> Run:
-    """The run of the same arguments as ``integrate`` takes, for what judges a run by itself: nothing is looked for in it."""
+    """``integrate`` without findings and warnings, for callers that judge a run themselves."""
     return step(Request.of(system, method, Options(**options)))

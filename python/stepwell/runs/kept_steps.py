@@ -1,4 +1,4 @@
-"""Adaptive runs that keep the state at every so manieth accepted step of each member."""
+"""Adaptive runs that save the state at every n-th accepted step of each member."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..base.arrays import Array, Whole
 from . import engine
 from .events.members import Members
 
-#: How many numbers of steps the core fills before they are taken over.
+#: The most numbers that the core fills with states of steps before they are copied.
 NUMBERS_AT_ONCE = 1 << 21
 
 
 class StepKeeper:
-    """Makes runs as ``engine.adapt`` does, and keeps the state at every so manieth accepted step of each member."""
+    """Makes runs as ``engine.adapt`` does, and saves the state at every n-th accepted step of each member."""
 
     def __init__(self, every: int) -> None:
         self._every = every
@@ -32,7 +32,7 @@ class StepKeeper:
         index: Whole | None = None,
         until: Any = None,
     ) -> engine.Adapted:
-        """Make it, of these members of the whole run, each of which may stop before its end, ``until`` a time (NaN for none)."""
+        """Step these members of the whole run. Each may stop early, at its time in ``until`` (NaN for the end of the run)."""
         index = np.arange(plan.members) if index is None else index
         end = np.broadcast_to(pacing.at[-1], plan.batch).reshape(-1)
         until = end if until is None else np.where(np.isnan(until), end, until)
@@ -50,27 +50,27 @@ class StepKeeper:
             part = members.plan(left)
             at, jumps = (_of_members(times, plan, left) for times in (pacing.at, pacing.jumps))
             again = pacing._replace(at=at, jumps=jumps, begins=False, room=self._room(part, pacing.budget))
-            made = engine.adapt(part, again, np.ascontiguousarray(rows[:, left]), *(end[..., left] for end in ends))
-            self._take(index[left], made, until[left])
-            rows[:, left], status[left] = made.paces, made.status
-            for (saved, _), block in zip(states, (made.v, made.y), strict=True):
+            piece = engine.adapt(part, again, np.ascontiguousarray(rows[:, left]), *(end[..., left] for end in ends))
+            self._take(index[left], piece, until[left])
+            rows[:, left], status[left] = piece.paces, piece.status
+            for (saved, _), block in zip(states, (piece.v, piece.y), strict=True):
                 saved[..., left] = block
-            for end, block in zip(ends, (made.last_v, made.last_y), strict=True):
+            for end, block in zip(ends, (piece.last_v, piece.last_y), strict=True):
                 end[..., left] = block
-            left = left[made.status == engine.FULL]
+            left = left[piece.status == engine.FULL]
         return out
 
     def saved(
         self, plan: engine.Plan, start: tuple[Array, Array, Array], last: tuple[Array, Array, Array]
     ) -> tuple[Array, Array, Array]:
-        """The states at the start, those of the steps, and those at the end, each as t, v and y; NaN where a member has no more.
+        """The states at the start, at the steps and at the end, each as t, v and y; NaN where a member has no more.
 
-        The times are those of the plan.
+        Times are those of the plan.
         """
         total, batch = plan.members, plan.batch
         count = np.zeros(total, np.int64)
-        kept = [(index, steps, _within(steps, until)) for index, steps, until in self._parts]
-        for index, _, there in kept:
+        parts = [(index, steps, _within(steps, until)) for index, steps, until in self._parts]
+        for index, _, there in parts:
             count[index] += there.sum(axis=0)
         rows = 2 + int(count.max(initial=0))
         blocks = []
@@ -81,7 +81,7 @@ class StepKeeper:
             blocks.append(block)
         flat = [block.reshape(rows, *block.shape[1 : block.ndim - len(batch)], total) for block in blocks]
         count[:] = 1
-        for index, steps, there in kept:
+        for index, steps, there in parts:
             row, place = np.nonzero(there)
             to = count[index[place]] + row
             for block, values in zip(flat, steps[1:], strict=True):
@@ -90,7 +90,7 @@ class StepKeeper:
         return blocks[0], blocks[1], blocks[2]
 
     def _room(self, plan: engine.Plan, budget: int) -> int:
-        """How many steps of each member the core keeps before they are taken over."""
+        """How many steps of each member the core saves before they are copied."""
         numbers = 1 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
         return int(max(1, min(NUMBERS_AT_ONCE // (numbers * max(plan.members, 1)), budget // self._every)))
 
@@ -102,7 +102,7 @@ class StepKeeper:
 
 
 def _of_members(times: Any, plan: engine.Plan, index: Whole) -> Any:
-    """Times of these members, which may be those of all."""
+    """Times of these members, from times of each or of all."""
     if times is None or times.ndim == 1:
         return times
     wide = np.broadcast_to(times.reshape(len(times), *(times.shape[1:] or (1,))), (len(times), *plan.batch))
@@ -110,6 +110,6 @@ def _of_members(times: Any, plan: engine.Plan, index: Whole) -> Any:
 
 
 def _within(steps: engine.KeptSteps, until: Any) -> Any:
-    """Which of the steps there are, and are before the end of their member."""
+    """Which entries are steps that end before their member does."""
     there = np.arange(len(steps.t))[:, np.newaxis] < steps.counts
     return there & (np.where(there, steps.t, np.inf) < until)

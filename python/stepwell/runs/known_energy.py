@@ -1,4 +1,4 @@
-"""Runs whose known energy or invariant tells, at their end, that they did not follow the motion; of other systems than bodies."""
+"""Runs whose energy or invariant shows at their end that they did not follow the motion; for systems other than bodies."""
 
 from __future__ import annotations
 
@@ -19,81 +19,83 @@ from .result import Run
 State = tuple[Array, Array]
 #: From the places of members in one row to the least and the most y of each, and how many attempts were rejected.
 Visited = Callable[[Whole], tuple[Array, Array, Array]]
-#: What steps own equations, by the name that the core knows.
+#: The name of the core's kernel for own equations.
 KERNEL_OF_EQUATIONS = "equations"
 Members = np.ndarray[Any, np.dtype[np.bool_]]
-#: What is to be said, and of which members.
+#: A message, and the members that it is about.
 About = tuple[str, Members]
 
-#: It is looked at where a run made so many function evaluations, and has at most so many numbers: that is little work against it.
+#: A run is checked only if it made this many function evaluations and has at most this many numbers, so that checking is little
+#: work beside it.
 FEW_EVALUATIONS, MOST_NUMBERS = 100, 100_000
-#: An invariant is another at the end if it changed by more than this share of what its terms are made of, and either of what they
-#: exchange in the motion, as the kinetic energy of a swing, or of its own size; there, where terms cancel, by more than a share
-#: of its slope times the length of the state. The first two are the same whatever constant is added to it. The second alone would
-#: take a fast rotation that exchanges little for wrong, and the third alone an energy that happens to be zero. Of a quadratic
-#: energy all are the energy, but for the last, which is twice that. Changes below LITTLE of its own size are not looked at,
-#: which takes a hundred microseconds: they would count only beside a constant of a thousand times what is exchanged.
+#: An invariant has changed if its change is more than this share of the size of its terms, and more than this share either of
+#: what its terms exchange in the motion, such as the kinetic energy of a swing, or of its own size; in the last case also more
+#: than CHANGED_OF_SLOPE of its slope times the length of the state, since terms may cancel. The first two sizes do not depend on
+#: a constant that is added to the invariant. The second alone would report a fast rotation that exchanges little, and the third
+#: alone an energy that happens to be zero. For a quadratic energy all of them are the energy, and the last is twice that.
+#: Changes below LITTLE of its own size are not checked, which takes a hundred microseconds: they would count only if a constant
+#: of a thousand times what is exchanged was added.
 CHANGED, CHANGED_OF_SLOPE, LITTLE = 0.5, 0.25, 2.0**-10
-#: The part of a number by which it is changed to find a derivative: a third of its digits, for a central difference.
+#: A central difference changes a number by this part of it: a third of its digits.
 PART = 2.0**-17
-#: Changes of an invariant by v and by y cancel but for this share. Differences are right to the square of the part by which an
-#: angle changes, 1e-5 where a state has some hundred turns a unit of time; damping and drives leave more than a thousandth.
+#: Changes of an invariant by v and by y cancel up to this share. The error of differences is the square of the part by which an
+#: angle changes, 1e-5 with some hundred turns a unit of time; damping and drives leave more than a thousandth.
 CONSTANT = 1e-3
-#: Numbers of a state for whom a gradient is found by differences.
+#: A gradient is computed by differences for states of at most this many numbers.
 MOST_IN_GRADIENT = 64
-#: So many places between the ends of a motion are looked at for a barrier, and so many between two of them, again and again.
+#: A barrier is searched at PLACES places between the ends of a motion, then at FINER places between two of them, TIMES times.
 PLACES, FINER, TIMES = 1024, 33, 3
 #: A barrier counts if it is higher than the energy by more than the roundings of both.
 ROUNDING = 2.0**-40
 
 
 def keeps_energy(run: Run) -> bool:
-    """Whether nothing takes or gives energy in the true motion: no damping, drag, friction, floors, inputs or torques."""
+    """Whether the true motion keeps its energy: no damping, drag, friction, floors, inputs or torques."""
     system: System = run.system.uncontrolled
     if run.force is not None or getattr(system, "torques_act", False):
         return False
     if not all(part.keeps_energy for part in system.around):
         return False
     if system.kernel == KERNEL_OF_EQUATIONS:
-        return True  # its energy is what was declared to be constant
+        return True  # its energy was declared to be constant
     terms = [getattr(system, name, None) for name in ("damping", "drag", "friction")]
     if any(term is not None and np.any(term) for term in terms):
         return False
     return isinstance(system, RigidBody) or not system.given_inputs()
 
 
-def told(run: Run, start: State, visited: Visited | None, heard: Callable[[type[Warning]], bool]) -> About | None:
-    """What is to be said and of which members, or None.
+def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[type[Warning]], bool]) -> About | None:
+    """What shows that members did not follow the motion, and which members; None if nothing does.
 
-    With steps of fixed length a change of the energy is a property of the method, which grows or decays by nature; there it is
-    said only where a method that keeps swings bounded passed a barrier.
+    With steps of fixed length the method itself makes the energy grow or decay. There only a passed barrier counts, and only
+    with a method that keeps swings bounded.
 
     Args:
-        run: which.
+        run: the run.
         start: velocities and coordinates at its start, spread over the batch.
-        visited: between which y some members have been, by their places, at the ends of adaptive steps.
-        heard: whether a warning is of use.
+        visited: between which y some members have been at the ends of adaptive steps, by their places.
+        heard: whether a warning would be shown.
     """
     system, paces = run.system, run.paces
     if paces is None and (run.method.limit == 0.0 or not (isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS)):
         return None  # other systems have no barrier
-    made = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
-    if made < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS or not run.status.size:
+    evaluations = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
+    if evaluations < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS or not run.status.size:
         return None
     if system.keeper is not None or not (names := _names(system)) or not keeps_energy(run) or not heard(AccuracyWarning):
         return None
     start = np.broadcast_to(start[0], run.v.shape[1:]), np.broadcast_to(start[1], run.y.shape[1:])
     with np.errstate(all="ignore"):
         for name in names:
-            about = _of_one(run, name, start, made, visited)
-            # An invariant may have been declared to be recorded, as the energy of what is damped or driven.
+            about = _of_one(run, name, start, evaluations, visited)
+            # An invariant may be declared only to be recorded, such as the energy of a damped or driven system.
             if about is not None and (system.kernel != KERNEL_OF_EQUATIONS or _is_constant(run, name)):
                 return about
     return None
 
 
 def _is_constant(run: Run, name: str) -> bool:
-    """Whether an invariant is one: along the rates at the end, what its change by v and that by y add up to is nothing."""
+    """Whether an invariant is one: along the rates at the end its changes by v and by y cancel."""
     system, v, y = run.system, run.v[-1], run.y[-1]
     alone = system.reference_at_step(1.0, run.status.shape)
     t = np.broadcast_to(run.t[-1], run.status.shape)
@@ -111,12 +113,12 @@ def _is_constant(run: Run, name: str) -> bool:
     return bool((constant | ~np.isfinite(changes[0] + changes[1])).all())
 
 
-def _of_one(run: Run, name: str, start: State, made: int, visited: Visited | None) -> About | None:
-    """What is to be said of one invariant. States are evaluated together, since a call takes longer than a thousand numbers."""
+def _of_one(run: Run, name: str, start: State, evaluations: int, visited: Visited | None) -> About | None:
+    """What one invariant shows. States are evaluated together, since a call takes longer than a thousand numbers."""
     system = run.system
     # Of few members it takes some tenths of a millisecond; else a place takes as long as some hundred evaluations of the core.
     few = run.status.size * PLACES <= MOST_NUMBERS // 10
-    places = PLACES if few else min(PLACES, MOST_NUMBERS // run.status.size, made // 100)
+    places = PLACES if few else min(PLACES, MOST_NUMBERS // run.status.size, evaluations // 100)
     is_line = system.kernel == KERNEL_OF_EQUATIONS and system.v_shape == () and system.y_shape == ()
     has_barriers = isinstance(system, Pendulum) or (is_line and places >= FINER)
     if not has_barriers and run.paces is None:
@@ -135,7 +137,7 @@ def _of_one(run: Run, name: str, start: State, made: int, visited: Visited | Non
 
 
 def _looked_over(run: Run, name: str, start: State, region: State | None, places: int) -> tuple[Array, Array, Array]:
-    """An invariant at the start and at the end, and by how much the lowest barrier of a region that is above the first is so."""
+    """An invariant at the start and at the end, and how far the lowest barrier of a region above the first is above it."""
     system, ends = run.system, _ends(run, start)
     if region is None:
         first, last = _values(system, name, ends)
@@ -154,7 +156,7 @@ def _looked_over(run: Run, name: str, start: State, region: State | None, places
 
 
 def _names(system: System) -> list[str]:
-    """The invariants that it is known to have."""
+    """The names of its invariants."""
     if system.kernel == KERNEL_OF_EQUATIONS:
         return list(system.quantities)
     return ["energy"] if type(system).energy is not System.energy else []
@@ -173,7 +175,7 @@ def _values(system: System, name: str, states: State) -> Array:
 
 
 def _of_a_change(run: Run, name: str, start: State, values: tuple[Array, Array]) -> About | None:
-    """An invariant that has another size at the end."""
+    """Members whose invariant has another size at the end."""
     first, last = values
     change = np.abs(last - first)
     size = np.maximum(np.abs(first), np.abs(last))
@@ -208,7 +210,7 @@ def _end(run: Run) -> State:
 
 
 def _sizes(run: Run, numbers: Array) -> State:
-    """A number of each group of components that errors are relative to, as one for each number of v and of y."""
+    """Spread one number for each group of components over the numbers of v and y."""
     shapes = run.system.v_shape, run.system.y_shape
     n_v, n_y = (prod(shape) for shape in shapes)
     groups = run.system.groups or (0,) * n_v + (int(n_v > 0),) * n_y
@@ -316,7 +318,7 @@ class Barrier(NamedTuple):
 
 
 def _of_a_barrier(run: Run, name: str, first: Array, barrier: Barrier) -> About | None:
-    """A motion along a line that passed a place where even at rest it would have more energy than it has."""
+    """Members that passed a place along a line where even at rest they would have more energy than they have."""
     passed = (barrier.height > first + ROUNDING * np.abs(first)) & (barrier.height < np.inf) & (run.status == 0)
     if not passed.any():
         return None
@@ -332,23 +334,23 @@ def _of_a_barrier(run: Run, name: str, first: Array, barrier: Barrier) -> About 
 
 
 def _saved(run: Run, start: State) -> State:
-    """Between which y each member is known to have been, by its saved states."""
+    """Between which y the saved states of each member are."""
     ys = np.concatenate([start[1][np.newaxis], run.y])
     return np.asarray(np.fmin.reduce(ys, axis=0)), np.asarray(np.fmax.reduce(ys, axis=0))
 
 
 def _farthest(run: Run) -> State:
-    """Between which y each member may have been, by how far from 0 it was at the ends of its adaptive steps."""
+    """Between which y each member may have been, from its largest distance from 0 at the ends of its adaptive steps."""
     _, farthest = _sizes(run, _longest(run))
     farthest = np.fmax(farthest, np.abs(run.y[-1]))  # within the last step
     return -farthest, farthest
 
 
 def _stepped(run: Run, name: str, start: State, above: Array, visited: Visited | None) -> State | None:
-    """Between which y each member has been at the ends of its adaptive steps, which do not depend on the states that are saved.
+    """Between which y each member has been at the ends of its adaptive steps, which do not depend on the saved times.
 
-    That is looked for where a barrier is so little above the energy that errors of all its steps, each as large as is tolerated,
-    would lift it over. None where no member has such a barrier.
+    The steps are made again only for members with a barrier that the tolerated errors of all their steps together would lift
+    them over. None if no member has such a barrier.
     """
     assert run.paces is not None
     fastest, _ = _sizes(run, _longest(run))
@@ -358,7 +360,7 @@ def _stepped(run: Run, name: str, start: State, above: Array, visited: Visited |
     if visited is None or not may.any():
         return None
     least, most, rejected = visited(np.flatnonzero(may))
-    # Where a saved state made a step be rejected, the steps were others; what is known of them are the saved states.
+    # Where a saved state caused a rejection, the steps were others, of which only the saved states are known.
     known = np.where(rejected == run.paces.rejected[may], run.y[-1:][:, may], run.y[:, may])
     between = [np.array(np.broadcast_to(start[1], run.status.shape)) for _ in range(2)]
     between[0][may] = np.fmin(least, np.fmin.reduce(known, axis=0))
@@ -367,7 +369,7 @@ def _stepped(run: Run, name: str, start: State, above: Array, visited: Visited |
 
 
 def _upright(run: Run, between: State) -> Barrier:
-    """A pendulum that stands on its head."""
+    """The barrier of a pendulum: upright."""
     assert isinstance(run.system, Pendulum)
     least, most = between
     place = pi * (2.0 * np.ceil(0.5 * (least / pi - 1.0)) + 1.0)
@@ -402,5 +404,5 @@ def _searched(run: Run, name: str, start: State, first: Array, between: State, p
 
 
 def _between(low: Array, high: Array, places: int) -> Array:
-    """So many places from one to the other, shape (places, *batch)."""
+    """This many places from one to the other, shape (places, *batch)."""
     return np.asarray(low + np.linspace(0.0, 1.0, places).reshape(-1, *(1,) * np.ndim(low)) * (high - low))

@@ -295,8 +295,8 @@ class Run(ValueEquality):
         if self.encounter is None:
             why = f"{self.system!r} has no bodies that meet" if self.paces is None else "expected a run with fixed steps"
             raise UnsupportedError(f"encounters: {why}")
-        found = (self.encounter(index) for index in np.ndindex(self.status.shape))
-        return tuple(each for each in found if each is not None)
+        encounters = (self.encounter(index) for index in np.ndindex(self.status.shape))
+        return tuple(each for each in encounters if each is not None)
 
     def save(self, path: str | Path) -> None:
         """Write the run to a file, from which ``stepwell.load`` reads it again, bit for bit, and from which it goes on.
@@ -386,18 +386,18 @@ class Run(ValueEquality):
         registry.task("picture_of_run")(self).animate(path, seconds=seconds, fps=fps)
 
     def __repr__(self) -> str:
-        told = dict(self._told())
-        how = "" if self.paces is None else " with a tolerance"
-        steps = f"{told['steps']}, t = {told['time']}"
-        end = f"{told['saved states']} saved, {told['members']}: {told['verdict']}"
-        return shortened(f"<run of {self.system!r} by {self.method.name}{how}: {steps}, {end}>", MAX_LINE)
+        summary = dict(self._summary())
+        tolerance = "" if self.paces is None else " with a tolerance"
+        steps = f"{summary['steps']}, t = {summary['time']}"
+        end = f"{summary['saved states']} saved, {summary['members']}: {summary['verdict']}"
+        return shortened(f"<run of {self.system!r} by {self.method.name}{tolerance}: {steps}, {end}>", MAX_LINE)
 
     def _repr_html_(self) -> str:
-        """The same as a table, for notebooks."""
-        return facts(f"{self.system.kind_name} by {self.method.title}", [("system", repr(self.system)), *self._told()])
+        """The summary as a table, for notebooks."""
+        return facts(f"{self.system.kind_name} by {self.method.title}", [("system", repr(self.system)), *self._summary()])
 
-    def _told(self) -> list[tuple[str, str]]:
-        """What it is, by name: steps, time, saved states, members, and how they ended."""
+    def _summary(self) -> list[tuple[str, str]]:
+        """Steps, time, saved states, members and how they ended, each with its name."""
         diverged = (self.status != 0) & (self.status != Status.EVENT)
         members, bad, stopped = (
             self.status.size,
@@ -407,16 +407,16 @@ class Run(ValueEquality):
         if self.paces is None:
             steps = f"{counted(self.steps, 'step')} of {self.dt:g}"
             begins, ends = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
-            how, number = "diverged", int(self.first_bad_step[diverged].min()) if bad else None
+            ending, number = "diverged", int(self.first_bad_step[diverged].min()) if bad else None
         else:
             rejected = int(self.paces.rejected.sum())
             steps = f"{counted(int(self.paces.accepted.sum()), 'step')}, {rejected} rejected"
-            begins, ends, how, number = self.t0, self.t[-1], "stopped early", None
+            begins, ends, ending, number = self.t0, self.t[-1], "stopped early", None
         backward = np.any(ends < begins)
         first, last = (np.max(begins), np.min(ends)) if backward else (np.min(begins), np.max(ends))
         when = "" if number is None or np.ndim(self.t0) else f" (t = {self.t0 + number * self.dt:g})"
         at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number}{when}"
-        verdict = "finite" if not bad else f"{how}{at}" if members == 1 else f"{bad} of {members} {how}{at}"
+        verdict = "finite" if not bad else f"{ending}{at}" if members == 1 else f"{bad} of {members} {ending}{at}"
         if stopped:
             verdict += f", {stopped} of {members} stopped at an event" if members > 1 else ", stopped at an event"
         return [

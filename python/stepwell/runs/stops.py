@@ -23,22 +23,22 @@ WHY_STOPPED = {
     Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time",
     Status.NOT_FINITE: "no step, however small, gives finite numbers",
 }
-#: Why steps shrink without an end where rates are finite and the time has digits enough.
+#: Why steps shrink without end although rates are finite and the time has enough digits.
 BLOWS_UP = (
     "the solution blows up there (a collision, a pole), or does so by the errors that the tolerance allows: try a smaller one, "
     "or a pair (relative, absolute)"
 )
 
-#: Roundings of the time by which rates are looked at beyond where a member stopped.
+#: Rates are also evaluated this many roundings of the time beyond where a member stopped.
 BEYOND = 8.0
-#: The time has too few digits where a member stops at its start, or if a step of this share of the mean one is within roundings.
+#: The time has too few digits if a member stops at its start, or if this share of its mean step is within roundings.
 USUAL = 2.0**-10
 
 State = tuple[Array, Array]
 
 
 def of_stops(run: Run) -> list[Finding]:
-    """The members that stopped by themselves: how many, which first, when, and what is known of its cause."""
+    """The members that stopped by themselves: how many, which was first, when and why."""
     assert run.paces is not None
     if not np.count_nonzero(run.status) or not (stopped := (run.status != 0) & (run.status < Status.EVENT)).any():
         return []
@@ -54,15 +54,15 @@ def of_stops(run: Run) -> list[Finding]:
 
 
 def _why(run: Run, index: Shape) -> str:
-    """What stopped a member, and the numbers that show it."""
+    """Why a member stopped, with numbers."""
     assert run.paces is not None
     status = Status(int(run.status[index]))
     if status == Status.BUDGET:
         accepted, rejected = int(run.paces.accepted[index]), int(run.paces.rejected[index])
         mean = f", steps of {abs(float(run.paces.t[index]) - start_of(run, index)) / accepted:.2g} on average" if accepted else ""
-        held = registry.task("held_by_stability")(run, index, accepted + rejected)
+        by_stability = registry.task("held_by_stability")(run, index, accepted + rejected)
         tried = f"{counted(accepted + rejected, 'attempt')}, {rejected} of them rejected{mean}"
-        return f"{WHY_STOPPED[status]}: {tried}{held}; max_steps= allows more"
+        return f"{WHY_STOPPED[status]}: {tried}{by_stability}; max_steps= allows more"
     if status == Status.UNDERFLOW and (beyond := _of_rates_beyond(run, index)):
         return f"{WHY_STOPPED[Status.NOT_FINITE]}: {beyond} beyond"
     if wrong := _of_rates_there(run, index):
@@ -85,7 +85,7 @@ def _why(run: Run, index: Shape) -> str:
 
 
 def _of_member(run: Run, times: Any, index: Shape) -> Any:
-    """A time of a member, which may be that of all."""
+    """The time of a member, from times of each or one of all."""
     return np.broadcast_to(times, run.status.shape)[index]
 
 
@@ -95,7 +95,7 @@ def start_of(run: Run, index: Shape) -> float:
 
 
 def _of_rates_beyond(run: Run, index: Shape) -> str:
-    """Which rate is not finite some roundings of the time behind where a member stopped; empty if all are."""
+    """Which rate is not finite some roundings of the time after a member stopped; empty if all are finite."""
     assert run.paces is not None
     assert run.controller_state is not None
     t, (v, y) = run.paces.t, (run.controller_state.v, run.controller_state.y)
@@ -113,7 +113,7 @@ def _rates_there(run: Run) -> State:
 
 
 def _of_rates_there(run: Run, index: Shape) -> str:
-    """Which rate is not finite where a member stopped; empty if all are."""
+    """Which rate is not finite where a member stopped; empty if all are finite."""
     assert run.paces is not None
     wrong = _not_finite(_rates_there(run), index)
     return wrong and f"{wrong} {'at the start' if float(run.paces.t[index]) == start_of(run, index) else 'there'}"
@@ -128,9 +128,9 @@ def _largest_rate(run: Run, index: Shape) -> str:
 
 
 def _left_for_below_zero(run: Run, index: Shape) -> str:
-    """Which component that ``positive=`` keeps from there every step leads below zero; empty if none does.
+    """Which component of ``positive=`` every step makes negative; empty if none does.
 
-    Several may be kept: it is the one that would be at zero first.
+    If there are several, it is the one that would reach zero first.
     """
     from ..reference.adaptive import OUTSIDE
 
@@ -139,14 +139,14 @@ def _left_for_below_zero(run: Run, index: Shape) -> str:
         return ""
     blocks, rates = (run.controller_state.v, run.controller_state.y), _rates_there(run)
     state, rate = (np.concatenate([checks.member(block, index).reshape(-1) for block in each]) for each in (blocks, rates))
-    kept = np.array(places_of(run.system, run.controller_state.options["positive"]))
+    places = np.array(places_of(run.system, run.controller_state.options["positive"]))
     with np.errstate(all="ignore"):
-        left = np.where(rate[kept] < 0.0, state[kept] / -rate[kept], np.inf)
-    return name_of(run.system, int(kept[left.argmin()]))
+        left = np.where(rate[places] < 0.0, state[places] / -rate[places], np.inf)
+    return name_of(run.system, int(places[left.argmin()]))
 
 
 def _roundings_of_the_time(run: Run, index: Shape) -> float:
-    """The distance between floats at the time at which a member stopped, if usual steps are no longer than that; else 0."""
+    """The distance between floats at the time of the stop, if usual steps are no longer than that; else 0."""
     assert run.paces is not None
     t, accepted = float(run.paces.t[index]), int(run.paces.accepted[index])
     spacing, elapsed = float(np.spacing(abs(t))), abs(t - start_of(run, index))

@@ -1,4 +1,4 @@
-"""What ``tolerance=`` means: one number, or one for each component or member, relative or absolute too."""
+"""The argument ``tolerance=``: relative, or relative and absolute, each for all, for components or for members."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _is_of_components(part: Array, system: System, batch: Shape) -> bool:
 
 
 def _of_groups(part: Array, of_components: bool, system: System, acceptance: Acceptance) -> Array:
-    """A tolerance of each group: of several components the least."""
+    """A tolerance for each group of components: the least of its components."""
     n_v, n_y = prod(system.v_shape), prod(system.y_shape)
     groups = acceptance.groups or (0,) * n_v + (int(n_v > 0),) * n_y
     count = sum(acceptance.counts(n_v, n_y))
@@ -79,12 +79,10 @@ def _of_groups(part: Array, of_components: bool, system: System, acceptance: Acc
 
 
 def order_of_series(method: Method, relative: Array) -> int:
-    """The order of a series for relative tolerances, one for each member or all; 0 of a method that has one order.
-
-    Of tolerances of components the least of a member counts.
+    """The order of a series for relative tolerances, one for each member or all; 0 for a method with one order.
 
     Raises:
-        UnsupportedError: if they ask for different orders.
+        UnsupportedError: if members would need different orders.
     """
     if not method.has_series or not relative.size:
         return 0
@@ -101,9 +99,9 @@ def order_of_series(method: Method, relative: Array) -> int:
 
 
 def lost_in_tolerance(paces: Array, groups: int) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Members whose absolute tolerance is most of what a step may err, and much of the motion itself, shape (*batch).
+    """Members whose absolute tolerance is most of the tolerated error, and much of the motion itself, shape (*batch).
 
-    ``paces`` are the numbers of where they stand. The motion is that of the group that has been the largest.
+    ``paces`` are their step-size controllers. The motion is measured by the largest length of a group so far.
     """
     absolute, relative = paces[engine.ABSOLUTE], paces[engine.RELATIVE]
     longest = paces[engine.PACE_NUMBERS : engine.PACE_NUMBERS + groups].max(axis=0, initial=0.0)

@@ -17,7 +17,8 @@ from ..model.systems import System
 from . import engine
 from .continuation import Continuation
 from .findings import warn_of
-from .request import Options, Request
+from .options import Options
+from .request import Request
 from .result import Run
 
 if TYPE_CHECKING:
@@ -200,7 +201,7 @@ class World:
             >>> world.events["lowest"].member, world.events["lowest"].t.round(6)
             (array([1, 2]), array([0.837497, 0.558331]))
         """
-        return {} if self._frames is None else self._frames.told
+        return {} if self._frames is None else self._frames.last_occurrences
 
     @property
     def t(self) -> float:

@@ -1,7 +1,7 @@
-"""Slots in, slots out: the same run by the Rust core or by the NumPy reference, in direct, matrix or power form.
+"""Runs by the Rust core or by the NumPy reference, in direct, matrix or power form.
 
-A slot is the array that holds a block between steps: v for most methods, the carry for those that have one. Everything
-above this folder works with states, everything below with slots.
+A slot is the array that contains a block between steps: v for most methods, the carry for those that have one. Code above this
+folder works with states, code below with slots.
 """
 
 from __future__ import annotations

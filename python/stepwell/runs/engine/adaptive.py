@@ -20,26 +20,26 @@ from .plan import Plan, model
 if TYPE_CHECKING:
     from ...reference.adaptive import Attempted, Jumps, Pace
 
-#: How many numbers a ``Pace`` has that are not of each group of components; behind them are those of the groups.
+#: The numbers of a ``Pace`` that are not of a group of components; those of groups follow.
 PACE_NUMBERS = 20
 #: Places among them; the counts are of accepted, rejected and extra steps.
 TIME, STEP, TARGET, HELD, RELATIVE, ABSOLUTE, LASTS, ERROR = 0, 1, 2, 4, 5, 6, 7, 18
 MOST_STEP, COUNTS, WORK = 11, slice(15, 18), 19
-#: The first step where the state tells nothing, in units of time; in a run of less than SHORT of them, this part of its time. So
-#: steps of other runs do not depend on when states are saved.
+#: The first step if the state does not determine one, in units of time; in a run shorter than SHORT this part of its time. So
+#: steps of longer runs do not depend on the saved times.
 BLIND = 1.0 / (1 << 20)
 SHORT = 32.0 * BLIND
-#: The least absolute tolerance, 1024 times the smallest number above zero. A state that grows out of zero, before a smooth push,
-#: begins with numbers of few bits, of which an error cannot be small beside the whole.
+#: The least absolute tolerance, 1024 times the smallest number above zero. A state that grows from zero under a smooth push
+#: begins with numbers of few bits, whose relative error cannot be small.
 LEAST = 2.0**-1064
-#: The status of a member that has no room for another step.
+#: The status of a member that has no room to save another step.
 FULL = -1
 
 
 class Tolerances(NamedTuple):
-    """What is tolerated of a step: numbers over the batch, or with one for each group along the first axis.
+    """The tolerances of a step: numbers over the batch, or with one for each group along the first axis.
 
-    Without ``absolute`` the relative error is one of the largest that a group has been.
+    Without ``absolute`` the error is relative to the largest length of a group so far.
     """
 
     relative: Array
@@ -48,11 +48,11 @@ class Tolerances(NamedTuple):
 
 
 class Pacing(NamedTuple):
-    """When the state is asked for, ascending, the most attempts of a member, and whether members have yet to begin.
+    """When the state is saved, ascending, the most attempts of a member, and whether members have yet to begin.
 
-    ``at`` and ``jumps``, the times that no step crosses, are the same for all members or of each, shape (times, *batch). Every
-    ``every``-th accepted step of a member is kept, 0 for none. The core has ``room`` for so many of each, and a member that has
-    filled it ends with the status ``FULL``.
+    ``at`` and ``jumps``, the times that no step crosses, are the same for all members or one for each, shape (times, *batch).
+    Every ``every``-th accepted step of a member is saved, 0 for none. The core has ``room`` for this many steps of each member,
+    and a member that has filled it ends with the status ``FULL``.
     """
 
     at: Array
@@ -64,7 +64,7 @@ class Pacing(NamedTuple):
 
 
 class CorePacing(NamedTuple):
-    """The same as the core takes it: rows of one number for all or for each member, those of jumps twice, before and after."""
+    """``Pacing`` as the core takes it: rows of one number for all or for each member; jumps twice, before and after."""
 
     at: Array
     jumps: Array
@@ -87,7 +87,7 @@ def jumps_of(plan: Plan, pacing: Pacing) -> Jumps | None:
 
 
 def pacing_of_core(plan: Plan, pacing: Pacing) -> CorePacing:
-    """As the core takes it."""
+    """``pacing`` as the core takes it."""
     jumps = jumps_of(plan, pacing)
     both = np.empty((0, 1)) if jumps is None else np.concatenate([_rows(jumps.before, plan), _rows(jumps.after, plan)])
     return CorePacing(_rows(pacing.at, plan), both, pacing.budget, pacing.begins, pacing.every)
@@ -101,10 +101,10 @@ def _rows(times: Array, plan: Plan) -> Array:
 
 
 class KeptSteps(NamedTuple):
-    """The states after accepted steps that are kept, as far as each member has some: their times, velocities and coordinates.
+    """The saved states after accepted steps, as many as each member has.
 
     Attributes:
-        counts: how many each member has, shape (members,).
+        counts: the number of each member, shape (members,).
         t: their times, shape (room, members).
         v: velocities, shape (room, *block, members).
         y: coordinates, likewise.
@@ -117,20 +117,20 @@ class KeptSteps(NamedTuple):
 
 
 class AdaptiveArrays(NamedTuple):
-    """What a run with a tolerance begins with and what it fills, for the core.
+    """The arrays that a run with a tolerance reads and fills, for the core.
 
     Attributes:
         v: rows of v, of one number for each member or one for all.
         y: rows of y, likewise.
-        paces: where members stand at the start, shape (numbers, members), or (…, 1) where that is the same for all.
-        saved_v: velocities at the asked times, shape (times, *block, *batch); NaN from where a member stopped.
+        paces: the step-size controllers at the start, shape (numbers, members), or (…, 1) if they are the same for all.
+        saved_v: velocities at the times of ``at``, shape (times, *block, *batch); NaN from where a member stopped.
         saved_y: coordinates, likewise.
-        last_state: the state where members stand at the end, shape (numbers of v and y, members).
-        last_paces: where they stand, as ``paces``.
-        status: how they ended, shape (members,).
-        trail: None; or times and steps to try next, shape (2, times, members), where attempts are made one by one until the asked
-            time, and what is kept is where members stand before the first and after each.
-        steps: None; or the steps that are kept.
+        last_state: the states of members at the end, at their own times, shape (numbers of v and y, members).
+        last_paces: the step-size controllers at the end, as ``paces``.
+        status: how members ended, shape (members,).
+        trail: None; or times and steps to try next, shape (2, times, members). Attempts are then made one by one, and the states
+            before the first and after each are saved.
+        steps: None; or the saved steps.
     """
 
     v: Array
@@ -146,9 +146,9 @@ class AdaptiveArrays(NamedTuple):
 
 
 class Adapted(NamedTuple):
-    """Saved states, and of each member at the end the state, the numbers of its ``Pace`` and the status.
+    """Saved states, and for each member at the end its state, the numbers of its ``Pace`` and the status.
 
-    ``evaluations`` is how many function evaluations an attempt takes, ``steps`` those that were kept, if they were.
+    ``evaluations`` is the number of function evaluations of an attempt, ``steps`` the saved steps or None.
     """
 
     v: Array
@@ -162,22 +162,21 @@ class Adapted(NamedTuple):
 
 
 def groups_of(plan: Plan) -> int:
-    """How many groups of components a plan has."""
+    """The number of groups of components of a plan."""
     return sum(plan.acceptance.counts(prod(plan.system.v_shape), prod(plan.system.y_shape)))
 
 
 def pace_numbers(plan: Plan) -> int:
-    """How many numbers say where a member stands."""
+    """The number of numbers of a member's ``Pace``."""
     return PACE_NUMBERS + groups_of(plan) * (3 if plan.acceptance.own else 1)
 
 
 def paces(
     plan: Plan, first: Array | None, tolerances: Tolerances, most_step: Array | None = None, pacing: Pacing | None = None
 ) -> Array:
-    """Where members stand before they begin, shape (numbers, *batch), or (numbers,) if it is the same for all.
+    """The step-size controllers before members begin, shape (numbers, *batch), or (numbers,) if they are the same for all.
 
-    Of ``pacing`` it takes the time of the run, of which a part may be the first step where the state tells nothing, and a jump at
-    the start.
+    From ``pacing`` they need the length of the run, for a first step that the state does not determine, and a jump at the start.
     """
     from ...reference import adaptive  # only such runs need it
 
@@ -207,7 +206,7 @@ def paces(
 
 
 def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
-    """The step-size controllers at the first step, computed by the reference from their state before it."""
+    """The step-size controllers at the first step, by the reference, from those before members begin."""
     from ...reference import adaptive
 
     system, pace = attempted_system(plan), pace_of(plan, paces)
@@ -217,7 +216,7 @@ def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
 
 
 def begun_again(plan: Plan, numbers: Array, t: Array, v: Array, y: Array) -> Array:
-    """The numbers of members that begin again at these times, with the tolerances and counts of before."""
+    """The numbers of members that begin again at these times, with their tolerances and counts."""
     from ...reference import adaptive
 
     pace, zero = pace_of(plan, numbers), np.zeros(plan.batch)
@@ -227,7 +226,7 @@ def begun_again(plan: Plan, numbers: Array, t: Array, v: Array, y: Array) -> Arr
 
 
 def attempted_system(plan: Plan) -> Attempted:
-    """How an attempt uses the NumPy reference of the system, scaled to a step of 1, or of −1 where its time runs backward."""
+    """The NumPy reference of the system for attempts, scaled to a step of 1, or of −1 if its time runs backward."""
     from ...reference import adaptive
 
     s = plan.system.reference_at_step(-1.0 if plan.backward else 1.0, plan.batch)
@@ -235,7 +234,7 @@ def attempted_system(plan: Plan) -> Attempted:
 
 
 def pace_of(plan: Plan, numbers: Array) -> Pace:
-    """Where the members of a plan stand, from the numbers of each, or those of all."""
+    """The ``Pace`` of the members of a plan, from numbers of each or of all."""
     from ...reference import adaptive
 
     batch = plan.batch
@@ -249,9 +248,9 @@ def numbers_of(pace: Pace) -> Array:
 
 
 def evaluations(method: Method, system: System, *, order: int = 0, paced: bool = False) -> int:
-    """Function evaluations of a step, or of an attempt at an adaptive one by a series of that order.
+    """Function evaluations of a step, or of an attempt at an adaptive one, with a series of this order.
 
-    Of a series: operations of all coefficients of the rates over those of one evaluation, rounded up. All operations count alike.
+    For a series it is the operations of all coefficients of the rates over those of one evaluation, rounded up.
 
     Raises:
         UnsupportedError: if the series of the system is too long.
@@ -276,18 +275,18 @@ def attempts(plan: Plan, system: Any) -> Any:
 
 def evaluated_attempt(plan: Plan, budget: int) -> Any:
     """An attempt at an adaptive step."""
-    made = evaluated(plan, "attempt", budget)
+    next_rows = evaluated(plan, "attempt", budget)
 
     def attempt(pace: Pace, budget: int, v: Array, y: Array) -> tuple[Pace, Array, Array]:
         numbers = np.broadcast_arrays(*pace.numbers)
-        out = made([*rows_of(plan, v, y), *numbers], None)
+        out = next_rows([*rows_of(plan, v, y), *numbers], None)
         return (pace_of(plan, out[-len(numbers) :]), *blocks_of(v, y, out))
 
     return attempt
 
 
 def attempt_by_numpy(plan: Plan, budget: int) -> Any:
-    """The same, by the tape if it has to be."""
+    """An attempt at an adaptive step by NumPy: by the tape where that is needed, else by the reference."""
     if plan.single:
         return tried_attempt(plan)
     if plan.by_tape:
@@ -296,7 +295,7 @@ def attempt_by_numpy(plan: Plan, budget: int) -> Any:
 
 
 def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
-    """Continue every member; ``paces`` has a column for each member, or one for all."""
+    """Step every member to its last time; ``paces`` has a column for each member, or one for all."""
     if plan.backend == "numpy":
         return _adapt_by_numpy(plan, pacing, paces, v, y)
     times, n_v, members, numbers = len(pacing.at), prod(plan.system.v_shape), plan.members, pace_numbers(plan)
@@ -327,7 +326,7 @@ def _evaluations_of_attempt(plan: Plan) -> int:
 
 
 def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
-    """The same by the reference."""
+    """``adapt`` by the reference."""
     from ...reference import adaptive
 
     pace = begun(plan, paces, v, y) if pacing.begins else pace_of(plan, paces)
@@ -340,13 +339,13 @@ def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array
 
 
 def _gathered(plan: Plan, steps: Sequence[tuple[Any, Any, Array, Array]]) -> KeptSteps:
-    """The steps of each member one after the other."""
+    """The saved steps of each member, one after the other."""
     members, shapes = plan.members, (plan.system.v_shape, plan.system.y_shape)
     count = np.zeros(members, np.int64)
-    room = max((int(n) for n in np.sum([np.reshape(kept, -1) for kept, *_ in steps], axis=0)), default=0) if steps else 0
+    room = max((int(n) for n in np.sum([np.reshape(saved, -1) for saved, *_ in steps], axis=0)), default=0) if steps else 0
     out = KeptSteps(count, np.empty((room, members)), *(np.empty((room, *shape, members)) for shape in shapes))
-    for kept, t, v, y in steps:
-        index = np.flatnonzero(kept)
+    for saved, t, v, y in steps:
+        index = np.flatnonzero(saved)
         out.t[count[index], index] = np.reshape(t, -1)[index]
         for to, block, shape in zip((out.v, out.y), (v, y), shapes, strict=True):
             to[count[index], ..., index] = np.moveaxis(block.reshape(*shape, members)[..., index], -1, 0)

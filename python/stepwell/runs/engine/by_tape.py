@@ -1,4 +1,4 @@
-"""Steps by the tape of the reference, line by line, for all members at once: what is fused, of float32, or a series."""
+"""Steps by the tape of the reference, line by line, for all members at once: fused steps, float32 and series."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Some = tuple[Mapping[int, Any], Sequence[Any]]
 
 
 def traced(plan: Plan, what: str) -> tuple[Tracer, Any, list[Any]]:
-    """A method's "step", "attempt", "tried" part of one, or how it goes from v to what it carries and back, on a tape.
+    """Trace a method's "step", "attempt", the "tried" part of one, or "start" or "finish", from v to the carry or back.
 
     Returns the tracer, the tape, and the symbols of the next state.
     """
@@ -46,7 +46,7 @@ def traced(plan: Plan, what: str) -> tuple[Tracer, Any, list[Any]]:
 
 
 def steps_of_single(plan: Plan, what: str) -> Steps:
-    """The same in float32, to be evaluated for all members at once."""
+    """``traced`` in float32, to be evaluated for all members at once."""
     from ...reference.tape.single import Steps
 
     tracer, tape, symbols = traced(plan, what)
@@ -54,7 +54,7 @@ def steps_of_single(plan: Plan, what: str) -> Steps:
 
 
 def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
-    """From the rows of a state, and the time, to the next ones: line by line, for all members at once."""
+    """A function from the rows of a state and the time to the next rows, line by line for all members at once."""
     from ...reference.tape.evaluate import Evaluation
 
     steps: Callable[..., list[Any]]
@@ -65,18 +65,18 @@ def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], 
         numbers, [(_, _, number_of_budget)] = dict(enumerate(tracer.numbers)), tape.operations([tape.budget()])[0]
         steps = Evaluation(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fused)
 
-    def made(state: list[Array], t: Any) -> Array:
+    def next_rows(state: list[Array], t: Any) -> Array:
         rows = steps(state, t, plan.dt)
         out = np.empty((len(rows), *plan.batch), dtype=plan.dtype)
         for i, row in enumerate(rows):
             out[i] = row
         return out
 
-    return made
+    return next_rows
 
 
 def some_of(steps: Steps, index: Any) -> Some:
-    """Of these members, along one axis, what they step with."""
+    """The parameters and samples of these members, along one axis."""
 
     def some(numbers: Any) -> Any:
         return numbers[..., index] if numbers.ndim and numbers.shape[-1] > 1 else numbers
@@ -88,12 +88,12 @@ def some_of(steps: Steps, index: Any) -> Some:
 
 
 def tried(plan: Plan, steps: Steps, t: Any, step: Any, v: Array, y: Array, some: Some | None = None) -> adaptive.Tried:
-    """The part of an attempt of float32 before its decision, in numbers of float64; of other members if these are given."""
+    """The part of an attempt in float32 before its decision, as float64; with the parameters of ``some`` members if given."""
     from ...reference import adaptive
 
     numbers, tables = (None, steps.tables) if some is None else some
     sign = -1.0 if plan.backward else 1.0
-    # No step crosses the time of a sample, so that one holds all over it: that of its middle.
+    # No step crosses the time of a sample, so the sample at its middle is that of the whole step.
     samples = [table.sample(sign * (t + 0.5 * step)) for table in tables]
     n_v, n_y, batch = prod(plan.system.v_shape), prod(plan.system.y_shape), v.shape[len(plan.system.v_shape) :]
     n = n_v + n_y
@@ -108,7 +108,7 @@ def tried(plan: Plan, steps: Steps, t: Any, step: Any, v: Array, y: Array, some:
 
 
 def tried_attempt(plan: Plan) -> Any:
-    """An attempt at an adaptive step of float32, whose decision is float64."""
+    """An attempt at an adaptive step in float32, decided in float64."""
     from ...reference import adaptive
 
     steps, order = steps_of_single(plan, "tried"), plan.method.error_order
@@ -116,9 +116,9 @@ def tried_attempt(plan: Plan) -> Any:
 
     def attempt(pace: adaptive.Pace, budget: int, v: Array, y: Array) -> tuple[adaptive.Pace, Array, Array]:
         outlook = pace.outlook(budget)
-        made = tried(plan, steps, pace.t, outlook.step, v, y)
+        trial = tried(plan, steps, pace.t, outlook.step, v, y)
         return adaptive.judged(
-            pace, outlook, order, plan.block_axes, plan.acceptance, v, y, made, rounding=adaptive.SINGLE_ROUNDING
+            pace, outlook, order, plan.block_axes, plan.acceptance, v, y, trial, rounding=adaptive.SINGLE_ROUNDING
         )
 
     return attempt
@@ -129,26 +129,26 @@ def rows_of(plan: Plan, v: Array, y: Array) -> list[Array]:
     return [*v.reshape(-1, *plan.batch), *y.reshape(-1, *plan.batch)]
 
 
-def blocks_of(v: Array, y: Array, made: Array) -> Blocks:
-    """Blocks of the same shapes, from rows."""
-    n_v, n_y = (a.size // max(1, made[0].size) for a in (v, y))
-    return made[:n_v].reshape(v.shape), made[n_v : n_v + n_y].reshape(y.shape)
+def blocks_of(v: Array, y: Array, rows: Array) -> Blocks:
+    """Blocks from rows, in the shapes of v and y."""
+    n_v, n_y = (a.size // max(1, rows[0].size) for a in (v, y))
+    return rows[:n_v].reshape(v.shape), rows[n_v : n_v + n_y].reshape(y.shape)
 
 
 def evaluated_step(plan: Plan, s: Any) -> reference.Step:
-    """A step; what a control of ``s`` adds up is added up there."""
-    made = evaluated(plan, "step")
+    """A step, which adds the work of a control to ``s.work``."""
+    next_rows = evaluated(plan, "step")
 
     def step(t: float, v: Array, y: Array) -> Blocks:
         if plan.system.control is None:
-            return blocks_of(v, y, made(rows_of(plan, v, y), t))
-        *_, s.work = out = made([*rows_of(plan, v, y), np.asarray(s.work, dtype=plan.dtype)], t)
+            return blocks_of(v, y, next_rows(rows_of(plan, v, y), t))
+        *_, s.work = out = next_rows([*rows_of(plan, v, y), np.asarray(s.work, dtype=plan.dtype)], t)
         return blocks_of(v, y, out)
 
     return step
 
 
 def evaluated_slot(plan: Plan, which: str) -> reference.Velocity:
-    """What a method carries from velocities, or back."""
-    made = evaluated(plan, which)
-    return lambda t, v, y: blocks_of(v, y, made(rows_of(plan, v, y), t))[0]
+    """A function from velocities to what a method carries, or back."""
+    next_rows = evaluated(plan, which)
+    return lambda t, v, y: blocks_of(v, y, next_rows(rows_of(plan, v, y), t))[0]

@@ -1,4 +1,4 @@
-"""How many operations a step has, by kind."""
+"""The operations of a step, counted by kind."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .plan import Plan
 
 
 def written(plan: Plan, attempts: bool = False) -> dict[str, int]:
-    """Operations of a step as it is written down, by kind, of values that change between steps."""
+    """Count the operations of a step as it is written down, by kind, for values that change between steps."""
     tape = _core.Tape(single=plan.single)
     return tape.written(traced(Tracer(plan.system, tape), plan, attempts))
 

@@ -30,7 +30,7 @@ def advance_direct(plan: Plan, v: Array, y: Array, before: Whole | None = None, 
 
 
 def first_bad_steps(plan: Plan, before: Whole | None) -> Whole:
-    """Those of earlier runs, to be written to; −1 for members that were finite so far."""
+    """A copy of the first bad steps of earlier runs; −1 for members that were finite so far."""
     if before is not None:
         return before.copy()
     none: Whole = buffer_pool.empty(plan.batch, np.int64)
@@ -44,16 +44,16 @@ def _run_by_reference(plan: Plan, v: Array, y: Array, before: Whole, carried: bo
         v, y = v.astype(plan.dtype), y.astype(plan.dtype)
 
     def plain(t: float, v: Array, y: Array) -> Blocks:
-        made: Blocks = contact.step(steps, s, plan.choice, t, plan.dt, v, y)
-        return made
+        blocks: Blocks = contact.step(steps, s, plan.choice, t, plan.dt, v, y)
+        return blocks
 
     step = evaluated_step(plan, s) if plan.by_tape else plain
     slot = v if carried else to_slot(plan, v, y)
-    slot, y, kept, first_bad = looped(plan, step, slot, y, before, plan.block_axes, to_velocity(plan))
-    out = finished(plan, slot, kept, first_bad)
+    slot, y, saved, first_bad = looped(plan, step, slot, y, before, plan.block_axes, to_velocity(plan))
+    out = finished(plan, slot, saved, first_bad)
     with np.errstate(all="ignore"):
         recorded = {
-            name: _stacked((s.record(name, *state) for state in zip(out.v, out.y, strict=True)), plan.kept)
+            name: _stacked((s.record(name, *state) for state in zip(out.v, out.y, strict=True)), plan.save_count)
             for name in plan.record
         }
     work = None if plan.system.control is None else np.broadcast_to(np.asarray(s.work), plan.batch).copy()
@@ -61,7 +61,7 @@ def _run_by_reference(plan: Plan, v: Array, y: Array, before: Whole, carried: bo
 
 
 def _stacked(states: Iterable[Array], count: int) -> Array:
-    """So many arrays of one shape as one, without a list of them."""
+    """Stack ``count`` arrays of one shape without a list of them."""
     stack = np.empty(0)
     for i, state in enumerate(states):
         if i == 0:
@@ -71,7 +71,7 @@ def _stacked(states: Iterable[Array], count: int) -> Array:
 
 
 def to_velocity(plan: Plan) -> reference.Velocity | None:
-    """Makes velocities of what the method carries in their place at a time; None if it carries nothing else."""
+    """A function from the carry to velocities at a time; None if the method carries velocities."""
     if plan.method.carry is None:
         return None
     if plan.by_tape:
@@ -94,10 +94,10 @@ def looped(
     block_axes: tuple[int, int],
     velocity: reference.Velocity | None,
 ) -> Looped:
-    """The steps of the plan by the reference, which tells of its progress."""
+    """The steps of the plan by the reference, with calls of ``progress``."""
     done, every = 0, max(1, plan.steps // 100)
 
-    def told(t: float, v: Array, y: Array) -> Blocks:
+    def step_with_progress(t: float, v: Array, y: Array) -> Blocks:
         nonlocal done
         done += 1
         if plan.progress is not None and done % every == 0:
@@ -105,7 +105,7 @@ def looped(
         return step(t, v, y)
 
     counts: Any = {"h": plan.dt, "t0": plan.t0, "first": plan.first, "steps": plan.steps, "saves": plan.saves}
-    return reference.run(told, v, y, before, block_axes, velocity=velocity, **counts)
+    return reference.run(step_with_progress, v, y, before, block_axes, velocity=velocity, **counts)
 
 
 def to_slot(plan: Plan, v: Array, y: Array) -> Array:
@@ -120,9 +120,9 @@ def to_slot(plan: Plan, v: Array, y: Array) -> Array:
             return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
 
 
-def finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
-    """The states from the kept slots, which are the caller's to spend."""
-    v, y = kept
+def finished(plan: Plan, slot: Array, saved: Blocks, first_bad: Any) -> Outcome:
+    """The outcome with velocities from the saved slots, which are overwritten."""
+    v, y = saved
     if velocity := to_velocity(plan):
         if np.shares_memory(slot, v):
             slot = slot.copy()
@@ -135,16 +135,16 @@ def finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
 def run_by_core(
     plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
-    """The run by the core. ``carries`` is whether it has a carry at the end, where that does not go by the method."""
+    """The run by the core. ``carries`` is whether it returns a carry, as the method does if None."""
     carries = plan.method.carry is not None if carries is None else carries
-    kept = plan.kept
-    empty = np.empty if kept * (v.size + y.size) < buffer_pool.LEAST_POOLED // 8 else buffer_pool.empty
-    saved_v, saved_y = empty((kept, *v.shape), plan.dtype), empty((kept, *y.shape), plan.dtype)
+    count = plan.save_count
+    empty = np.empty if count * (v.size + y.size) < buffer_pool.LEAST_POOLED // 8 else buffer_pool.empty
+    saved_v, saved_y = empty((count, *v.shape), plan.dtype), empty((count, *y.shape), plan.dtype)
     carry = np.empty(v.shape, plan.dtype) if carries else None
     recorded = None
     if plan.record:
         shapes = {name: plan.system.quantities[name] for name in plan.record}
-        recorded = buffer_pool.empty((kept, sum(map(prod, shapes.values())), *plan.batch))
+        recorded = buffer_pool.empty((count, sum(map(prod, shapes.values())), *plan.batch))
     work = None if plan.system.control is None else np.empty(plan.batch, plan.dtype)
     tally, noticed = None if work is None else work.reshape(-1), None
     if plan.watched is not None:
@@ -159,6 +159,6 @@ def run_by_core(
     if recorded is not None:
         for name, shape in shapes.items():
             mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
-            by_name[name] = mine.reshape(kept, *shape, *plan.batch)
+            by_name[name] = mine.reshape(count, *shape, *plan.batch)
     work = None if work is None else per_step(plan, work)
     return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged, noticed)

@@ -8,7 +8,7 @@ from .plan import Outcome, Plan
 
 
 def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
-    """Make the run. ``v`` holds what the method carries if ``carried``; both have the shape of a block and a batch.
+    """Make the run. ``v`` is what the method carries if ``carried``; v and y have the shape of a block and the batch.
 
     ``before`` has the first bad steps of earlier runs, −1 for members that were finite so far.
     """

@@ -18,11 +18,11 @@ from ...reference import run as reference
 from .direct import Looped, advance_direct, finished, looped, run_by_core, to_slot, to_velocity
 from .plan import BEGINS, Outcome, Plan
 
-#: Numbers that are kept at a time for each element of the matrix: unit vectors, their states after a step, what the core makes of
-#: them; and of powers one that is squared, one that is made, and their product.
+#: Numbers in memory at a time for each element of the matrix: unit vectors, their states after a step, the core's copies of them;
+#: and for powers the one that is squared, the product so far, and their product.
 NUMBERS_OF_AN_ELEMENT, NUMBERS_OF_A_POWER = 8, 3
 
-#: Numbers of states, and of matrices that members have of their own, that are stepped at once: an operation with so many takes a
+#: This many numbers of states, and of matrices if members have their own, are stepped at once: an operation on them takes a
 #: millisecond.
 NUMBERS_AT_ONCE = 1 << 20
 
@@ -36,25 +36,25 @@ def _fits(plan: Plan, numbers: int) -> None:
 def transition(plan: Plan) -> Array:
     """P of shape (n, n, *batch), from one step of each unit vector of the slots (v slot first).
 
-    Each vector of a member takes the member's parameters with it, as many as a matrix has, so some vectors go at once. Of a step
-    of float32 it is a parameter: found in float64, then rounded.
+    Each vector of a member needs a copy of the member's parameters, so only some vectors are stepped at once. For steps in
+    float32 P is a parameter: computed in float64, then rounded.
     """
     n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
     n = n_v + n_y
     free = plan._replace(system=plan.system.without_inputs(), single=False)
     at_once = max(1, NUMBERS_AT_ONCE // (n * n * prod(plan.batch))) if plan.system.batch else n
-    made: Array = np.empty((n, n, *plan.batch))
+    matrix: Array = np.empty((n, n, *plan.batch))
     for k in range(0, n, at_once):
         along = np.eye(n)[:, k : k + at_once].reshape(n, -1, *(1,) * len(plan.batch))
         batch = (along.shape[1], *plan.batch)
         unit = np.broadcast_to(along, (n, *batch))
         v, y = unit[:n_v].reshape(*plan.system.v_shape, *batch), unit[n_v:].reshape(*plan.system.y_shape, *batch)
-        made[:, k : k + at_once] = one_step(free._replace(batch=batch), v, y)
-    return _rounded(plan, "the transition matrix", made)
+        matrix[:, k : k + at_once] = one_step(free._replace(batch=batch), v, y)
+    return _rounded(plan, "the transition matrix", matrix)
 
 
 def _rounded(plan: Plan, name: str, matrix: Array) -> Array:
-    """A matrix as a step of this precision has it."""
+    """A matrix rounded to the precision of the steps."""
     if not plan.single:
         return matrix
     checks.fits_single(name, matrix)
@@ -69,7 +69,7 @@ def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
     q = np.zeros((len(plan.method.nodes), len(inputs), n, *plan.batch))
     for i, node in enumerate(plan.method.nodes):
         pulse, part = np.zeros(grid + 1), abs(plan.dt) / grid
-        # Of a step back in time the last part comes first, and a node is at the end of its part.
+        # In a step back in time the last part comes first, and a node is at the end of its part.
         back = plan.dt < 0.0
         pulse[grid - _bin(node, grid) if back else _bin(node, grid)] = 1.0
         start = -(grid + _LATE) * part if back else 0.0
@@ -78,17 +78,17 @@ def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
     return _rounded(plan, "what inputs add in a step", q)
 
 
-#: Nodes are less than 0.9 of a part behind its beginning: so much more of it lies behind all of them.
+#: A node is in the first 0.9 of its part, so that this share of a part is after all of them.
 _LATE = 0.95
 
 
 def _bin(node: float, grid: int) -> int:
-    """Which of so many parts of a step holds a node."""
+    """The part of a step that contains a node, if the step has ``grid`` parts."""
     return floor(node * grid + 1e-6)
 
 
 def _grid(nodes: Iterable[float]) -> int:
-    """The least number of parts of a step that hold its nodes apart, none of them near the end of its part."""
+    """The least number of parts of a step for each node to be in a part of its own, and not near its end."""
     nodes = list(nodes)
     return next(
         n for n in count(1) if len({_bin(c, n) for c in nodes}) == len(nodes) and all(c * n - _bin(c, n) < 0.9 for c in nodes)
@@ -96,7 +96,7 @@ def _grid(nodes: Iterable[float]) -> int:
 
 
 def one_step(plan: Plan, v: Array | None = None, y: Array | None = None) -> Array:
-    """The slots after one step at t = 0, from rest if not from ``v`` and ``y``, as rows: those of v, then those of y."""
+    """The slots after one step at t = 0 from ``v`` and ``y``, zero if None, as rows: those of v, then those of y."""
     if v is None or y is None:
         v, y = (np.zeros((*shape, *plan.batch)) for shape in (plan.system.v_shape, plan.system.y_shape))
     one = plan._replace(t0=0.0, first=0, steps=1, every=None, form="direct", progress=None)
@@ -114,13 +114,13 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
     linear_map: dict[str, Any] = {"n": n_v + n_y, "n_v": n_v, "carries": carries, "p": P, "q": q, "inputs": inputs}
     if isinstance(plan.t0, np.ndarray) and inputs:
         linear_map[BEGINS] = plan.t0
-    given = flat(linear_map, plan.batch)
+    parameters = flat(linear_map, plan.batch)
     nodes = list(plan.method.nodes)
-    return _core.ModelSpec("matrix", plan.method.name, given, matrix=(nodes, n_v), fused=plan.fused, single=plan.single)
+    return _core.ModelSpec("matrix", plan.method.name, parameters, matrix=(nodes, n_v), fused=plan.fused, single=plan.single)
 
 
 def _matrix_step(plan: Plan, P: Array, Q: Array) -> Callable[[float, Array], Array]:
-    """The same by the reference, from a time and the rows of a state to the next ones."""
+    """A step by a transition matrix by the reference, from a time and the rows of a state to the next rows."""
     inputs, carries = [each.signal() for each in plan.system.given_inputs().values()], plan.method.carry is not None
     if not plan.single:
         return reference.linear_step(P, Q, inputs, plan.method.nodes, plan.dt, carries, fused=plan.fused)
@@ -140,8 +140,8 @@ def _matrix_step(plan: Plan, P: Array, Q: Array) -> Callable[[float, Array], Arr
 def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     """The run by the transition matrix, step by step."""
     _fits(plan, NUMBERS_OF_AN_ELEMENT)
-    given = plan.system.given_inputs()
-    p, q = transition(plan), pulses(plan, given)
+    inputs = plan.system.given_inputs()
+    p, q = transition(plan), pulses(plan, inputs)
     q = q.reshape(q.shape[0] * q.shape[1], *q.shape[2:])
     slot = v if carried else to_slot(plan, v, y)
     n_v, n_y = v.size // max(1, prod(plan.batch)), y.size // max(1, prod(plan.batch))
@@ -162,7 +162,7 @@ def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> O
 
     if plan.backend == "numpy":
         flat_v, flat_y = flat_v.astype(plan.dtype, copy=False), flat_y.astype(plan.dtype, copy=False)
-        flat_v, _, kept, first_bad = by_reference(plan, flat_v, flat_y, before)
+        flat_v, _, saved, first_bad = by_reference(plan, flat_v, flat_y, before)
     else:
         spec = matrix_model(plan, p, q)
 
@@ -172,8 +172,8 @@ def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> O
 
         out = by_core(plan, flat_v, flat_y, before)
         first_bad = out.first_bad if finish is None else _seen(plan, by_core, by_reference, flat_v, flat_y, before, out)
-        flat_v, kept = out.slot, (out.v, out.y)
-    v, y = (a.reshape(len(a), *block) for a, block in zip(kept, blocks, strict=True))
+        flat_v, saved = out.slot, (out.v, out.y)
+    v, y = (a.reshape(len(a), *block) for a, block in zip(saved, blocks, strict=True))
     return finished(plan, flat_v.reshape(blocks[0]), (v, y), first_bad)
 
 
@@ -193,7 +193,7 @@ def _seen(
     before: Whole,
     out: Outcome,
 ) -> Whole:
-    """The first bad steps of a run in matrix form, whose velocities the core does not know.
+    """The first bad steps of a run in matrix form, whose velocities the core does not compute.
 
     Members that come near the end of the number range are stepped again by the reference, from the last check before that.
     """
@@ -217,7 +217,7 @@ def _seen(
 
 
 def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
-    """By powers of the transition matrix; the backend finds P and Q, the rest is the reference's."""
+    """The run by powers of the transition matrix; the backend computes P and Q, the reference the rest."""
     from ...reference import power  # only this form needs it
     from ...reference.signal import Constant, Sine
 
@@ -225,31 +225,31 @@ def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Ou
         return np.broadcast_to(array, plan.batch).reshape(-1)
 
     _fits(plan, NUMBERS_OF_AN_ELEMENT + NUMBERS_OF_A_POWER)
-    given = plan.system.given_inputs()
+    signals = plan.system.given_inputs()
     inputs = [
         Constant(wide(each.values[0]))
         if isinstance(each, Sampled)
         else Sine(wide(each.amplitude), wide(each.omega), wide(each.phase))
-        for each in given.values()
+        for each in signals.values()
     ]
     members, n_v = plan.members, prod(plan.system.v_shape)
     slot = v if carried else to_slot(plan, v, y)
     s = np.concatenate([slot.reshape(n_v, members), y.reshape(prod(plan.system.y_shape), members)])
-    p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in (transition(plan), pulses(plan, given)))
+    p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in (transition(plan), pulses(plan, signals)))
 
     drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt, fused=plan.fused)
-    kept, saves = (np.empty((plan.kept, *v.shape)), np.empty((plan.kept, *y.shape))), plan.saves
+    saved, saves = (np.empty((plan.save_count, *v.shape)), np.empty((plan.save_count, *y.shape))), plan.saves
     with np.errstate(all="ignore"):
         step = power.one_step(p, q, inputs, plan.method.nodes, drive)
         states = power.run(step, drive, s, before.reshape(-1), t0=wide(plan.t0), first=plan.first, saves=map(int, saves))
         for i, s in enumerate(states):
-            kept[0][i], kept[1][i] = s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)
+            saved[0][i], saved[1][i] = s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)
             if plan.progress is not None:
                 plan.progress((i + 1) / len(saves))
-    out = finished(plan, kept[0][-1], kept, before)
-    # Velocities are made of what is carried at saved states only, so a power cannot tell of those between.
+    out = finished(plan, saved[0][-1], saved, before)
+    # Velocities are computed from the carry at saved states only, so those between are not checked.
     first_bad = out.first_bad.reshape(-1)
-    for save, v in zip(plan.saves, out.v.reshape(plan.kept, n_v, members), strict=True):
+    for save, v in zip(plan.saves, out.v.reshape(plan.save_count, n_v, members), strict=True):
         bad, k = ~np.isfinite(v).all(axis=0), plan.first + int(save)
         first_bad[bad & ((first_bad < 0) | (first_bad > k)) & (save > 0)] = k
     return out

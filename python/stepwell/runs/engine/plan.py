@@ -1,4 +1,4 @@
-"""What to run, and the same as the core takes it."""
+"""The plan of a run, its outcome, and both as the core takes them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BEGINS = "time.begins"
 
 
 class Watched(NamedTuple):
-    """Quantities whose changes of sign the core notices while it makes steps: what it computes them by, and how many they are."""
+    """Quantities whose changes of sign the core notices while it makes steps, as operations, and their number."""
 
     quantities: _core.Equations
     number: int
@@ -33,8 +33,8 @@ class Plan(NamedTuple):
     """What to run. ``choice`` is the number of the method's start; ``force`` is added to v̇; ``threads`` 0 chooses their number.
 
     ``t0`` is the time of step 0, or that of each member, shape (*batch), which the core takes as a parameter: see ``of_core``.
-    ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32. Of adaptive steps,
-    ``acceptance`` is what they must satisfy, and ``backward`` whether the time of the system is that of the run, negated.
+    ``single`` is whether steps are computed in float32. With adaptive steps ``order`` is that of a series, ``acceptance`` what a
+    step must satisfy, and ``backward`` whether the time of the system is the negated time of the run.
     """
 
     system: System
@@ -60,31 +60,31 @@ class Plan(NamedTuple):
     backward: bool = False
 
     def t0_of(self, members: Any) -> Any:
-        """The time of step 0 of these members of one batch axis, which may be that of all."""
+        """The time of step 0 of these members of one batch axis, or of all."""
         return self.t0[members] if isinstance(self.t0, np.ndarray) else self.t0
 
     def of_core(self) -> Plan:
-        """The same with one clock for all members, at 0 where each has a time of its own."""
+        """The plan with one clock for all members, at 0 if each has a time of its own."""
         return self._replace(t0=0.0) if isinstance(self.t0, np.ndarray) else self
 
     @property
     def dtype(self) -> type[Any]:
-        """Of the states."""
+        """The type of the states."""
         return np.float32 if self.single else np.float64
 
     @property
     def saves(self) -> Whole:
-        """The steps, counted from the first, at which the state is kept: every so many, and the last."""
+        """The steps, counted from the first, after which the state is saved: multiples of ``every`` and the last."""
         if self.every is None:
             return np.array([self.steps], dtype=np.int64)
         every = min(self.every, self.steps)
-        kept = np.arange(0, self.steps + every, every, dtype=np.int64)  # an array, for there may be millions of them
-        kept[-1] = self.steps
-        return kept
+        steps = np.arange(0, self.steps + every, every, dtype=np.int64)  # an array, for there may be millions of them
+        steps[-1] = self.steps
+        return steps
 
     @property
-    def kept(self) -> int:
-        """How many states are kept."""
+    def save_count(self) -> int:
+        """The number of saved states."""
         return 1 if self.every is None else -(-self.steps // min(self.every, self.steps)) + 1
 
     def scaled(self) -> Any:
@@ -93,17 +93,17 @@ class Plan(NamedTuple):
 
     @property
     def by_tape(self) -> bool:
-        """Whether the NumPy backend evaluates the tape of the reference, as for what is fused or of float32, and for a series."""
+        """Whether the NumPy backend evaluates the tape of the reference: for fused steps, float32 and series."""
         return self.fused or self.single or self.method.has_series
 
     @property
     def members(self) -> int:
-        """How many trajectories."""
+        """The number of trajectories."""
         return prod(self.batch)
 
     @property
     def block_axes(self) -> tuple[int, int]:
-        """How many axes a block of v and one of y have."""
+        """The numbers of axes of a block of v and of y."""
         return len(self.system.v_shape), len(self.system.y_shape)
 
 
@@ -151,7 +151,7 @@ class Outcome(NamedTuple):
 
 
 def model(plan: Plan) -> _core.ModelSpec:
-    """What to step, as the core takes it."""
+    """The model of a plan, as the core takes it."""
     series = plan.method.has_series and not plan.single
     parameters = plan.system.parameters(plan.batch, series=series, single=plan.single)
     if isinstance(plan.t0, np.ndarray) and plan.system.has_time and not plan.single:
@@ -176,12 +176,12 @@ def model(plan: Plan) -> _core.ModelSpec:
 
 
 def per_step(plan: Plan, work: Array | None) -> Array | None:
-    """What a control did, in units of energy, from h times the sum over all evaluations."""
+    """The work of a control in units of energy, from the core's sum over all evaluations, which has the factor h."""
     if work is None:
         return None
     return np.asarray(np.asarray(work, dtype=np.float64) / (pushes(plan.system.control, plan.method.evaluations) * plan.dt))
 
 
 def pushes(control: Any, evaluations: int) -> int:
-    """How many times a step with so many evaluations adds to what a control did."""
+    """How many times a step with this many evaluations adds to the work of a control."""
     return evaluations if isinstance(control, EnergyControl) and not control.between else 1

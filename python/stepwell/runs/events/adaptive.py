@@ -1,7 +1,7 @@
-"""A run with events and adaptive steps: attempts are made some at a time, and the states between them are looked at.
+"""A run with events and adaptive steps: some attempts are made at a time, and events are searched between their states.
 
-An event that changes the state ends a member's part of the run. The next part begins from the new state as a run does, with the
-step chosen anew; only the sizes to which errors are relative are those of all parts.
+An event that changes the state ends a part of the member's run. The next part begins from the new state as a run does, with a
+new first step; only the sizes to which errors are relative are those of all parts.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from .parts import Changes
 from .resets import LARGEST_RATIO, NO_TIME, SETTLED, Resets
 from .trials import AdaptiveTrials
 
-#: As ``engine.adapt``, of members of a whole run and the times at which they stop.
+#: As ``engine.adapt``, for members of a whole run and with the times at which they stop.
 Keep = Callable[..., engine.Adapted]
 
-#: Numbers of the states of members that are looked at together: a megabyte, which stays in a cache.
+#: Numbers of the states that are searched together: a megabyte, which stays in a cache.
 NUMBERS_AT_ONCE = 1 << 17
-#: The first attempts of members are few, then twice as many are made together each time, up to the most: a member may stop early.
+#: Few attempts are made first, since a member may stop early; then twice as many together each time, up to the most.
 FIRST_ATTEMPTS, MOST_ATTEMPTS = 16, 1 << 10
-#: Members are cut into groups such that at least so many attempts of each group are looked at together.
+#: Groups of members are small enough for at least this many attempts of each to be searched together.
 LEAST_ATTEMPTS = 16
-#: Times between changes of the state that shrink geometrically end in a limit. A member is set there when no more than this share
-#: of its time is left to it, and when the time since the last change is less than NO_FLIGHT of it, however they shrink.
+#: Times between changes of the state that shrink geometrically have a limit. A member is set to it when no more than this share
+#: of its time is left until then; and also, however they shrink, when the last one is less than NO_FLIGHT of its time.
 LEFT_OF_SERIES, NO_FLIGHT = 2.0**-20, 2.0**-44
-#: Before the first step of a run this share of it stands for the length of a step.
+#: Before the first step this share of the run is taken as the length of a step.
 SHARE_OF_RUN = 2.0**-10
 
 
 class AdaptiveRun:
     """A run with events, in place of ``engine.adapt``: first the events are found, up to where each member stops.
 
-    Then the run is made as without events, to there, so that all that it returns is the same.
+    Then the run is made up to there as without events, and returns the same states and counts.
     """
 
     def __init__(self, events: Sequence[Event], keep: Keep | None = None) -> None:
@@ -52,7 +52,7 @@ class AdaptiveRun:
         self._driver: _Driver | None = None
 
     def adapt(self, plan: engine.Plan, pacing: engine.Pacing, paces: Array, v: Array, y: Array) -> engine.Adapted:
-        """Make it."""
+        """Make the run."""
         numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
         rows = sum(numbers * min(event.most, int(event.terminal) or pacing.budget) for event in self._events)
         checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
@@ -64,21 +64,21 @@ class AdaptiveRun:
             plan.progress(1.0)
         return out
 
-    def tell(self, run: Any) -> None:
-        """Give the result what was found."""
+    def write_to(self, run: Any) -> None:
+        """Write events, and the times and statuses of members that they stopped, to the result."""
         assert self._driver is not None
         by_themselves, stops = run.stopped_at, self._driver.stops()
         run.events, run.changed_by = self._driver.occurrences(), names_of_changing(self._events)
         if stops is not None:
             run.status = np.where(np.isnan(stops), run.status, Status.EVENT).astype(np.int8)
             run.stopped_at = stops if by_themselves is None else np.where(np.isnan(stops), by_themselves, stops)
-        self._driver.tell_of_rest(run)
+        self._driver.write_rests(run)
 
 
 class _Driver(Collected):
     """The run of all members."""
 
-    #: Makes the run and keeps states of its steps, if that was asked for.
+    #: Makes the run and saves states of its steps; None if steps are not saved.
     keep: Keep | None = None
 
     def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
@@ -102,7 +102,7 @@ class _Driver(Collected):
         rows = np.broadcast_to(paces.reshape(self.numbers, -1), (self.numbers, total))
         blocks = v.reshape(*system.v_shape, total), y.reshape(*system.y_shape, total)
         if not self.pacing.begins:
-            # A step that is held has been looked at before, up to the last time of the run that goes on.
+            # A held step was searched before, up to the last time of the run that goes on.
             self.since = np.where(rows[engine.HELD] > 0.0, rows[engine.TARGET], -np.inf)
             self.begin = rows[engine.TIME]
         self.look(np.arange(total), rows, *blocks, self.pacing.begins)
@@ -129,7 +129,7 @@ class _Driver(Collected):
             longest = paces[engine.PACE_NUMBERS : engine.PACE_NUMBERS + engine.groups_of(self.plan)]
             stopped = self._look(some, index, out, before, longest, not begins)
             after = out.paces[engine.COUNTS][:2].sum(axis=0)
-            # Members that make no attempt cannot, or may not: they are out of attempts, or a step no longer moves the time.
+            # Members make no further attempt if none is left, or if a step no longer moves the time.
             on = (
                 ~stopped & (out.t[-1] < self.end[index]) & (after - before.sum(axis=0) == attempts) & (after < self.pacing.budget)
             )
@@ -143,10 +143,10 @@ class _Driver(Collected):
                 self.plan.progress(min(0.99, max(0.0, float(gone))))
 
     def _look(self, now: engine.Plan, index: Whole, out: Attempts, before: Array, longest: Array, goes_on: bool) -> Any:
-        """Find the events within these steps; which of the members stop."""
+        """Find the events within these steps. Returns which members stop."""
         v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
-        given, h = self.members.numbers(index), out.lengths(now)
-        g = [self.quantity(e, out.t, v, y, given) for e in range(len(self.events))]
+        parameters, h = self.members.numbers(index), out.lengths(now)
+        g = [self.quantity(e, out.t, v, y, parameters) for e in range(len(self.events))]
         may, moves = [self.may_change(e, index, each) for e, each in enumerate(g)], out.t[1:] > out.t[:-1]
         self.looks(index, out, may)
         if not np.any([each.any() for each in may]):
@@ -160,7 +160,7 @@ class _Driver(Collected):
             return Changes(row, place, index[place], step, out.t[places], h[places], low, high, *values, *begins, *ends)
 
         changes = [self.parts(e, known(e, *np.nonzero(each & moves))) for e, each in enumerate(may)]
-        # Of steps that go beyond the end, or began before this run, only a part is in it.
+        # Steps that go beyond the end, or began before this run, are in it only in part.
         partial = out.t[1:] > self.end[index]
         if goes_on:
             partial |= out.t[:-1] < self.since[index]
@@ -174,8 +174,8 @@ class _Driver(Collected):
         if stops is None:
             return np.zeros(len(index), dtype=bool)
         which, whose = stops.which, index[stops.which]
-        for kept, state in zip(self.stop_state, (stops.v, stops.y), strict=True):
-            kept[..., whose] = state[..., which]
+        for all_stops, state in zip(self.stop_state, (stops.v, stops.y), strict=True):
+            all_stops[..., whose] = state[..., which]
         row = stops.step[which]
         self.attempts[whose] = before.sum(axis=0)[which] + row + 1
         self.steps[whose] = taken[row + 1, np.flatnonzero(which)]
@@ -183,31 +183,31 @@ class _Driver(Collected):
         return which
 
     def looks(self, index: Whole, out: Attempts, may: list[Any]) -> None:
-        """Steps that are looked into whatever the values at their ends are."""
+        """Mark steps in ``may`` that are searched whatever the values at their ends are."""
 
     def parts(self, e: int, steps: Changes) -> Changes:
         """Where one event changes its sign in these steps."""
         return self.within(e, steps)[0]
 
     def left(self, member: Whole, place: Whole, row: Whole, longest: Array, out: Attempts, stops: Stops) -> None:
-        """Members stop in these steps; ``longest`` are the largest sizes of each group before them."""
+        """Note members that stop in these steps; ``longest`` are the largest sizes of each group before them."""
 
-    def tell_of_rest(self, run: Any) -> None:
-        """Tell of members that came to rest at an event."""
+    def write_rests(self, run: Any) -> None:
+        """Write which members came to rest at an event."""
 
     def stepped(self, plan: engine.Plan, pacing: engine.Pacing, index: Whole, paces: Array, v: Array, y: Array) -> engine.Adapted:
-        """The run of some members as without events; those that stopped make no more attempts than up to there."""
+        """The run of some members as without events; those that stopped make attempts only up to their stop."""
         stopped_at = self.stopped_at[index]
         stopped, plan = ~np.isnan(stopped_at), plan._replace(progress=None)
         adapt = engine.adapt if self.keep is None else partial(self.keep, index=index, until=stopped_at)
         if not stopped.any():
             return adapt(plan, pacing, paces, v, y)
         batch, total, rejected = plan.batch, plan.members, 1 + engine.COUNTS.start
-        # What they may not make any more counts as if it had been rejected before.
+        # Attempts that they may not make any more count as rejected before.
         spare = np.where(stopped, pacing.budget - self.attempts[index], 0.0)
-        given = np.broadcast_to(paces.reshape(self.numbers, -1), (self.numbers, total)).copy()
-        given[rejected] += spare
-        out = adapt(plan, pacing, given.reshape(self.numbers, *batch), v, y)
+        start_paces = np.broadcast_to(paces.reshape(self.numbers, -1), (self.numbers, total)).copy()
+        start_paces[rejected] += spare
+        out = adapt(plan, pacing, start_paces.reshape(self.numbers, *batch), v, y)
         last, status = out.paces.reshape(self.numbers, total).copy(), out.status.reshape(total).copy()
         last[rejected] -= spare
         last[engine.TIME, stopped], last[engine.WORK, stopped] = stopped_at[stopped], np.nan
@@ -218,28 +218,28 @@ class _Driver(Collected):
         states = []
         for saved, at_end, all_stops in zip((out.v, out.y), (out.last_v, out.last_y), self.stop_state, strict=True):
             stop = all_stops[..., index]
-            kept = saved.reshape(len(pacing.at), *stop.shape)
-            np.copyto(kept, stop, where=np.expand_dims(later, tuple(range(1, stop.ndim))))
+            block = saved.reshape(len(pacing.at), *stop.shape)
+            np.copyto(block, stop, where=np.expand_dims(later, tuple(range(1, stop.ndim))))
             ends = np.where(stopped, stop, np.reshape(at_end, stop.shape))
-            states.append((kept.reshape(saved.shape), ends.reshape(saved.shape[1:])))
+            states.append((block.reshape(saved.shape), ends.reshape(saved.shape[1:])))
         (saved_v, last_v), (saved_y, last_y) = states
         paces, status = last.reshape(self.numbers, *batch), status.reshape(batch)
         return out._replace(v=saved_v, y=saved_y, last_v=last_v, last_y=last_y, paces=paces, status=status)
 
 
 class _Resetting(_Driver):
-    """A run with events that change the state, part by part: members whose state was changed make their next parts together."""
+    """A run with events that change the state, part by part: members with a changed state make their next parts together."""
 
     def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
         super().__init__(plan, events, pacing)
         self._resets, total = Resets(self), plan.members
-        #: When the part of each member began and in which state, how long the one before lasted, over how long that before it.
+        #: The time and the state at the start of each member's part, the length of its last part, the ratio to that before.
         self._start, self._flight, self._ratio = (np.full(total, np.nan) for _ in range(3))
         self._state = tuple(np.full_like(each, np.nan) for each in self.stop_state)
         self._longest = np.zeros((engine.groups_of(plan), total))
-        #: From which side members came to each event that ended their part, 0 for others, and how large it was around.
+        #: The side from which members came to each event that ended their part, 0 for others, and the largest |g| around it.
         self._sides, self._sizes = (np.zeros((len(events), total)) for _ in range(2))
-        #: How long the steps were that ended in these events.
+        #: The lengths of the steps that ended in these events.
         self._lengths = np.zeros(total)
         #: The number of the event at which a member is at rest; else −1.
         self._rests = np.full(total, -1)
@@ -297,7 +297,7 @@ class _Resetting(_Driver):
         return on
 
     def _go_on_anew(self, index: Whole) -> None:
-        """Change the states of these members, from which they go on or in which they are at rest."""
+        """Change the states of these members, which then go on or are at rest."""
         t, sides, sizes_of = self.stopped_at[index], self._sides[:, index], self._sizes[:, index]
         v, y = (each[..., index] for each in self.stop_state)
         v, y, at, event = self._resets.new_states(t, self._lengths[index], v, y, index, sides, sizes_of)
@@ -317,13 +317,13 @@ class _Resetting(_Driver):
         self._rests[index[rests]] = event[rests]
         limit = np.where(settled, t + flight * limit, t)
         self.stopped_at[index] = np.where(rests, np.minimum(limit, self.end[index]), np.nan)
-        for kept, block in zip(self.stop_state, (v, y), strict=True):
-            kept[..., index] = block
+        for all_stops, block in zip(self.stop_state, (v, y), strict=True):
+            all_stops[..., index] = block
         self._start[index], self._resets.at[:, index], self.before[:, index] = t, at, np.nan
         self._sides[:, index], self.since[index] = 0.0, -np.inf
 
     def _begun(self, index: Whole, at: Array, rows: Array, v: Array, y: Array) -> tuple[engine.Plan, engine.Pacing, Array]:
-        """Of these members where they stand at the start of their next parts."""
+        """Plan, pacing and paces of these members at the start of their next parts."""
         plan = self.members.plan(index)
         jumps = self.jumps if self.jumps is None or self.jumps.ndim == 1 else self.jumps[:, index]
         pacing = self.pacing._replace(at=at, begins=False, jumps=jumps)
@@ -344,8 +344,8 @@ class _Resetting(_Driver):
     def parts(self, e: int, steps: Changes) -> Changes:
         side = self._side(e, steps)
         parts, stuck = self.within(e, steps, side)
-        held = np.flatnonzero((side != 0.0) & self._resets.led_back[e, steps.member])
-        stuck = np.union1d(stuck, held)
+        led_back = np.flatnonzero((side != 0.0) & self._resets.led_back[e, steps.member])
+        stuck = np.union1d(stuck, led_back)
         soon = (self._side(e, parts) != 0.0) & (parts.high <= NO_TIME)
         if not len(stuck) and not soon.any():
             return parts
@@ -359,7 +359,7 @@ class _Resetting(_Driver):
         return together.some(np.lexsort((together.high, together.row, together.place)))
 
     def _side(self, e: int, steps: Changes) -> Array:
-        """From which side members came that are at an event where their steps begin, since it changed the state; else 0."""
+        """The side from which members came to an event that changed the state where their steps begin; else 0."""
         return np.where(steps.t == self._start[steps.member], self._resets.at[e, steps.member], 0.0)
 
     def left(self, member: Whole, place: Whole, row: Whole, longest: Array, out: Attempts, stops: Stops) -> None:
@@ -370,7 +370,7 @@ class _Resetting(_Driver):
         so_far = np.maximum.accumulate(sizes(v, y, plan.block_axes, plan.acceptance.groups), axis=1)
         self._longest[:, member] = np.maximum(longest[:, place], so_far[:, row, place])
 
-    def tell_of_rest(self, run: Any) -> None:
+    def write_rests(self, run: Any) -> None:
         rests = (self._rests >= 0).reshape(self.plan.batch)
         if rests.any():
             run.status = np.where(rests, Status.REST, run.status).astype(np.int8)

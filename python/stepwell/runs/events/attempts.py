@@ -14,7 +14,7 @@ from ...reference.bits import less, where
 from .. import engine
 from .members import Members
 
-#: So many attempts are made before it is checked where members are.
+#: This many attempts are made between checks of where members are.
 ATTEMPTS = 256
 
 
@@ -51,15 +51,15 @@ def attempted(
     y: Array,
     jumps: Array | None = None,
 ) -> Attempts:
-    """Make attempts one by one, of each member until it is at or past a time.
+    """Make attempts one by one until each member is at or past a time.
 
-    The last step of a member is therefore taken, although a run would hold it to save states inside it.
+    So the last step of a member is taken, which a run would hold to save states inside it.
 
     Args:
         plan: of these members, along one axis.
         until: that time.
-        attempts: how many, at most.
-        budget: the most of a member, with those before.
+        attempts: the most attempts of a member here.
+        budget: the most attempts of a member, with earlier ones.
         begins: whether members have yet to begin.
         paces: where they stand, shape (numbers of a ``Pace``, members) or (numbers,).
         v: velocities, shape (*block, members).
@@ -129,9 +129,9 @@ def _by_numpy(
 def extremes(
     plan: engine.Plan, pacing: engine.Pacing, paces: Array, v: Array, y: Array, index: Whole
 ) -> tuple[Array, Array, Array]:
-    """Between which y some members are at the ends of steps within their run, which are made again; shape (*block, members).
+    """The least and the largest y of some members at the ends of their steps, which are made again; shape (*block, members).
 
-    And how many attempts were rejected: the run itself has more if states that it saved within a step made that one be rejected.
+    And how many attempts were rejected: the run itself has more if a state that it saved within a step caused a rejection.
 
     Args:
         plan: of the run.
@@ -139,7 +139,7 @@ def extremes(
         paces: where members stand at its start.
         v: velocities there.
         y: coordinates there.
-        index: the places of these members, of all in one row.
+        index: the places of these members in the flattened batch.
     """
     numbers, total, every = engine.pace_numbers(plan), plan.members, Members(plan._replace(progress=None))
     place = np.arange(len(index))

@@ -1,4 +1,4 @@
-"""What is found of the events of a run, however its steps are made: counted, located, and kept."""
+"""Events of a run with fixed or adaptive steps: changes of sign are counted, located and kept."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from .. import engine
 from ..occurrences import Occurrences
 from .event import Event
 from .members import Members
-from .parts import Changes, Found, nothing, ordinals
+from .parts import Changes, Located, nothing, ordinals
 from .traced import Quantity
 from .trials import Trials
 
-#: So many changes of sign are located together: enough that the calls of NumPy take less time than its work.
+#: This many changes of sign are located together: enough for the overhead of NumPy's calls not to count.
 LOCATED_AT_ONCE = 1 << 12
 
-#: What stands for the slope of a quantity that begins at zero without one, on the side from which it came.
+#: The slope, towards the side from which it came, that a quantity gets if it begins at zero with slope zero.
 LEAST_SLOPE = float(np.finfo(float).tiny)
-#: A slope towards the other side is none, if it is less than this share of that at the end of the step: what a bounce without
-#: speed leaves of it.
+#: A slope towards the other side counts as zero if it is less than this share of the slope at the end of the step: a bounce
+#: without speed leaves such a slope.
 NO_SLOPE = 2.0**-24
 
-#: The share of a step that stands for its start: there is nothing to locate.
+#: A share of a step that counts as its start, where there is nothing to locate.
 AT_START = LEAST_SHARE
 
-#: Makes what is known of one event in these whole steps of these members, which are counted among those that are looked at.
+#: From an event, the numbers of whole steps and of members among those that are searched, to these steps.
 Known = Callable[[int, Whole, Whole], Changes]
 
 
 class Stops(NamedTuple):
-    """Which of some members stop, in which of some steps, at which time and in which state.
+    """Which members stop, in which step, at which time and in which state.
 
-    Of each event ``side`` is the sign of g before it where it stops a member, else 0, and ``size`` the largest |g| around it.
+    For each event ``side`` is the sign of g before it if it stops the member, else 0, and ``size`` the largest |g| around it.
     """
 
     which: Any
@@ -56,27 +56,27 @@ class Collected:
         self.members = Members(plan)
         self.quantities = [Quantity(event, plan.system, self.members.numbers(slice(None))) for event in events]
         self.trials = trials(plan, self.members)
-        #: Times of a plan that goes backward are negated until they are told.
+        #: Times of a plan that goes backward are negated, but not in occurrences.
         self.sign = -1.0 if plan.backward else 1.0
         self.stopped_at = np.full(plan.members, np.nan)
-        #: Each quantity one state before those that are looked at next; NaN where that is not known.
+        #: Each quantity one state before those that are searched next; NaN where it is not known.
         self.before = np.full((len(events), plan.members), np.nan)
         self.clear()
 
     def clear(self) -> None:
-        """Forget what was found."""
+        """Remove all occurrences."""
         self.count = np.zeros((len(self.events), self.plan.members), dtype=np.int64)
-        self.found: list[list[Found]] = [[] for _ in self.events]
+        self.entries: list[list[Located]] = [[] for _ in self.events]
         self.waiting: list[list[Changes]] = [[] for _ in self.events]
 
     def changes(self, e: int, may: Any, known: Known) -> Changes:
-        """Where one event changes its sign in those steps, of shape (steps, members), in which it may."""
+        """Where one event changes its sign, in steps in which it may, an array of shape (steps, members)."""
         return self.within(e, known(e, *np.nonzero(may)))[0]
 
     def within(self, e: int, steps: Changes, at: Array | None = None) -> tuple[Changes, Whole]:
         """The parts of whole steps in which one event changes its sign, and which steps return to it within roundings.
 
-        ``at`` is not zero for steps that begin at the event, since it changed the state there: the side from which it came.
+        ``at`` is the side from which members came that begin at the event, where it changed their state; 0 for others.
         """
         member, t, h = steps.member, steps.t, steps.h
 
@@ -111,13 +111,13 @@ class Collected:
         return self.quantities[e](self.sign * t, v, y, numbers)
 
     def may_change(self, e: int, index: Whole, g: Array) -> Any:
-        """In which of some steps of these members an event may change its sign, from its values at all of their ends."""
+        """In which steps of these members an event may change its sign, from its values at their ends."""
         may = may_change(self.before[e, index], g)
         self.before[e, index] = g[-2]
         return may
 
     def slope(self, e: int, index: Any, t: Array, h: Array, v: Array, y: Array) -> Array:
-        """By how much the quantity would change in a step that goes on as the states do."""
+        """By how much the quantity would change in a step at the present rates."""
         rates = self.trials.rates(index, t, h, v, y)
         return self.quantities[e].slope(self.sign * t, v, y, self.members.numbers(index), self.sign * h, *rates)
 
@@ -126,8 +126,8 @@ class Collected:
 
         Args:
             index: the members.
-            steps: how many there are.
-            changes: of each event, in the order of time of each member.
+            steps: the number of steps.
+            changes: those of each event, in the order of time of each member.
         """
         # The step in which a member stops; later ones do not count.
         last = np.full(len(index), steps)
@@ -135,27 +135,27 @@ class Collected:
             ends = each.some(self.ends(e, each.member))
             np.minimum.at(last, ends.place, ends.row)
         stops = last < steps
-        in_last: list[tuple[Found, Changes]] = []
+        in_last: list[tuple[Located, Changes]] = []
         for e, (each, event) in enumerate(zip(changes, self.events, strict=True)):
             if stops.any():
                 mine = each.some(each.row == last[each.place])
                 in_last.append((self.located(e, mine), mine))
                 each = each.some(each.row < last[each.place])
             if len(each.row):
-                kept = ordinals(each.member) + self.count[e, each.member] <= event.most
+                within_most = ordinals(each.member) + self.count[e, each.member] <= event.most
                 self.count[e, index] += np.bincount(each.place, minlength=len(index))
-                self._put_off(e, each.some(kept))
+                self._put_off(e, each.some(within_most))
         return self._stopped(index, in_last, last, stops) if stops.any() else None
 
     def ends(self, e: int, member: Whole) -> Any:
-        """Which of these further occurrences, in the order of time of each member, end its run or change its state."""
+        """Which of these next occurrences, each member's in the order of time, end its run or change its state."""
         event = self.events[e]
         if event.then is not None:
             return np.ones(len(member), dtype=bool)
         return ordinals(member) + self.count[e, member] >= event.terminal if event.terminal else np.zeros(len(member), dtype=bool)
 
-    def _stopped(self, index: Whole, in_last: list[tuple[Found, Changes]], last: Whole, stops: Any) -> Stops:
-        """Let members stop at the first terminal event of their last step."""
+    def _stopped(self, index: Whole, in_last: list[tuple[Located, Changes]], last: Whole, stops: Any) -> Stops:
+        """Stop members at the first terminal event of their last step."""
         end, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
         v, y = (np.empty((*shape, len(index))) for shape in (self.plan.system.v_shape, self.plan.system.y_shape))
         side, size = np.zeros((2, len(self.events), len(index)))
@@ -169,33 +169,33 @@ class Collected:
             side[e, who], size[e, who] = np.sign(changes.g[first]), np.maximum(np.abs(changes.g), np.abs(changes.g_end))[first]
             end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
         for e, (each, changes) in enumerate(in_last):
-            # What comes after the end of a member is not there; and one that lies at its start did not come to it.
+            # Later ones are not in the run; and a member that rests at the event does not cross it.
             self.note(e, each.some((each.share <= end[changes.place]) & (each.share > AT_START)))
         self.stopped_at[index[stops]] = times[stops]
         return Stops(stops, last, times, v, y, side, size)
 
-    def note(self, e: int, found: Found) -> None:
-        """Count and keep these."""
-        few = ordinals(found.member) + self.count[e, found.member] <= self.events[e].most
-        np.add.at(self.count[e], found.member, 1)
-        self.found[e].append(found.some(few))
+    def note(self, e: int, entries: Located) -> None:
+        """Count these, and keep the first ones."""
+        few = ordinals(entries.member) + self.count[e, entries.member] <= self.events[e].most
+        np.add.at(self.count[e], entries.member, 1)
+        self.entries[e].append(entries.some(few))
 
     def _put_off(self, e: int, changes: Changes) -> None:
-        """Locate these with others, as many at once as are quick together."""
+        """Locate these later, with others."""
         self.waiting[e].append(changes)
         if sum(len(each.member) for each in self.waiting[e]) >= LOCATED_AT_ONCE:
             self.locate_waiting(e)
 
     def locate_waiting(self, e: int) -> None:
-        """Locate what was put off."""
+        """Locate the changes that wait."""
         waiting, self.waiting[e] = self.waiting[e], []
         if waiting:
             together = Changes(*(np.concatenate(each, axis=-1) for each in zip(*waiting, strict=True)))
             for first in range(0, len(together.member), LOCATED_AT_ONCE):
-                self.found[e].append(self.located(e, together.some(slice(first, first + LOCATED_AT_ONCE))))
+                self.entries[e].append(self.located(e, together.some(slice(first, first + LOCATED_AT_ONCE))))
 
-    def located(self, e: int, changes: Changes) -> Found:
-        """The places of these changes of sign."""
+    def located(self, e: int, changes: Changes) -> Located:
+        """Locate these changes of sign."""
         member, t, length = changes.member, changes.t, changes.h
 
         def trial(which: Any, share: Array) -> tuple[Array, Array, Array]:
@@ -205,7 +205,7 @@ class Collected:
 
         ends = changes.low, changes.high, changes.g, changes.g_end
         share, v, y = located(trial, *ends, changes.v_end, changes.y_end)
-        return Found(member, changes.step, share, t + np.where(share > AT_START, share, 0.0) * length, v, y)
+        return Located(member, changes.step, share, t + np.where(share > AT_START, share, 0.0) * length, v, y)
 
     def stops(self) -> Array | None:
         """When a terminal event stopped each member; None without such events."""
@@ -213,15 +213,15 @@ class Collected:
         return np.asarray(self.sign * self.stopped_at.reshape(self.plan.batch)) if ends else None
 
     def occurrences(self) -> dict[str, Occurrences]:
-        """Those of each event, by name."""
-        blocks, made = (self.plan.system.v_shape, self.plan.system.y_shape), {}
+        """The occurrences of each event, by name."""
+        blocks, by_name = (self.plan.system.v_shape, self.plan.system.y_shape), {}
         for e, (event, count) in enumerate(zip(self.events, self.count, strict=True)):
             self.locate_waiting(e)
-            found = self.found[e]
-            member, step, share, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
-            # A step that is made in parts has shares of each part.
+            entries = self.entries[e]
+            member, step, share, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *entries, strict=True))
+            # Shares do not order a step that is made in parts, since each part has its own.
             order = np.lexsort((share, np.sign(self.plan.dt) * t, step, member))
             v, y = (np.ascontiguousarray(np.moveaxis(each[..., order], -1, 0)) for each in (v, y))
             numbers = count.reshape(self.plan.batch)
-            made[event.name] = Occurrences(event.name, numbers, member[order], step[order], self.sign * t[order], v, y)
-        return made
+            by_name[event.name] = Occurrences(event.name, numbers, member[order], step[order], self.sign * t[order], v, y)
+        return by_name

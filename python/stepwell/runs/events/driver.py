@@ -1,4 +1,4 @@
-"""A run with events: some steps of some members at a time, all of whose states are looked at."""
+"""A run with events and fixed steps: some steps of some members at a time, with events searched between all states."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from .parts import At, Changes
 from .resets import Resets, Stretch
 from .traced import watched
 
-#: Members × steps × numbers of a state that are looked at together: a megabyte, which stays in a cache.
+#: Members × steps × numbers of a state that are searched together: a megabyte, which stays in a cache.
 NUMBERS_AT_ONCE = 1 << 17
-#: Members are cut into groups such that at least so many steps of each group are looked at together.
+#: Groups of members are small enough for at least this many steps of each to be searched together.
 LEAST_STEPS = 16
-#: The first steps are few, then four times as many are made together each time, up to the most: a member may stop early.
+#: Few steps are made first, since a member may stop early; then four times as many together each time, up to the most.
 FIRST_STEPS, MOST_STEPS = 64, 1 << 13
-#: Where the core notices changes of sign, so many steps are made at once; those of a member that has one are repeated.
-#: Twice as many the next time if fewer than this share of the members had one, half as many if more than that had.
+#: Where the core notices changes of sign, this many steps are made at once, and those of members with a change are repeated.
+#: Next time twice as many if fewer than the first share of the members had one, half as many if more than the second had.
 WATCHED_STEPS, FEW_NOTICED, MANY_NOTICED = 64, 1 / 16, 1 / 4
-#: If so many have one in so few steps, all states are looked at from there on.
+#: If more than this share has one in the fewest steps, all states are searched from then on.
 TOO_MANY_NOTICED = 1 / 2
-#: All states of fewer members than these are looked at: a repetition would take longer than that.
+#: All states of fewer members than this are searched: a repetition would take longer.
 FEW_MEMBERS = 64
-#: Where states are saved more often than after so many steps, all are looked at instead.
+#: Where states are saved more often than this many steps apart, all are searched instead.
 LEAST_BETWEEN_SAVES = 32
 
 
 def advanced(plan: engine.Plan, at: At) -> engine.Outcome:
-    """Steps of some members from where they are; states of float32 are then numbers of float64, as quantities are."""
+    """Steps of some members from where they are, with states in float64, as quantities are."""
     out = engine.advance(plan, at.slot, at.y, at.bad, carried=at.carried)
     return out._replace(**{name: getattr(out, name).astype(np.float64, copy=False) for name in ("v", "y", "slot")})
 
 
 def check_room(events: Sequence[Event], plan: engine.Plan) -> None:
-    """Raise if what may be kept of the events would not fit in memory."""
+    """Raise if all occurrences that may be kept would not fit in memory."""
     numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
     rows = sum(numbers * min(event.most, int(event.terminal) or plan.steps) for event in events)
     checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
@@ -53,7 +53,7 @@ class Run:
     """A run with events, in place of ``engine.advance``.
 
     Args:
-        events: what was asked for.
+        events: the events.
         v: velocities at the start, or what the method carries, shape (*block, *batch).
         y: coordinates, likewise.
         before: first bad steps of earlier runs, as of ``engine.advance``.
@@ -64,21 +64,21 @@ class Run:
         self._events, self._start = events, (v, y, before, carried)
         self._driver: _Driver | None = None
 
-    def made(self, plan: engine.Plan) -> engine.Outcome:
-        """Make it."""
+    def advance(self, plan: engine.Plan) -> engine.Outcome:
+        """Make the run."""
         check_room(self._events, plan)
         self._driver = (_Resetting if any(event.then for event in self._events) else _Driver)(plan, self._events)
         return self._driver.run(*self._start)
 
-    def tell(self, run: Any) -> None:
-        """Give the result what was found."""
+    def write_to(self, run: Any) -> None:
+        """Write events, and the times and statuses of members that they stopped, to the result."""
         assert self._driver is not None
         run.events, run.stopped_at = self._driver.occurrences(), self._driver.stops()
         run.changed_by = names_of_changing(self._events)
         if run.stopped_at is not None and (stopped := ~np.isnan(run.stopped_at)).any():
             run.status = np.where(stopped, Status.EVENT, run.status).astype(np.int8)
             run.encounter = run.overshoots = None  # these go through all of the steps
-        self._driver.tell_of_rest(run)
+        self._driver.write_rests(run)
 
 
 class _Driver(Collected):
@@ -89,11 +89,11 @@ class _Driver(Collected):
         total = plan.members
         self.saves = plan.saves
         blocks = plan.system.v_shape, plan.system.y_shape
-        self.kept = tuple(np.empty((len(self.saves), *shape, total)) for shape in blocks)
+        self.saved = tuple(np.empty((len(self.saves), *shape, total)) for shape in blocks)
         self.slot = np.empty((*blocks[0], total))
         self.first_bad = np.full(total, -1, dtype=np.int64)
         self.done = 0
-        #: Members one of whose quantities is near to zero where the steps end that were made last.
+        #: Members with a quantity that is near zero at the end of the last steps.
         self.close = np.zeros(total, dtype=bool)
         self.watched: engine.Watched | None = None
 
@@ -163,15 +163,15 @@ class _Driver(Collected):
                 plan.progress(self.done / (plan.steps * plan.members))
 
     def _look_again(self, now: engine.Plan, index: Whole, at: At, out: engine.Outcome, done: int, most: int) -> Any:
-        """Repeat the steps of members with a change of sign, to find it; which members stop, and which share was repeated."""
+        """Repeat the steps of members with a change of sign. Returns which members stop, and the share that was repeated."""
         assert out.noticed is not None
         if done + now.steps == self._next_save(done):
             self._save(done + now.steps, 0, index, out.v, out.y)
-        end, given = now.t0 + (now.first + now.steps) * now.dt, self.members.numbers(index)
+        end, parameters = now.t0 + (now.first + now.steps) * now.dt, self.members.numbers(index)
         noticed = (out.noticed[-1] > 0.0) | self.close[index]
         self.close[index] = False
         for e, (quantity, before) in enumerate(zip(self.quantities, out.noticed, strict=False)):
-            g = quantity(np.array(end), out.v[-1], out.y[-1], given)
+            g = quantity(np.array(end), out.v[-1], out.y[-1], parameters)
             self.close[index] |= near(g, before)
             noticed |= near(g, before) | near(before, g)
             self.before[e, index] = before
@@ -190,27 +190,27 @@ class _Driver(Collected):
         return stopped, len(where) / len(index)
 
     def _next_save(self, done: int) -> int:
-        """The next step after these whose state is kept."""
+        """The next step whose state is saved."""
         return int(self.saves[np.searchsorted(self.saves, done, "right")])
 
     def _save(self, done: int, steps: int, index: Whole, *states: Array) -> None:
-        """Keep those of these states that are asked for."""
+        """Save the states at the steps of ``saves``."""
         first, last = np.searchsorted(self.saves, done, "left"), np.searchsorted(self.saves, done + steps, "right")
         if first == last:
             return
         where, members = self.saves[first:last] - done, slice(index[0], index[-1] + 1)
-        for kept, state in zip(self.kept, states, strict=True):
+        for saved, state in zip(self.saved, states, strict=True):
             if len(index) == index[-1] + 1 - index[0]:
-                kept[first:last, ..., members] = state[where]
+                saved[first:last, ..., members] = state[where]
             else:
-                kept[first:last][..., index] = state[where]
+                saved[first:last][..., index] = state[where]
 
     def _may(self, now: engine.Plan, index: Whole, out: engine.Outcome) -> tuple[Known, list[Any]]:
-        """What is known of these steps, and in which of them an event may change its sign."""
+        """A function that gives these steps, and in which of them each event may change its sign."""
         v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
         t: Any = now.t0 + ((now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
-        given = self.members.numbers(index)
-        g = [quantity(t, v, y, given) for quantity in self.quantities]
+        parameters = self.members.numbers(index)
+        g = [quantity(t, v, y, parameters) for quantity in self.quantities]
         may = [self.may_change(e, index, each) for e, each in enumerate(g)]
         if (out.first_bad >= 0).any():
             ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
@@ -227,7 +227,7 @@ class _Driver(Collected):
         return known, may
 
     def _look(self, now: engine.Plan, index: Whole, out: engine.Outcome, done: int) -> Any:
-        """Find the events within these steps; which of the members stop."""
+        """Find the events within these steps. Returns which members stop."""
         known, may = self._may(now, index, out)
         stops = self.take(index, now.steps, [self.changes(e, each, known) for e, each in enumerate(may)])
         if stops is None:
@@ -235,20 +235,20 @@ class _Driver(Collected):
         after = np.searchsorted(self.saves, done + stops.step, "right")
         for place in np.unique(after[stops.which]):
             these = stops.which & (after == place)
-            for kept_states, state in zip(self.kept, (stops.v, stops.y), strict=True):
-                kept_states[place:][..., index[these]] = state[..., these]
+            for saved, state in zip(self.saved, (stops.v, stops.y), strict=True):
+                saved[place:][..., index[these]] = state[..., these]
         return stops.which
 
-    def tell_of_rest(self, run: Any) -> None:
-        """Tell of members that came to rest at an event."""
+    def write_rests(self, run: Any) -> None:
+        """Write which members came to rest at an event."""
 
     def _outcome(self) -> engine.Outcome:
-        """As that of a run without events, without what a control added up."""
+        """The outcome as of a run without events, without the sum of a control."""
         batch, blocks = self.plan.batch, (self.plan.system.v_shape, self.plan.system.y_shape)
         shapes = (len(self.saves), *blocks[0]), (len(self.saves), *blocks[1]), blocks[0]
         v, y, slot = (
             each.reshape((*shape, *batch)).astype(self.plan.dtype, copy=False)
-            for each, shape in zip((*self.kept, self.slot), shapes, strict=True)
+            for each, shape in zip((*self.saved, self.slot), shapes, strict=True)
         )
         first_bad = self.first_bad.reshape(batch)
         diverged = bool((first_bad >= 0).any())
@@ -256,7 +256,7 @@ class _Driver(Collected):
 
 
 class _Resetting(_Driver):
-    """A run with events that change the state: where the first of a group is, the group's steps end, and go on from there."""
+    """A run with events that change the state: the steps of a group end at its first such event and go on from there."""
 
     def __init__(self, plan: engine.Plan, events: Sequence[Event]) -> None:
         super().__init__(plan, events)
@@ -286,7 +286,7 @@ class _Resetting(_Driver):
             before = self.before[:, index]
             known, may = self._may(now, index, out)
             changes = [self.changes(e, each, known) for e, each in enumerate(may)]
-            # Of all members up to the end of the first step in which one of them goes on from another state, or stops.
+            # All members go to the end of the first step in which one of them stops or goes on from another state.
             rows = [each.row[self.ends(e, each.member)] for e, each in enumerate(changes)]
             row = 0 if self.resets.at[:, index].any() else min([steps, *(each.min() for each in rows if len(each))])
             at_event: Any = self.resets.at[:, index].any(axis=0) & (row == 0)
@@ -305,7 +305,7 @@ class _Resetting(_Driver):
             gone: Any = np.zeros(len(index), dtype=bool)
             if row < steps:
                 slot, gone = self._through(now, index, out, known, np.flatnonzero(at_event), row)
-            later = int(done > 0)  # what was saved at the start is the state there, not what is made again of a carry
+            later = int(done > 0)  # the start is saved already, and a state that is computed from a carry differs from it
             self._save(done + later, now.steps - later, index, out.v[later:], out.y[later:])
             at = At(slot, out.y[-1], out.first_bad, True)
             self.slot[..., index], self.first_bad[index] = at.slot, at.bad
@@ -322,7 +322,7 @@ class _Resetting(_Driver):
     def _through(
         self, now: engine.Plan, index: Whole, out: engine.Outcome, known: Known, which: Whole, row: int
     ) -> tuple[Array, Any]:
-        """Take some members through the last of these steps; what all carry then, and which of them stop."""
+        """Take some members through the last of these steps. Returns what all carry then, and which of them stop."""
         step = known(0, np.full(len(which), row), which)
         member = index[which]
         end = now.t0_of(which) + (step.step + 1) * now.dt
@@ -343,13 +343,13 @@ class _Resetting(_Driver):
         return slot, stops
 
     def _stay(self, index: Whole, gone: Any, out: engine.Outcome, step: int) -> None:
-        """Keep the states of members that stop in this step."""
+        """Save the states of members that stop in this step, also for all later saves."""
         place = int(np.searchsorted(self.saves, step, "right"))
-        for kept, state in zip(self.kept, (out.v[-1], out.y[-1]), strict=True):
-            kept[place:][..., index[gone]] = state[..., gone]
+        for saved, state in zip(self.saved, (out.v[-1], out.y[-1]), strict=True):
+            saved[place:][..., index[gone]] = state[..., gone]
         self.first_bad[index[gone]], self.slot[..., index[gone]] = -1, np.nan
 
-    def tell_of_rest(self, run: Any) -> None:
+    def write_rests(self, run: Any) -> None:
         rests = (self.rests >= 0).reshape(self.plan.batch)
         if rests.any():
             run.status = np.where(rests, Status.REST, run.status).astype(np.int8)

@@ -15,7 +15,7 @@ from ...errors import ArgumentError, DTypeError
 if TYPE_CHECKING:
     from ...base.literals import Direction
 
-#: Default of ``most``: so many occurrences of an event are kept for each member.
+#: Default of ``most``: the occurrences of an event that are kept for each member.
 MOST_KEPT = 1000
 
 
@@ -78,22 +78,22 @@ class Event(Immutable, ValueEquality):
         options = {"direction": self.direction, "terminal": self.terminal}
         if self.then is not None:
             options["then"] = self.then.__name__
-        told = "".join(f", {name}={value}" for name, value in options.items() if value)
-        return f"Event({self.name}{told})"
+        text = "".join(f", {name}={value}" for name, value in options.items() if value)
+        return f"Event({self.name}{text})"
 
 
 def _agreed(name: str, function: Any, argument: Any, read: Callable[[str, Any], Any], otherwise: Any) -> Any:
-    """What the argument says, or the function's attribute of that name, which may not say another thing."""
+    """The argument, or the function's attribute of that name; raise if they differ."""
     attribute = getattr(function, name, None)
     its_own = None if attribute is None else read(f"{function.__name__}.{name}", attribute)
     if argument is None:
         return otherwise if its_own is None else its_own
-    asked = checks.direction(name, argument) if name == "direction" else read(name, argument)
-    if its_own is not None and its_own != asked:
+    value = checks.direction(name, argument) if name == "direction" else read(name, argument)
+    if its_own is not None and its_own != value:
         raise ArgumentError(
-            f"{name}: got {asked!r}, but the function {function.__name__} has an attribute {name} = {attribute!r}; leave one out"
+            f"{name}: got {value!r}, but the function {function.__name__} has an attribute {name} = {attribute!r}; leave one out"
         )
-    return asked
+    return value
 
 
 def _sign(name: str, value: Any) -> int:
@@ -105,7 +105,7 @@ def _sign(name: str, value: Any) -> int:
 
 
 def _stops(name: str, value: Any) -> bool | int:
-    """Whether an event stops a member, or at the how many-th change: True for the first, False for none."""
+    """The number of the change at which an event stops a member: True for the first, False for none."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     number = checks.count(name, value, 0)
@@ -113,27 +113,25 @@ def _stops(name: str, value: Any) -> bool | int:
 
 
 def names_of_changing(events: Sequence[Event]) -> tuple[str, ...]:
-    """The names of those that change the state."""
+    """The names of events that change the state."""
     return tuple(event.name for event in events if event.then is not None)
 
 
 def several(events: Any) -> list[Event]:
-    """The events that were given: one or a list, of which each may be a function alone."""
-    given: Sequence[Any] = [events] if isinstance(events, Event) or callable(events) else []
-    made = [
-        each if isinstance(each, Event) else Event(_function(each))
-        for each in given or checks.several("events", events, "events")
-    ]
-    names = [each.name for each in made]
+    """A list of events, from one event or several, each an ``Event`` or a function."""
+    is_one = isinstance(events, Event) or callable(events)
+    each_event: Sequence[Any] = [events] if is_one else checks.several("events", events, "events")
+    all_events = [each if isinstance(each, Event) else Event(_function(each)) for each in each_event]
+    names = [each.name for each in all_events]
     for name in names:
         if names.count(name) > 1:
             raise ArgumentError(f"events: expected a name for each, got {name!r} twice; give Event(…, name=…)")
-    return made
+    return all_events
 
 
-def _function(given: Any) -> Any:
-    if not inspect.isfunction(given):
+def _function(argument: Any) -> Any:
+    if not inspect.isfunction(argument):
         raise DTypeError(
-            f"events: expected functions g(t, v, y) or stepwell.Event, got {checks.short(given)} ({type(given).__name__})"
+            f"events: expected functions g(t, v, y) or stepwell.Event, got {checks.short(argument)} ({type(argument).__name__})"
         )
-    return given
+    return argument

@@ -1,4 +1,4 @@
-"""Events of a world: looked for after each of its steps, which is made again in parts where one changes the state."""
+"""Events of a world: searched after each step, which is made again in parts if one changes the state."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from .trials import Trials
 
 
 class Frames(Collected):
-    """The events of one call of ``World.step``, in place of the core's.
+    """Steps of a world with events, in place of the core's.
 
     Args:
-        plan: of the world; ``force`` is the array of the world, which its owner changes.
-        events: what was asked for.
+        plan: the world's plan; ``force`` is the world's array, which the user changes.
+        events: the events.
         v: the arrays that are stepped.
         y: likewise.
         loop: the core's world.
@@ -47,35 +47,35 @@ class Frames(Collected):
             )
         super().__init__(plan, events)
         self._blocks, self._loop = (v, y), loop
-        self._told: dict[str, Occurrences] | None = None
+        self._occurrences: dict[str, Occurrences] | None = None
         self._all = np.arange(plan.members)
         self._resets = Resets(self) if any(event.then for event in events) else None
-        #: Which members are at rest at an event; and the state and quantities that the last call left.
+        #: Which members are at rest at an event; and the state and quantities after the last call.
         self._rests = np.zeros(plan.members, dtype=bool)
         self._left: tuple[list[Array], list[Array]] | None = None
 
     def step(self, n: int = 1) -> None:
-        """Make n steps in place; what happened in them is then in ``World.events``."""
+        """Make n steps in place; ``World.events`` then has their events."""
         n = checks.count("n", n, 0)
         self.clear()
-        self._told = None
+        self._occurrences = None
         g = self._quantities(self._loop.step_number)
-        self._taken_up(g)
+        self._start_from(g)
         for _ in range(n):
             step, before = self._loop.step_number, [each.copy() for each in self._blocks]
             self._loop.step(1)
             after = self._quantities(self._loop.step_number)
             may = [self.may_change(e, self._all, np.stack(ends)) for e, ends in enumerate(zip(g, after, strict=True))]
             if np.any(may) or (self._resets is not None and self._resets.at.any()):
-                g = self._found(step, may, g, after, before)
+                g = self._after_a_step(step, may, g, after, before)
             else:
                 g = after
         for e in range(len(self.events)):
             self.locate_waiting(e)
         self._left = [each.copy() for each in self._blocks], g
 
-    def _taken_up(self, g: list[Array]) -> None:
-        """What is known of members from the last call, but for those that the user has moved since."""
+    def _start_from(self, g: list[Array]) -> None:
+        """Begin a call with these quantities: members that the user has moved since the last call begin again."""
         t = np.full(len(self._all), self.plan.t0 + self._loop.step_number * self.plan.dt)
         h, (v, y) = np.full(len(self._all), self.plan.dt), self._flat(self._blocks)
         if self._left is None:
@@ -93,18 +93,18 @@ class Frames(Collected):
             self._resets.begin_again(t, h, v, y, g, changed, moved)
 
     @property
-    def told(self) -> dict[str, Occurrences]:
-        """What happened in the last call."""
-        if self._told is None:
-            self._told = self.occurrences()
-        return self._told
+    def last_occurrences(self) -> dict[str, Occurrences]:
+        """The occurrences in the last call."""
+        if self._occurrences is None:
+            self._occurrences = self.occurrences()
+        return self._occurrences
 
     def _quantities(self, step: int) -> list[Array]:
         """The quantities of all members where the world stands."""
         t: Any = np.array(self.plan.t0 + step * self.plan.dt)
-        given = self.members.numbers(slice(None))
+        parameters = self.members.numbers(slice(None))
         v, y = self._flat(self._blocks)
-        return [quantity(t, v, y, given).copy() for quantity in self.quantities]  # not views of what is stepped in place
+        return [quantity(t, v, y, parameters).copy() for quantity in self.quantities]  # not views of what is stepped in place
 
     def _flat(self, blocks: Sequence[Array]) -> tuple[Array, ...]:
         """Blocks with one axis for all members."""
@@ -114,9 +114,9 @@ class Frames(Collected):
             for each, shape in zip(blocks, shapes, strict=True)
         )
 
-    def _found(self, step: int, may: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> list[Array]:
-        """Take what happened in a step; the quantities at its end."""
-        if self.plan.force is not None:  # which may be another one than in the last call
+    def _after_a_step(self, step: int, may: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> list[Array]:
+        """Process the events of a step. Returns the quantities at its end."""
+        if self.plan.force is not None:  # the user may have changed it since the last call
             force = np.array(self.plan.force)
             self.members = Members(self.plan._replace(force=force))
             self.trials = Trials(self.plan._replace(force=force), self.members)
@@ -156,7 +156,7 @@ class Frames(Collected):
         return self._quantities(step + 1)
 
     def _write(self, step: int, index: Whole, v: Array, y: Array) -> None:
-        """Set members where they are at this step; what the method carries of the others stays."""
+        """Write the states of these members at this step; what the method carries of others stays."""
         carry = self._loop.carry() if self.plan.method.carry is not None else None
         for block, new in zip(self._blocks, (v, y), strict=True):
             block.reshape(*new.shape[:-1], len(self._all))[..., index] = new

@@ -1,4 +1,4 @@
-"""Some members of a batch, in any order and any number of times, as a batch along one axis."""
+"""Some members of a batch, in any order and with repetitions, as a batch along one axis."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .. import engine
 
 
 class Members:
-    """All members of a plan, of which some can be taken.
+    """The members of a plan, from which some can be selected.
 
     Attributes:
         parameters: those of the system's own equations, by name, with one batch axis.

@@ -1,4 +1,4 @@
-"""What the driver of events hands on: where members are, changes of sign, occurrences."""
+"""What the parts of an event search exchange: states of members, changes of sign, occurrences."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...base.arrays import Array, Whole
 
 
 class At(NamedTuple):
-    """Where members are: the v slot, y, first bad steps, and whether the slot holds what the method carries."""
+    """Where members are: the v slot, y, first bad steps, and whether the slot contains what the method carries."""
 
     slot: Array
     y: Array
@@ -23,14 +23,14 @@ class At(NamedTuple):
 
 
 class Changes(NamedTuple):
-    """Parts of steps in which one event changes its sign, or may do so: whose, in which step, and what is known at both ends.
+    """Parts of steps in which one event changes its sign, or may do so.
 
-    A step begins at ``t`` and is as long as ``h``; the part goes from the share ``low`` of it to ``high``.
+    A step begins at ``t`` and has the length ``h``; the part is from the share ``low`` of it to ``high``.
 
     Attributes:
-        row: the number of the step among those that are looked at together.
-        place: the number of the member among those.
-        member: the member.
+        row: the number of the step among those that are searched together.
+        place: the number of the member among those that are searched together.
+        member: the number of the member in the batch.
         step: the number of the step.
         t: the time at its start.
         h: its length.
@@ -65,8 +65,8 @@ class Changes(NamedTuple):
         return Changes(*parts)
 
 
-class Found(NamedTuple):
-    """Occurrences of one event: members, numbers of steps, shares of them, times, and states there."""
+class Located(NamedTuple):
+    """Located changes of sign of one event: members, numbers of steps, shares of them, times, and states there."""
 
     member: Whole
     step: Whole
@@ -75,14 +75,14 @@ class Found(NamedTuple):
     v: Array
     y: Array
 
-    def some(self, which: Any) -> Found:
+    def some(self, which: Any) -> Located:
         """Some of them."""
         parts: Any = (each[..., which] for each in self)
-        return Found(*parts)
+        return Located(*parts)
 
 
 def ordinals(member: Whole) -> Whole:
-    """For each entry the how many-th of its member it is, from 1 on; entries are in the order of time."""
+    """The number of each entry among those of its member, from 1 on; entries are in the order of time."""
     order = np.argsort(member, kind="stable")
     ascending = member[order]
     first = np.searchsorted(ascending, ascending, "left")
@@ -91,7 +91,7 @@ def ordinals(member: Whole) -> Whole:
     return ordinals
 
 
-def nothing(blocks: Any) -> Found:
+def nothing(blocks: Any) -> Located:
     """No occurrences."""
     whole, real = np.empty(0, dtype=np.int64), np.empty(0)
-    return Found(whole, whole, real, real, *(np.empty((*shape, 0)) for shape in blocks))
+    return Located(whole, whole, real, real, *(np.empty((*shape, 0)) for shape in blocks))

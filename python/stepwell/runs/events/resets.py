@@ -1,4 +1,4 @@
-"""Events that change the state: a step with such events is made part by part, each from the state that the last one left."""
+"""Events that change the state: a step with such events is made in parts, each from the state after the last event."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from .collected import Collected
 from .parts import Changes
 from .traced import NewState
 
-#: A member whose state was changed more often than so many times within one step is at rest.
+#: A member whose state was changed more often than this within one step is at rest.
 MOST_IN_A_STEP = 1000
-#: Times between changes of the state shrink geometrically if their ratios differ by no more than this; the limit is then where
-#: the geometric series of times and states ends, if that is within the step.
+#: Times between changes of the state shrink geometrically if their ratios differ by no more than this. The member is then set to
+#: the limit of the geometric series of times and states, if that is within the step.
 SETTLED, LARGEST_RATIO = 2.0**-30, 1.0 - 2.0**-20
-#: In what is left of a step after an event, if it is less than this share of it, that event is not looked for: how far it moved
-#: may be less than roundings. It is looked for from the start of the next step on, as from where the state was changed.
+#: If less than this share of a step is left after an event, that event is not searched there, since the motion may be less than
+#: roundings. The search goes on from the start of the next step, as from where the state was changed.
 LEAST_LEFT = 2.0**-36
-#: A member that returns to an event within this share of its step does so in no time, also where the time is zero.
+#: A member that returns to an event within this share of its step does so in no time.
 NO_TIME = 2.0**-100
-#: A member is at an event still, after this changed its state, if g is no more than so many times what it was there, or than the
-#: share ``LEAST_LEFT`` of what it was at the ends of the step; else its state is elsewhere, as of a neuron that is set back.
+#: After an event changed its state, a member is still at the event if |g| is at most this many times its value before, or the
+#: share ``LEAST_LEFT`` of its values at the ends of the step. Else its state is elsewhere, as that of a neuron after a spike.
 AT = 8.0
-#: Whether an event leads a member back to itself is tried with the state that is this share of a step further on.
+#: Whether an event leads a member back to itself is tested with the state this share of a step later.
 FURTHER = 2.0**-10
 
 
@@ -36,7 +36,7 @@ State = tuple[Array, Array]
 
 
 class Stretch(NamedTuple):
-    """Members within a step: from when, how long, from where to where they come without a further event.
+    """Members within a step, from a time on, as they move without a further event.
 
     Attributes:
         member: the members.
@@ -47,7 +47,7 @@ class Stretch(NamedTuple):
         y: coordinates there.
         v_end: velocities at their end.
         y_end: coordinates there.
-        at: of each event the side from which a member came that is at it, since it changed the state there; else 0.
+        at: for each event the side from which members came that are at it since it changed their state; 0 for others.
     """
 
     member: Whole
@@ -67,7 +67,7 @@ class Stretch(NamedTuple):
 
 
 class Ahead(NamedTuple):
-    """What ends some stretches: the share of each, infinite without that, whether the run ends there, and whence it goes on.
+    """What ends some stretches: the share of each, infinite if nothing does, whether the run stops there, and the state after it.
 
     ``event`` is the number of the event that changed the state, −1 without one.
     """
@@ -87,9 +87,9 @@ class Arrived(NamedTuple):
     Attributes:
         v: velocities, shape (*block, n).
         y: coordinates.
-        at: of each event the side from which a member came that is at it still.
-        stops: which a terminal event stopped.
-        rests: the number of the event that changed the state of a member ever again within no time or holds it, −1 for others.
+        at: for each event the side from which members came that are still at it.
+        stops: which members a terminal event stopped.
+        rests: for members at rest the number of the event that holds them or changes their state again and again, else −1.
         t: the time at which members stopped or came to rest, NaN for others.
     """
 
@@ -105,28 +105,28 @@ class Resets:
     """Steps with events that change the state, of the members of a run or a world."""
 
     def __init__(self, run: Collected) -> None:
-        given = run.members.numbers(slice(None))
+        parameters = run.members.numbers(slice(None))
         #: The direction of time.
         self._run, self._way = run, 1.0 if run.plan.dt > 0.0 else -1.0
         self._new_states = {
-            e: NewState(event, run.plan.system, given) for e, event in enumerate(run.events) if event.then is not None
+            e: NewState(event, run.plan.system, parameters) for e, event in enumerate(run.events) if event.then is not None
         }
-        #: At which of them members are, from which side, since they changed the state at the end of a step.
+        #: For each event the side from which members came that are at it since it changed their state in the last step.
         self.at = np.zeros((len(run.events), run.plan.members))
-        #: Of those at an event, which it leads back to where they are.
+        #: Which members at an event it leads back to where they are.
         self.led_back = np.zeros(self.at.shape, dtype=bool)
 
     def begin(self, t: Array, h: Array, v: Array, y: Array) -> None:
-        """Members that begin at an event of a direction are there as if it had changed their state: a ball lies at the ground.
+        """Treat members that begin at an event with a direction as if it had changed their state: a ball lies on the ground.
 
-        ``h`` is about the length of their steps.
+        ``h`` is the approximate length of their steps.
         """
         numbers, everyone = self._run.members.numbers(slice(None)), np.ones(self.at.shape[1], dtype=bool)
         g = [self._run.quantity(e, t, v, y, numbers) for e in range(len(self._run.events))]
         self.begin_again(t, h, v, y, g, [everyone] * len(g), everyone)
 
     def begin_again(self, t: Array, h: Array, v: Array, y: Array, g: list[Array], changed: list[Any], moved: Any) -> None:
-        """The same of members that were moved, whose quantities are known, and of which events they were changed."""
+        """``begin`` for members that were moved, with their quantities, and for each event the members whose quantity changed."""
         run = self._run
         for e, new_state in self._new_states.items():
             there = np.where(g[e] == 0.0, -float(run.events[e].direction), 0.0)
@@ -148,19 +148,19 @@ class Resets:
     def new_states(
         self, t: Array, h: Array, v: Array, y: Array, member: Whole, side: Array, size: Array
     ) -> tuple[Array, Array, Array, Whole]:
-        """From where members go on, the sides from which they came to events at which they are still, and what changed them.
+        """The states from which members go on, the sides from which they came to events where they still are, the last events.
 
         Args:
-            t: when events change their states.
+            t: the times of the events.
             h: the lengths of their steps.
             v: their velocities then, shape (*block, n).
             y: their coordinates.
-            member: who they are.
-            side: of each event the sign of g before it, where it changes the state of a member, else 0.
-            size: of each event how large g was at the ends of the step.
+            member: the members.
+            side: for each event the sign of g before it if it changes the state of a member, else 0.
+            size: for each event the largest |g| at the ends of the step.
 
         Returns:
-            v, y, of each event its ``side`` where the new state is at the event, else 0, and the number of the last event.
+            v, y, for each event its ``side`` if the new state is at the event, else 0, and the number of the last event.
         """
         run, before, at, event = self._run, (v, y), np.zeros_like(side), np.full(len(member), -1)
         v, y = v.copy(), y.copy()
@@ -177,29 +177,29 @@ class Resets:
         return v, y, at, event
 
     def _leads_back(self, e: int, t: Array, h: Array, old: State, new: State, member: Whole, side: Array) -> Any:
-        """Whether an event holds members where they are: a tank that is empty, in which a level below zero is set to zero.
+        """Whether an event holds members where they are, such as the event of an empty tank that sets a level below zero to zero.
 
-        It left their states as they were but for roundings; they go on across it; and from there it leads them back, by half of
-        the way or more. A kick that is zero also leaves a state as it is, but leads back from nowhere.
+        It holds them if it changes their states by roundings only, the motion leads across it, and its change of the state after
+        that leads them back by at least half of the way. A kick of zero also leaves a state as it is, but leads nothing back.
         """
-        run, held = self._run, side != 0.0
-        if not held.any():
-            return held
+        run, holds = self._run, side != 0.0
+        if not holds.any():
+            return holds
         numbers, rates = run.members.numbers(member), run.trials.rates(member, t, h, *new)
         with np.errstate(all="ignore"):
             for before, after, change in zip(old, new, rates, strict=True):
                 same = np.abs(after - before) <= LEAST_LEFT * (np.abs(after) + np.abs(change))
-                held &= same.all(axis=tuple(range(same.ndim - 1)))
+                holds &= same.all(axis=tuple(range(same.ndim - 1)))
             v, y = (block + FURTHER * change for block, change in zip(new, rates, strict=True))
             t_further = t + FURTHER * h
             back = self._new_states[e](run.sign * t_further, v, y, numbers)
             g = run.quantity(e, t, *new, numbers)
             g_further, g_back = (run.quantity(e, t_further, *state, numbers) for state in ((v, y), back))
             across = side * (g - g_further)
-            return held & (across > 0.0) & (side * (g_back - g_further) >= 0.5 * across)
+            return holds & (across > 0.0) & (side * (g_back - g_further) >= 0.5 * across)
 
     def through(self, stretch: Stretch) -> Arrived:
-        """Go through one step of some members, from whole steps of theirs."""
+        """Make one step of some members again, with its events."""
         n, end, step, way = len(stretch.member), stretch.t + stretch.h, np.abs(stretch.h), self._way
         v, y, at = stretch.v_end.copy(), stretch.y_end.copy(), np.zeros_like(stretch.at)
         times, stops, rests, live = np.full(n, np.nan), np.zeros(n, dtype=bool), np.full(n, -1), np.arange(n)
@@ -250,16 +250,16 @@ class Resets:
         return Arrived(v, y, at, stops, rests, times)
 
     def _anew(self, member: Whole, step: Whole, end: Array, ahead: Ahead, which: Any) -> Stretch:
-        """What is left of steps, from the new states on."""
+        """The rest of the steps, from the new states on."""
         t, v, y = ahead.t[which], ahead.v[..., which], ahead.y[..., which]
         h = self._way * np.maximum(self._way * (end - t), 0.0)
         return Stretch(member, step, t, h, v, y, *self._run.trials.step(member, t, h, v, y), ahead.at[:, which])
 
     def _ahead(self, stretch: Stretch, step: Array) -> tuple[Ahead, Whole]:
-        """What ends stretches first, and of those that return to an event within roundings, which; that is taken note of."""
+        """Note what happens up to the first end of each stretch. Returns the ends, and the event that holds a member, else −1."""
         run, n = self._run, len(stretch.member)
         share, returns, rows = np.full(n, np.inf), np.full(n, -1), np.arange(n)
-        numbers, found, sizes = run.members.numbers(stretch.member), [], []
+        numbers, located, sizes = run.members.numbers(stretch.member), [], []
         ones, zeros = np.ones(n), np.zeros(n)
         for e, quantity in enumerate(run.quantities):
             g = quantity(stretch.t, stretch.v, stretch.y, numbers)
@@ -277,18 +277,18 @@ class Resets:
                     self._way * (occurs.t - stretch.t[changes.place]) <= NO_TIME * step[changes.place]
                 )
                 returns[changes.place[again]] = e
-            found.append((occurs, changes.place, np.sign(changes.g)))
+            located.append((occurs, changes.place, np.sign(changes.g)))
             sizes.append(np.maximum(np.abs(g), np.abs(g_end)))
             ends = run.ends(e, occurs.member)
             np.minimum.at(share, changes.place[ends], occurs.share[ends])
         share[returns >= 0] = -np.inf  # nothing happens before
         stops, t, v, y = np.zeros(n, dtype=bool), stretch.t.copy(), stretch.v.copy(), stretch.y.copy()
-        for e, (occurs, place, _) in enumerate(found):
+        for e, (occurs, place, _) in enumerate(located):
             here = run.ends(e, occurs.member) & (occurs.share == share[place])
             t[place[here]], v[..., place[here]], y[..., place[here]] = occurs.t[here], occurs.v[..., here], occurs.y[..., here]
             stops[place[here]] |= e not in self._new_states
         side = np.zeros_like(stretch.at)
-        for e, (occurs, place, before) in enumerate(found):
+        for e, (occurs, place, before) in enumerate(located):
             run.note(e, occurs.some(occurs.share <= share[place]))
             if e in self._new_states:
                 here = (occurs.share == share[place]) & ~stops[place]
@@ -298,7 +298,7 @@ class Resets:
         return Ahead(share, stops, t, v, y, at, event), returns
 
     def of_rest(self, rests: Whole, times: Array) -> Finding:
-        """The members that are at rest at an event, by its number, since these times; −1 for others."""
+        """A finding of members at rest: each one's event by its number, −1 for others, and since when."""
         batch, is_at_rest = self._run.plan.batch, (rests >= 0).reshape(self._run.plan.batch)
         first = int(np.argmin(np.where(rests >= 0, self._way * times, np.inf)))
         some, place = int(is_at_rest.sum()), tuple(int(i) for i in np.unravel_index(first, batch)) if batch else ()

@@ -1,4 +1,4 @@
-"""The function of an event as operations, which are the same for every member and state."""
+"""The function of an event as operations, the same for every member and state."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from ...reference.tape.replay import Replay
 from .. import engine
 from .event import Event
 
-#: The share of a step whose change stands for the slope of a quantity that has no derivative: its roundings, over this, are half
-#: of the digits.
+#: The slope of a quantity without derivative is its change over this share of a step, divided by the share: half of the digits
+#: are roundings.
 SHORT = 2.0**-26
 
 
-def parameters_of(function: Any, name: str, system: System, given: dict[str, Any]) -> list[str]:
-    """The parameters of the system that a function of a state takes."""
+def parameters_of(function: Any, name: str, system: System, values: dict[str, Any]) -> list[str]:
+    """The parameters of the system that a function of a state takes; ``values`` are those of the system by name."""
     state = ("t", "v", "y") if prod(system.v_shape) > 0 else ("t", "y")
     own = list(inspect.signature(function).parameters.values())
     head, rest = own[: len(state)], own[len(state) :]
@@ -41,10 +41,10 @@ def parameters_of(function: Any, name: str, system: System, given: dict[str, Any
     checks.argument_order(name, function, state)
     taken = []
     for each in rest:
-        if each.name in given and each.kind not in (each.POSITIONAL_ONLY, each.VAR_POSITIONAL, each.VAR_KEYWORD):
+        if each.name in values and each.kind not in (each.POSITIONAL_ONLY, each.VAR_POSITIONAL, each.VAR_KEYWORD):
             taken.append(each.name)
         elif each.default is each.empty:
-            known = ", ".join(given) or "none"
+            known = ", ".join(values) or "none"
             raise ArgumentError(
                 f"{name}: expected a function {expected} whose further arguments are parameters of "
                 f"{system.kind_name} that do not change with the time, got {each}. Known: {known}."
@@ -56,28 +56,28 @@ class Quantity:
     """The quantity of an event, for a system whose parameters are known.
 
     Args:
-        event: what it is.
-        system: what moves.
-        given: the parameters of the system that are numbers, by name, with one batch axis.
+        event: the event.
+        system: the system that moves.
+        values: the parameters of the system that are numbers, by name, with one batch axis.
     """
 
-    def __init__(self, event: Event, system: System, given: dict[str, Any]) -> None:
+    def __init__(self, event: Event, system: System, values: dict[str, Any]) -> None:
         self.event, self.v_shape, self.y_shape = event, system.v_shape, system.y_shape
         self.has_v = prod(system.v_shape) > 0
-        self._parameters = parameters_of(event.function, f"events: {event.name}", system, given)
+        self._parameters = parameters_of(event.function, f"events: {event.name}", system, values)
         self._quick_sines = bool(getattr(getattr(system, "definition", None), "quick_sines", False))
-        self._shapes = {name: given[name].shape[:-1] for name in self._parameters}
-        made = [self._operations_of() for _ in range(2)]
-        if made[0].lines != made[1].lines:
+        self._shapes = {name: values[name].shape[:-1] for name in self._parameters}
+        traces = [self._operations_of() for _ in range(2)]
+        if traces[0].lines != traces[1].lines:
             raise TraceError(
                 f"events: {event.name}: expected the same operations at every call, got others: an event may not draw random "
                 f"numbers or count its calls"
             )
-        self._operations = made[0]
+        self._operations = traces[0]
         self._slope = self._slope_of()
 
     def _operations_of(self) -> Replay:
-        """The operations of the event; number 0 of their state is the time."""
+        """The operations of the event; their state begins with the time."""
         tape = _core.Tape()
         numbers, state = map(tape.param, count()), map(tape.state, count())
         t = next(state)
@@ -85,7 +85,7 @@ class Quantity:
         return Replay(*tape.operations([self.on(tape, t, state, parameters)]))
 
     def _slope_of(self) -> Replay | None:
-        """The operations of its change along a change of time and state, which come behind the state; None if it has pieces."""
+        """The operations of its derivative along a change of time and state, which follows the state; None if it has pieces."""
         tape = _core.Tape()
         numbers = map(tape.param, count())
         n = 1 + self.has_v * prod(self.v_shape) + prod(self.y_shape)
@@ -100,69 +100,69 @@ class Quantity:
         return Replay(*tape.operations(slope))
 
     def on(self, tape: _core.Tape, t: _core.Symbol, state: Iterator[_core.Symbol], parameters: dict[str, Any]) -> _core.Symbol:
-        """The same on a tape."""
+        """Record the quantity on a tape."""
         blocks = [_symbols(self.v_shape, state), _symbols(self.y_shape, state)][0 if self.has_v else 1 :]
         name = f"events: {self.event.name}"
-        made = objects(run_function(rebound(self.event.function), name, self._quick_sines, Scalar(t), *blocks, **parameters))
-        if made.ndim or not isinstance(made[()], (Scalar, int, float)):
-            got = f"an array of shape {made.shape}" if made.ndim else kind_of(made[()])
+        result = objects(run_function(rebound(self.event.function), name, self._quick_sines, Scalar(t), *blocks, **parameters))
+        if result.ndim or not isinstance(result[()], (Scalar, int, float)):
+            got = f"an array of shape {result.shape}" if result.ndim else kind_of(result[()])
             raise TraceError(f"{name}: expected one number, whose changes of sign are the event, got {got}")
-        value = made[()].value if isinstance(made[()], Scalar) else made[()]
+        value = result[()].value if isinstance(result[()], Scalar) else result[()]
         return value if isinstance(value, _core.Symbol) else tape.number(float(value))
 
     def with_parameters(self, tape: _core.Tape, places: dict[str, int]) -> _core.Symbol:
-        """The same as the core computes it: parameters are those from these places on."""
+        """Record the quantity as the core computes it, with each parameter from its place on."""
         parameters = {name: _symbols(shape, map(tape.param, count(places[name]))) for name, shape in self._shapes.items()}
         return self.on(tape, tape.time(), map(tape.state, count()), parameters)
 
-    def __call__(self, t: Array, v: Array, y: Array, given: dict[str, Any]) -> Array:
-        """The quantity of states whose axes are the block's first; times and parameters broadcast over the others."""
-        return self._by(self._operations, self._rows_of(t, v, y), y, given)
+    def __call__(self, t: Array, v: Array, y: Array, values: dict[str, Any]) -> Array:
+        """The quantity of states whose first axes are those of a block; times and parameters broadcast over the others."""
+        return self._by(self._operations, self._rows_of(t, v, y), y, values)
 
-    def slope(self, t: Array, v: Array, y: Array, given: dict[str, Any], h: Array, dv: Array, dy: Array) -> Array:
-        """How much it would change in a step that goes on as the state does here; by a short way where it has no derivative."""
+    def slope(self, t: Array, v: Array, y: Array, values: dict[str, Any], h: Array, dv: Array, dy: Array) -> Array:
+        """By how much it would change in a step at these rates; from a short step if it has no derivative."""
         if self._slope is not None:
-            changes = self._by(self._slope, [*self._rows_of(t, v, y), *self._rows_of(h, dv, dy)], y, given)
+            changes = self._by(self._slope, [*self._rows_of(t, v, y), *self._rows_of(h, dv, dy)], y, values)
         else:
             with np.errstate(all="ignore"):
-                there = self(t + SHORT * h, v + SHORT * dv, y + SHORT * dy, given)
-                changes = (there - self(t, v, y, given)) / SHORT
+                there = self(t + SHORT * h, v + SHORT * dv, y + SHORT * dy, values)
+                changes = (there - self(t, v, y, values)) / SHORT
         return np.nan_to_num(changes, nan=0.0)
 
     def _rows_of(self, t: Array, v: Array, y: Array) -> list[Array]:
         return [t, *(_rows(v, self.v_shape) if self.has_v else []), *_rows(y, self.y_shape)]
 
-    def _by(self, operations: Replay, state: list[Array], y: Array, given: dict[str, Any]) -> Array:
-        numbers = [each for name in self._parameters for each in _rows(given[name], given[name].shape[:-1])]
+    def _by(self, operations: Replay, state: list[Array], y: Array, values: dict[str, Any]) -> Array:
+        numbers = [each for name in self._parameters for each in _rows(values[name], values[name].shape[:-1])]
         with np.errstate(all="ignore"):
             value = operations(state, numbers)[0]
         return np.broadcast_to(np.asarray(value, dtype=np.float64), y.shape[len(self.y_shape) :])
 
 
 class NewState:
-    """What an event makes of the state of a member, as operations.
+    """The new state that an event gives a member, as operations.
 
     Args:
-        event: which event; it has a function ``then``.
-        system: what moves.
-        given: the parameters of the system that are numbers, by name, with one batch axis.
+        event: the event, with a function ``then``.
+        system: the system that moves.
+        values: the parameters of the system that are numbers, by name, with one batch axis.
     """
 
-    def __init__(self, event: Event, system: System, given: dict[str, Any]) -> None:
+    def __init__(self, event: Event, system: System, values: dict[str, Any]) -> None:
         self._name, self._function = f"events: {event.name}: then", event.then
         self._shapes = (system.v_shape, system.y_shape) if prod(system.v_shape) > 0 else (system.y_shape,)
-        self._parameters = parameters_of(event.then, self._name, system, given)
+        self._parameters = parameters_of(event.then, self._name, system, values)
         quick_sines = bool(getattr(getattr(system, "definition", None), "quick_sines", False))
         tape = _core.Tape()
         numbers, state = map(tape.param, count()), map(tape.state, count())
         t = next(state)
-        parameters = {name: _symbols(given[name].shape[:-1], numbers) for name in self._parameters}
+        parameters = {name: _symbols(values[name].shape[:-1], numbers) for name in self._parameters}
         blocks = [_symbols(shape, state) for shape in self._shapes]
         result = run_function(rebound(self._function), self._name, quick_sines, Scalar(t), *blocks, **parameters)
         self._operations = Replay(*tape.operations([each for block in self._blocks(result) for each in symbols(tape, block)]))
 
     def _blocks(self, result: Any) -> list[Any]:
-        """The blocks that the function returned, each of its shape."""
+        """The blocks that the function returned, broadcast to their shapes."""
         if len(self._shapes) == 2 and not (isinstance(result, (tuple, list)) and len(result) == 2):
             raise TraceError(f"{self._name}: expected the new state (v, y), got {kind_of(result)}")
         blocks = []
@@ -177,15 +177,15 @@ class NewState:
             blocks.append(np.broadcast_to(numbers, shape))
         return blocks
 
-    def __call__(self, t: Array, v: Array, y: Array, given: dict[str, Any]) -> tuple[Array, Array]:
+    def __call__(self, t: Array, v: Array, y: Array, values: dict[str, Any]) -> tuple[Array, Array]:
         """The new states of members, whose axis comes last."""
         blocks = (v, y)[-len(self._shapes) :]
         state = [t, *(row for block, shape in zip(blocks, self._shapes, strict=True) for row in _rows(block, shape))]
-        numbers = [each for name in self._parameters for each in _rows(given[name], given[name].shape[:-1])]
+        numbers = [each for name in self._parameters for each in _rows(values[name], values[name].shape[:-1])]
         with np.errstate(all="ignore"):
-            values = self._operations(state, numbers)
-        new_v, new_y, n = v.copy(), y.copy(), len(values) - prod(self._shapes[-1])
-        for block, shape, rows in ((new_v, self._shapes[0], values[:n]), (new_y, self._shapes[-1], values[n:])):
+            results = self._operations(state, numbers)
+        new_v, new_y, n = v.copy(), y.copy(), len(results) - prod(self._shapes[-1])
+        for block, shape, rows in ((new_v, self._shapes[0], results[:n]), (new_y, self._shapes[-1], results[n:])):
             for index, row in zip(np.ndindex(*shape), rows, strict=False):
                 block[index] = row
         return new_v, new_y
@@ -198,21 +198,21 @@ def symbols(tape: _core.Tape, block: Any) -> list[_core.Symbol]:
 
 
 def watched(quantities: Sequence[Quantity], plan: engine.Plan) -> engine.Watched:
-    """What the core computes them by, for members of this plan."""
+    """The quantities as the core computes them for members of this plan."""
     places, rows = {}, 0
     for name, value in plan.system.parameters(plan.batch):
         if isinstance(value, np.ndarray):
             places[name], rows = rows, rows + len(value)
     tape = _core.Tape()
-    made = [(each.event.name, each.with_parameters(tape, places)) for each in quantities]
-    return engine.Watched(tape.equations([], [], made), len(made))
+    quantities_by_name = [(each.event.name, each.with_parameters(tape, places)) for each in quantities]
+    return engine.Watched(tape.equations([], [], quantities_by_name), len(quantities_by_name))
 
 
 def _symbols(shape: tuple[int, ...], symbols: Iterator[Any]) -> Any:
-    made = np.empty(shape, dtype=object)
+    block = np.empty(shape, dtype=object)
     for index in np.ndindex(*shape):
-        made[index] = next(symbols)
-    return scalars(made, len(shape))
+        block[index] = next(symbols)
+    return scalars(block, len(shape))
 
 
 def _rows(block: Array, shape: tuple[int, ...]) -> list[Array]:

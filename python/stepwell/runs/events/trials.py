@@ -1,4 +1,4 @@
-"""Steps of the method from the start of a step, of any length: the trials by which a change of sign is located."""
+"""Steps of any length from the start of a step: the trials that locate a change of sign."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from .members import Members
 if TYPE_CHECKING:
     from ...reference.tape.single import Steps
 
-#: A step of an own system of more operations is computed by calling its function.
+#: A step of an own system with more operations than this is computed by calling its function.
 MOST_OPERATIONS = 4000
-#: Steps of up to so many members are made by the core, one after the other: NumPy's calls take as long for one member as for some
-#: hundred.
+#: Steps of up to this many members are made by the core, one after the other: NumPy's calls take as long for one member as for
+#: some hundred.
 MEMBERS_BY_CORE = 6
 #: Shorter units of time have a reciprocal that is no float.
 LEAST_UNIT = 2.0**-1000
-#: So many members of a plan are kept, each as a plan of its own.
-KEPT_PLANS = 256
+#: At most this many plans of one member are kept.
+MAX_PLANS = 256
 
 
 class Trials:
     """Steps of any members of a plan, from any of their states.
 
-    The function of an own system takes long to call, so that its step is traced once for all members; of a few members the core
-    makes them, of steps of one length for all. The bits are the same.
+    The function of an own system takes long to call, so its step is traced once for all members. With steps of one length the
+    core makes those of a few members. The bits are the same.
 
     Args:
-        plan: of the run.
+        plan: the plan of the run.
         members: its members.
     """
 
@@ -48,18 +48,18 @@ class Trials:
         self._plan, self._members = plan, members
         self._operations: Replay | None = None
         self._numbers: list[Array] = []
-        #: Whether there is no other way, however long the step is.
+        #: Whether the step is replayed from its trace however long it is.
         self._always_traced = False
         self._is_traced = not isinstance(plan.system, OwnSystem)
         self._by_core = plan.backend == "rust" and not plan.single
-        #: Of float32: what makes steps, one part after the other.
+        #: In float32: the parts of a step.
         self._singles: list[Steps] = []
         self._plans: dict[int, engine.Plan] = {}
         self._rates: tuple[Replay, list[Array]] | None = None
         self._rates_traced = False
 
     def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-        """A step of these members from v and y, of another time and length for each."""
+        """A step of these members from v and y, with a time and a length for each."""
         if self._plan.single:
             return self._in_single(index, t, h, v, y)
         if self._by_core and len(index) <= MEMBERS_BY_CORE:
@@ -72,23 +72,23 @@ class Trials:
         state = [t, h, *_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
         numbers = [each if each.shape[-1] == 1 else each[index] for each in self._numbers]
         with np.errstate(all="ignore"):
-            made = self._operations(state, numbers)
-        n = len(made) - y[..., 0].size
-        return _block(made[:n], v), _block(made[n:], y)
+            rows = self._operations(state, numbers)
+        n = len(rows) - y[..., 0].size
+        return _block(rows[:n], v), _block(rows[n:], y)
 
     def _in_single(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-        """The same in float32."""
+        """A step of these members in float32."""
         if not self._singles:
             plan = self._members.plan(np.arange(self._plan.members))
             self._singles = [by_tape.steps_of_single(plan, part) for part in self._parts()]
         with np.errstate(all="ignore"):
-            return self._made_in_single(self._singles, index, t, h.astype(np.float32).astype(np.float64), v, y)
+            return self._single_step(self._singles, index, t, h.astype(np.float32).astype(np.float64), v, y)
 
     def _parts(self) -> list[str]:
-        """The parts of a step: what a method carries in place of v is made anew for its length."""
+        """The parts of a step; what a method carries in place of v is computed again for its length."""
         return ["step"] if self._plan.method.carry is None else ["start", "step", "finish"]
 
-    def _made_in_single(self, steps: list[Steps], index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+    def _single_step(self, steps: list[Steps], index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         rows: list[Any] = [*_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
         works = [np.zeros(len(index))] if self._plan.system.control is not None else []
         n_v, n = len(_rows(v, self._plan.system.v_shape)), len(rows)
@@ -98,7 +98,7 @@ class Trials:
         return _block(rows[:n_v], v), _block(rows[n_v:], y)
 
     def rates(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-        """How much v and y of these members would change in a step of the length if they went on as they do here."""
+        """By how much v and y of these members would change in a step of this length at their rates here."""
         if not self._rates_traced:
             self._rates, self._rates_traced = self._traced_rates(), True
         if self._rates is None:
@@ -114,7 +114,7 @@ class Trials:
         return _block(changes[:n], v), _block(changes[n:], y)
 
     def _traced_rates(self) -> tuple[Replay, list[Array]] | None:
-        """Rates of an own system as operations, likewise."""
+        """The rates of an own system as operations, if they are few and have no samples."""
         plan = self._members.plan(np.arange(self._plan.members))
         if not isinstance(plan.system, OwnSystem):
             return None
@@ -133,27 +133,27 @@ class Trials:
         return operations, [np.atleast_1d(each) for each in tracer.numbers]
 
     def _scaled(self, plan: engine.Plan, h: Any) -> Any:
-        """The system of these members, scaled to steps of another length for each."""
+        """The system of these members, scaled to a length for each."""
         return plan.system.scaled(h, plan.batch, plan.force)
 
     def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
-        """The same with symbols."""
+        """The system scaled to a length, with symbols."""
         return tracer.scaled(h)
 
     def _one_by_one(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-        """The same by the core."""
-        made_v, made_y = np.empty(v.shape), np.empty(y.shape)
+        """A step of these members by the core."""
+        end_v, end_y = np.empty(v.shape), np.empty(y.shape)
         for i, (member, begin, length) in enumerate(zip(index.tolist(), t.tolist(), h.tolist(), strict=True)):
             if member not in self._plans:
-                if len(self._plans) >= KEPT_PLANS:
+                if len(self._plans) >= MAX_PLANS:
                     self._plans.clear()
                 self._plans[member] = self._members.plan(np.array([member]))._replace(
                     first=0, steps=1, every=None, threads=1, progress=None, record=(), fused=False
                 )
             plan, one = self._plans[member]._replace(t0=begin, dt=length), slice(i, i + 1)
             out = engine.advance(plan, np.ascontiguousarray(v[..., one]), np.ascontiguousarray(y[..., one]))
-            made_v[..., one], made_y[..., one] = out.v[-1], out.y[-1]
-        return made_v, made_y
+            end_v[..., one], end_y[..., one] = out.v[-1], out.y[-1]
+        return end_v, end_y
 
     def _trace(self) -> None:
         """Trace a step of an own system, if it is short and has no samples."""
@@ -163,29 +163,29 @@ class Trials:
         t, h = tape.state(0), tape.state(1)
         shapes, leaves = (plan.system.v_shape, plan.system.y_shape), (tape.state(i) for i in range(2, 1 << 30))
         v, y = (_symbols(shape, leaves) for shape in shapes)
-        made = self._on(tracer, plan, t, h, v, y)
+        blocks = self._on(tracer, plan, t, h, v, y)
         if tracer.tables:
             return
-        operations = Replay(*tape.operations(tracer.flat(*made)))
+        operations = Replay(*tape.operations(tracer.flat(*blocks)))
         if len(operations.lines) <= MOST_OPERATIONS or self._always_traced:
             self._operations, self._numbers = operations, [np.atleast_1d(each) for each in tracer.numbers]
 
     def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-        """A step of all members of a plan, of another time and length for each."""
+        """A step of all members of a plan, with a time and a length for each."""
         return one_step(plan, t, h, v, y)
 
     def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
-        """The same with symbols."""
+        """A step with symbols."""
         s = tracer.scaled(h)
         return (v, y) if tracer.tables else stepped(plan, s, t, h, v, y)
 
 
 class AdaptiveTrials(Trials):
-    """The same of a plan with adaptive steps: as the states within a step are made that are saved."""
+    """Trials of a plan with adaptive steps, made as saved states within a step are."""
 
     def __init__(self, plan: engine.Plan, members: Members) -> None:
         super().__init__(plan, members)
-        self._by_core = False  # which makes no steps of a given length of these
+        self._by_core = False  # it does not make adaptive steps of a given length
         self._always_traced = plan.method.has_series
         self._is_traced = self._is_traced and not self._always_traced
 
@@ -198,7 +198,7 @@ class AdaptiveTrials(Trials):
     def _parts(self) -> list[str]:
         return ["tried"]
 
-    def _made_in_single(self, steps: list[Steps], index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+    def _single_step(self, steps: list[Steps], index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         return by_tape.tried(self._plan, steps[0], t, h, v, y, by_tape.some_of(steps[0], index)).projected
 
     def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
@@ -211,15 +211,15 @@ class AdaptiveTrials(Trials):
 
 
 def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-    """A step of all members of a plan, likewise."""
-    system: Any = plan.system  # whose step is one number elsewhere
+    """A step of all members of a plan, with a time and a length for each."""
+    system: Any = plan.system  # elsewhere the step is one number
     with np.errstate(all="ignore"):
         v, y = stepped(plan, system.scaled(h, plan.batch, plan.force), t, h, v, y)
     return np.asarray(v), np.asarray(y)
 
 
 def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
-    """A step of a method from v and y: what it carries in place of v is made anew for this length."""
+    """A step of a method from v and y; what it carries in place of v is computed again for this length."""
     steps, carries = plan.method.steps, plan.method.carry is not None
     if not carries:
         return tuple(contact.step(steps, s, plan.choice, t, h, v, y))
@@ -231,7 +231,7 @@ def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[
 
 
 def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
-    """A step of a method with adaptive steps, of a length that is given."""
+    """A step of this length of a method with adaptive steps."""
     steps: Any = plan.method.steps
     if plan.method.has_series:
         unit = longer(series_pace.unit_of(h), LEAST_UNIT)
@@ -244,10 +244,10 @@ def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any)
 
 
 def _symbols(shape: tuple[int, ...], leaves: Any) -> Any:
-    made = np.empty(shape, dtype=object)
+    block = np.empty(shape, dtype=object)
     for index in np.ndindex(shape):
-        made[index] = next(leaves)
-    return made
+        block[index] = next(leaves)
+    return block
 
 
 def _rows(block: Array, shape: tuple[int, ...]) -> list[Array]:
@@ -255,7 +255,7 @@ def _rows(block: Array, shape: tuple[int, ...]) -> list[Array]:
 
 
 def _block(rows: list[Array], like: Array) -> Array:
-    made = np.empty((len(rows), like.shape[-1]))
-    for row, numbers in zip(made, rows, strict=True):
+    block = np.empty((len(rows), like.shape[-1]))
+    for row, numbers in zip(block, rows, strict=True):
         row[:] = numbers
-    return made.reshape(like.shape)
+    return block.reshape(like.shape)

@@ -20,7 +20,8 @@ from ...model.systems.base import a_system
 from ...runs import float32
 from ...runs.diagnostics import of_a_strong_control
 from ...runs.findings import warn_of
-from ...runs.request import Options, Request
+from ...runs.options import Options
+from ...runs.request import Request
 from .c import C
 from .head import head
 from .javascript import JavaScript

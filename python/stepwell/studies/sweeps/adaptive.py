@@ -11,8 +11,8 @@ from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError, ShapeError, UnsupportedError
 from ...model.methods import Method
+from ...runs.adaptive_options import check_times
 from ...runs.engine import PACE_NUMBERS
-from ...runs.request import goes_with_times
 from ...runs.result import Run, Status
 from ...runs.stops import WHY_STOPPED
 from ...runs.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
@@ -95,7 +95,7 @@ def arguments(
         if axis.own:
             raise ArgumentError(f"axes: tolerance: expected one number for each member, got shape {axis.values.shape}")
         order_of_series(method, axis.values)
-    goes_with_times(tolerance is not None or "tolerance" in varied, at)
+    check_times(tolerance is not None or "tolerance" in varied, at)
     times = np.atleast_1d(checks.numbers("at", at, unit="units of time"))
     if times.ndim > 1:
         raise ShapeError(f"at: expected times along one axis, the same for all members, got shape {times.shape}")

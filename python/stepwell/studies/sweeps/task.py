@@ -22,7 +22,8 @@ from ...model.systems.base import a_system
 from ...runs.diagnostics import of_a_strong_control
 from ...runs.findings import Finding
 from ...runs.integration import quietly, step
-from ...runs.request import Options, Request, spread
+from ...runs.options import Options, spread
+from ...runs.request import Request
 from ...runs.result import Run
 from .adaptive import NUMBERS_OF_A_CONTROLLER, lost
 from .axes import OF_THE_RUN

@@ -21,7 +21,8 @@ from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import Oscillator
 from ...runs.integration import step
-from ...runs.request import Options, Request
+from ...runs.options import Options
+from ...runs.request import Request
 from .zplane import within
 
 if TYPE_CHECKING:

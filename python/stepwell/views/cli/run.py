@@ -17,7 +17,8 @@ from ...base.pictures import new_figure
 from ...errors import ArgumentError
 from ...model.controls import WAYS, AnyControl, EnergyControl, Projection
 from ...runs.integration import noticing
-from ...runs.request import FORMS, Options, Request
+from ...runs.options import FORMS, Options
+from ...runs.request import Request
 from ...runs.result import Run
 from ...scenes import Scene
 from ..charts import RunPicture, run_picture

@@ -1,0 +1,175 @@
+"""The options of a run, and checks of those that go with fixed and with adaptive steps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..base import checks
+from ..base.arrays import Array, Shape
+from ..base.reprs import of_member
+from ..errors import ArgumentError, UnsupportedError
+from ..model.compatibility import fits_together, velocities
+from ..model.controls import ConstraintControl, EnergyControl
+from ..model.methods import Method
+from ..model.methods import method as find_method
+from ..model.systems import Sinusoid, System
+from ..model.systems.base import a_system
+from . import continuation
+
+if TYPE_CHECKING:
+    from ..base.literals import Backend, RunForm
+    from .continuation import Continuation
+    from .events import Event
+
+FORMS: tuple[RunForm, ...] = ("direct", "matrix", "power")
+BACKENDS: tuple[Backend, ...] = ("rust", "numpy")
+
+
+class Options(NamedTuple):
+    """The arguments of ``integrate`` in their order, unchecked, None for those that were left out."""
+
+    v: Any = None
+    y: Any = None
+    dt: Any = None
+    steps: Any = None
+    every: Any = None
+    tolerance: Any = None
+    at: Any = None
+    control: Any = None
+    force: Any = None
+    record: Any = None
+    events: Any = None
+    form: Any = "direct"
+    fused: Any = None
+    dtype: Any = None
+    t0: Any = None
+    start: Any = None
+    max_steps: Any = None
+    max_step: Any = None
+    jumps: Any = None
+    positive: Any = None
+    progress: Any = False
+    threads: Any = None
+    backend: Any = "rust"
+    start_step: Any = None
+    resume: Any = None
+
+
+def under_control(system: System, control: Any, v: Array | None, y: Array | None, batch: Shape, dt: float | None) -> System:
+    """The system under control. Without a state the control needs all of its numbers, but not if there is no ``dt`` either."""
+    if v is not None and y is not None and dt is not None:
+        return system.controlled(control, v, y, dt)
+    if dt is not None and not system.keeps(control) and not isinstance(control, ConstraintControl) and control.target is None:
+        raise ArgumentError("control: expected one with a target, or v and y, whose energy it keeps")
+    if dt is not None and isinstance(control, EnergyControl) and control.gain is None:
+        raise ArgumentError("control: expected one with gain=, or v and y, since relative= refers to them")
+    return system.under(control, batch)
+
+
+def options_of_resumed(options: Options) -> tuple[Options, Continuation]:
+    """The options, with those of the run that goes on for options that were left out."""
+    before = continuation.of(options.resume)
+    for name in ("t0", "start_step"):
+        if getattr(options, name) is not None:
+            raise ArgumentError(
+                f"{name}: the run that goes on has its own, got {checks.short(getattr(options, name))}; to begin elsewhere, "
+                f"start anew from its last state: v=run.v[-1], y=run.y[-1]"
+            )
+    known = {"v": before.v, "y": before.y} | before.options
+    return options._replace(**{name: each for name, each in known.items() if getattr(options, name) is None}), before
+
+
+def checked_system(system: Any, method: str | Method, v: Any, y: Any) -> tuple[Method, System, Any]:
+    """Method and system of a run, and the velocities at its start."""
+    method = find_method(method)
+    system = a_system(system)
+    if y is None:
+        raise ArgumentError("y: expected the coordinates at the start, got None; or the run that goes on, resume=run")
+    system = system.for_state_shapes(v, y)
+    v = velocities(system, v)
+    fits_together(system, method)
+    return method, system, v
+
+
+def arithmetic(fused: Any, dtype: Any) -> tuple[bool, bool]:
+    """Whether steps have fused multiply-adds, and whether they are in float32."""
+    return fused is not None and checks.flag("fused", fused), dtype is not None and checks.is_single(dtype)
+
+
+def controlled(system: System, method: Method, control: Any, v: Array, y: Array, dt: float) -> System:
+    """The system under control, with the state as target if the control has none."""
+    system = system.controlled(control, v, y, dt)
+    fits_together(system, method)
+    return system
+
+
+def event_list(events: Any, form: str) -> list[Event]:
+    """The events as a list."""
+    from .events.event import several
+
+    if form != "direct":
+        raise UnsupportedError(
+            f"events: goes with form='direct' only, got form={form!r}; a located event ends a shorter step, and a "
+            f"matrix is of steps of one length"
+        )
+    return several(events)
+
+
+def check_matrix_form(system: System, method: Method, form: str, force: Any) -> None:
+    """Raise if there is no transition matrix."""
+    if force is not None:
+        raise UnsupportedError(
+            f"force: goes with form='direct' only, got form={form!r}; the matrices of a step have no term for it: "
+            f"give the linear system an input"
+        )
+    if not system.linear:
+        raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    if method.has_series and any(isinstance(each, Sinusoid) for each in system.given_inputs().values()):
+        raise UnsupportedError(
+            f"form: {method.name} takes the derivatives of inputs too, and the transition matrix their values only; "
+            f"use form='direct'"
+        )
+
+
+def quantities(system: System, record: Any) -> list[str]:
+    """The quantities to record, each once; raise if the system does not have one."""
+    if record is None or (type(record) is tuple and not record):
+        return []
+    names = [record] if isinstance(record, str) else checks.several("record", record, "quantities")
+    known = list(dict.fromkeys(["energy", *system.quantities]))
+    for name in names:
+        checks.known("record", name, known)
+    if "energy" in names and "energy" not in system.quantities:
+        v, y = (np.zeros((*shape, *system.batch)) for shape in (system.v_shape, system.y_shape))
+        system.energy(v, y)  # raises if there is none, before any work
+    return list(dict.fromkeys(names))
+
+
+def spread(array: Array, block: Shape, batch: Shape) -> Array:
+    """Broadcast a block to the whole batch."""
+    axes = array.shape[len(block) :]
+    if axes == batch:
+        return array
+    if not array.ndim:
+        return checks.over(array, batch)
+    return np.broadcast_to(array.reshape((*block, *(1,) * (len(batch) - len(axes)), *axes)), (*block, *batch))
+
+
+def last_time(t0: Any, dt: float, start_step: int, steps: int) -> float:
+    """The largest |t| of a run; raise if a time does not advance or is not finite."""
+    begin, end = t0 + start_step * dt, t0 + (start_step + steps) * dt
+    index: Shape = ()
+    if isinstance(t0, np.ndarray):
+        wrong = (begin == end) | ~np.isfinite(end)
+        if not wrong.any():
+            return float(max(np.abs(each).max(initial=0.0) for each in (begin, end)))
+        index = tuple(np.argwhere(wrong)[0].tolist())
+        begin, end = begin[index], end[index]
+    elif begin != end and np.isfinite(end):
+        return float(max(abs(begin), abs(end)))
+    raise ArgumentError(
+        f"dt, t0: expected a time that moves on and stays finite, got t = {begin:g} at step {start_step} and t = {end:g} "
+        f"after {steps} steps of {dt:g}{of_member(index)}"
+    )
