@@ -1,9 +1,9 @@
-"""Bodies that meet within one step, which no method can follow: whether a run may have such, and where it has.
+"""Bodies that meet within one step, which no method can follow: whether a run may contain such a step, and where it does.
 
 In such a step the line from one body to the other turns by more than a right angle, or they move past each other by more than
-twice the distance at which they begin or end. Looking for it takes the run again with all of its states. So it is done on
-request (``Run.encounters``), and by itself only where two bodies alone, begun as some saved state has them, would meet so, and
-the others pull them apart, or together, by less than the two pull each other.
+twice the distance at which they begin or end. The search repeats the run with all of its states. So it is made on request
+(``Run.encounters``), and otherwise only if two bodies alone would meet so from a saved state, and the others pull them apart or
+together by less than the two pull each other.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from ..model.parameters import aligned
 from ..model.systems import NBody
 from . import engine
 
-#: Encounters that turn a pair by less than this, in radians, are no matter.
+#: Encounters that turn a pair by less than this, in radians, do not count.
 WEAK = 0.01
 
-#: A warning names the bodies that collided, or that passed each other, if repeating the run of the member takes at most so many
-#: steps × numbers, which is a moment. Otherwise they are found by ``Run.collisions`` and ``Run.encounters``.
+#: A warning names the bodies that collided or passed each other if repeating the member's run takes at most this many steps ×
+#: numbers, which is a moment. Otherwise ``Run.collisions`` and ``Run.encounters`` find them.
 MAX_RERUN = 10_000_000
 
-#: States that are looked at together hold so many numbers, some megabytes.
+#: States that are searched together have this many numbers, some megabytes.
 NUMBERS_AT_ONCE = 1 << 18
 
 
@@ -66,7 +66,7 @@ class Encounter(NamedTuple):
 def met_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], float] | None:
     """The first step in which two bodies of one member met.
 
-    Softened bodies pass each other above one another, at the distance ε.
+    Softened bodies pass each other as if they were ε apart in a further dimension.
 
     Args:
         bodies: of one member.
@@ -93,7 +93,7 @@ def met_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], flo
         share = np.clip(-(before * moved).sum(axis=-1) / way2, 0.0, 1.0)
         nearest = before + moved * share[..., np.newaxis]
         q2 = (nearest * nearest).sum(axis=-1)
-        # A step too near may fling them apart: the speed is that with which they came, in the step before.
+        # A step too near may fling them apart, so the speed is that of the step before.
         came2 = way2.copy()
         came2[1:] = np.where(way2[:-1] > 0.0, np.minimum(way2[1:], way2[:-1]), way2[1:])
         speed2 = came2 / (h * h)
@@ -107,7 +107,7 @@ def met_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], flo
 
 
 def pieces(plan: engine.Plan, bodies: NBody, v: Array, y: Array, carried: bool, steps: int) -> Iterator[tuple[int, Array, Array]]:
-    """All states of a run of one member again, some at once: the number of steps before, velocities and coordinates."""
+    """All states of a run of one member, made again some at once: the number of earlier steps, velocities and coordinates."""
     length = max(16, NUMBERS_AT_ONCE // (y.size * len(y)))
     done = 0
     while done < steps:
@@ -124,13 +124,13 @@ def pieces(plan: engine.Plan, bodies: NBody, v: Array, y: Array, carried: bool, 
 def of_member(
     plan: engine.Plan, v: Array, y: Array, carried: bool, steps: int, index: tuple[int, ...], bound: float = math.inf
 ) -> Encounter | None:
-    """The first encounter of one member in so many steps, if finding it takes no more than ``bound`` steps × numbers."""
+    """The first encounter of one member within ``steps``, searched for at most ``bound`` steps × numbers."""
     assert isinstance(plan.system, NBody)
     bodies = plan.system.member(index, plan.batch)
     v, y = checks.member(v, index), checks.member(y, index)
     begin = y
     for done, _, states in pieces(plan, bodies, v, y, carried, steps):
-        # Each step is looked at with the one before it.
+        # Each step is searched with the one before it.
         if (met := met_in(bodies, np.concatenate([begin[np.newaxis], states]), plan.dt)) is not None:
             step, pair, distance = met
             return Encounter(index, plan.first + done + step - 1, pair, distance)
@@ -143,7 +143,7 @@ def of_member(
 def overshoots(
     plan: engine.Plan, v: Array, y: Array, carried: bool, steps: int, index: tuple[int, ...], bound: float = math.inf
 ) -> tuple[int, float] | None:
-    """The first step before which h·C·K of a member under a control was 1 or more, and that number; None if that is not found."""
+    """The first step before which h·C·K of a member under a control was 1 or more, and that number; None if there is none."""
     assert isinstance(plan.system, NBody)
     bodies = plan.system.member(index, plan.batch)
     assert bodies.control is not None
@@ -160,10 +160,10 @@ def overshoots(
 
 
 def may_meet(bodies: NBody, h: float, time: float, v: Any, y: Any) -> bool:
-    """Whether two bodies of one state, left to each other, would pass each other within a step, in lists of floats.
+    """Whether two bodies of one state, left to each other, would pass each other within a step; all in lists of floats.
 
-    A pair of relative angular momentum L has the speed L/r where it is nearest, and turns there by a right angle in a step if
-    h·L/(2r) = √(r² + ε²). It comes nearer than that r if its energy suffices there.
+    A pair with relative angular momentum L has the speed L/r at its nearest point, and turns there by a right angle in a step if
+    h·L/(2r) = √(r² + ε²). It comes nearer than this r if its energy suffices.
     """
     masses, gravity, soft2 = bodies.masses.tolist(), float(bodies.G), float(bodies.softening) ** 2
     newton = bodies.force == "newton"
@@ -192,7 +192,7 @@ def may_meet(bodies: NBody, h: float, time: float, v: Any, y: Any) -> bool:
             at_near = potential(strength, near2 + soft2)
             if not energy > at_near + 2.0 * (near2 + soft2) / (h * h):
                 continue
-            # At the speed that it has half way in, or less, it comes there in this time or more.
+            # It is at most as fast as half way in, so it takes at least this time to come there.
             middle = potential(strength, 0.25 * r2 + soft2)
             if math.sqrt(r2) > 2.0 * time * math.sqrt(max(0.0, 2.0 * (energy - middle))):
                 continue
@@ -205,7 +205,7 @@ def may_meet(bodies: NBody, h: float, time: float, v: Any, y: Any) -> bool:
 
 
 def _spread(square: Any, newton: bool) -> Any:
-    """What the distance is divided by in the attraction of a unit of mass: r³ by Newton's law, or r²."""
+    """The divisor of the distance vector in the attraction by a unit of mass: r³ by Newton's law, or r²."""
     return square * np.sqrt(square) if newton else square
 
 
@@ -217,7 +217,7 @@ def _pull(gravity: float, masses: Any, y: Any, k: int, i: int, soft2: float, new
 
 
 def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> Any:
-    """The same of every member of a batch, as an array of truths; blocks of shape (bodies, dim, *batch)."""
+    """``may_meet`` for every member of a batch, as an array of truths; blocks have the shape (bodies, dim, *batch)."""
     newton = bodies.force == "newton"
     i, j = np.triu_indices(len(y), 1)
 
@@ -240,7 +240,7 @@ def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> A
         in_time = np.sqrt(r2) <= 2.0 * time * np.sqrt(np.maximum(0.0, 2.0 * middle))
         attract = strength > 0.0
         near, may = attract & (r2 <= near2), attract & ~parts & reaches & in_time
-        # How strongly the others pull a pair apart takes longest, and few pairs come so far.
+        # The pull of the others takes longest to compute, and few pairs need it.
         far = np.flatnonzero(may.reshape(len(i), -1).any(axis=1))
         i, j, by_others = i[far], j[far], np.zeros_like(d[far])
         for k in range(len(y) if far.size else 0):
@@ -255,7 +255,7 @@ def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> A
 
 
 def collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tuple[int, ...], step: int) -> Collision:
-    """Which bodies were nearest in the last state that was finite: the member is run again up to there, alone."""
+    """The two nearest bodies in the last finite state; the member is run again alone up to there."""
     system, steps = plan.system, step - 1 - plan.first
     assert isinstance(system, NBody)
     alone, y = system.member(index, plan.batch), checks.member(y, index)

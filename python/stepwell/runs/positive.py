@@ -1,4 +1,4 @@
-"""Components that must not become negative: what ``positive=`` says, as places among the numbers of a state."""
+"""The argument ``positive=``: components that must not become negative, as places among the numbers of a state."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def places_of(system: System, components: Any) -> list[int]:
 
 
 def checked_places(system: System, components: Any, v: Array, y: Array) -> tuple[int, ...]:
-    """The same, at a start at which none of them is negative."""
+    """``places_of``; raise if one of the components is negative at the start."""
     places = places_of(system, components)
     rows = [row for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))) for row in _rows_of(block, axes)]
     for place in places:
@@ -41,7 +41,7 @@ def _rows_of(block: Array, axes: int) -> list[Array]:
 
 
 def _place(system: System, part: Any) -> int:
-    """The place of a component that is given as an index of y, or as ("v", …) or ("y", …)."""
+    """The place of a component, from an index of y, or from ("v", …) or ("y", …)."""
     block, index = (
         ("y", part) if not isinstance(part, tuple) or not part or isinstance(part[0], (int, np.integer)) else (part[0], part[1:])
     )
@@ -58,15 +58,12 @@ def _place(system: System, part: Any) -> int:
             f"positive: expected True, or components of {block}, whose shape is {shape}: an index of y, or as ('y', 0), got "
             f"{checks.short(part)}"
         )
-    return (
-        int(np.ravel_multi_index(index, shape)) + (prod(system.v_shape) if block == "y" else 0)
-        if shape
-        else (prod(system.v_shape) if block == "y" else 0)
-    )
+    first = prod(system.v_shape) if block == "y" else 0
+    return first + (int(np.ravel_multi_index(index, shape)) if shape else 0)
 
 
 def name_of(system: System, place: int) -> str:
-    """A component as it is written, by its place among the numbers of v and then of y."""
+    """The name of a component, such as y[1], by its place among the numbers of v and then of y."""
     n_v = prod(system.v_shape)
     block, shape, number = ("v", system.v_shape, place) if place < n_v else ("y", system.y_shape, place - n_v)
     return f"{block}[{', '.join(map(str, np.unravel_index(number, shape)))}]" if shape else block

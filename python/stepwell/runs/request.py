@@ -200,22 +200,7 @@ class Request(NamedTuple):
             t0 = spread(t0, (), batch)
             rows += 1  # the times, which are each member's own
         plan = engine.Plan(
-            system,
-            method,
-            batch,
-            dt,
-            t0,
-            start_step,
-            steps,
-            every,
-            choice,
-            workers,
-            backend,
-            form,
-            None,
-            (),
-            fused,
-            single=single,
+            system, method, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused, single=single
         )
         # What the core does not record is computed from the saved states, with some of them in between.
         recorded = 0
@@ -443,9 +428,8 @@ class Request(NamedTuple):
         if control is not None:
             if checks.batch_shape({"control": control.batch, "v and y": batch}) != batch:
                 raise ShapeError(f"control: its batch {control.batch} does not broadcast to that of v and y, {batch}")
-            stepped = controlled(system, method, control, np.asarray(v, np.float64), np.asarray(y, np.float64), dt).stepped_by(
-                method
-            )
+            wide_v, wide_y = np.asarray(v, np.float64), np.asarray(y, np.float64)
+            stepped = controlled(system, method, control, wide_v, wide_y, dt).stepped_by(method)
         slot = None
         if before is not None and before.carry is not None and before.holds(stepped, batch, v, y):
             slot = np.array(before.carry, dtype=kind).reshape(-1)

@@ -113,7 +113,7 @@ class World:
 
             self._frames = frames.Frames(plan, request.events, v, y, loop)
             make = self._frames.step
-        # What an event makes of a state tells nothing of the steps.
+        # A state that an event changed says nothing about the growth by steps.
         if not any(each.then for each in request.events or ()):
             make = registry.task("watched_for_growth")(make, loop, request.system, plan.method, plan.dt, v, y)
         #: ``step(n=1)`` makes n steps in place.
@@ -149,7 +149,7 @@ class World:
         return self._plan.dt
 
     def _standing(self) -> Continuation:
-        """Where it stands, for what goes on from here; the arrays are copies."""
+        """The state from which another world goes on; arrays are copies."""
         plan = self._plan
         options: dict[str, Any] = {"t0": plan.t0, "start_step": self.step_number, "dt": plan.dt, "start": self._start}
         options |= {"fused": plan.fused, "dtype": str(self._y.dtype), "control": self._system.keeper}
