@@ -61,7 +61,7 @@ def integrate(
     ``resume`` and ``steps``, or ``resume`` and ``at``.
 
     Args:
-        system: what to step.
+        system: the system to step.
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block at the start, shape (*block, *batch), or one number for all; a first-order system has none.
         y: coordinate block at the start, likewise.
@@ -69,9 +69,9 @@ def integrate(
             to try first; if None, a hundredth of the time in which the state changes at the start, or from rest 2⁻²⁰ units of
             time, or that part of a run of less than 2⁻¹⁵ units.
         steps: number of steps, one or more.
-        every: save the state every so many steps, and at the first and the last; None saves the last alone. With a tolerance so
-            many accepted steps of each member, and at the one time of ``at``, its end: rows of ``run.t``, v and y are NaN where a
-            member has made fewer steps than another.
+        every: save the state at the start, after each ``every`` steps and after the last; None saves the last alone. With a
+            tolerance accepted steps of each member count, and ``at`` is one time, the end; rows of ``run.t``, v and y are NaN
+            where a member has made fewer steps than another.
         tolerance: in place of ``steps``, for adaptive steps: every member has steps of its own, such that the estimated error of
             each stays below this. One number is relative: of own equations to the largest that each component has been, so that
             units do not matter; of built-in systems, whose directions are equivalent, to the largest length of each block. For a
@@ -112,9 +112,9 @@ def integrate(
         jumps: with a tolerance, times at which rates jump, shape (jumps,), or (jumps, *batch) for jumps of each member. No step
             crosses one; behind it the step is chosen anew. Those of sampled inputs, and comparisons of your own equations with
             the time, are known without.
-        positive: with a tolerance, the components that must not become negative: True for all of y, or one or a list of indices
-            of y, or of tuples such as ("v", 0). A step that makes one negative is rejected; a member stops where no step is small
-            enough.
+        positive: with a tolerance, the components that must not become negative: True for all of y, or an index of y, a tuple
+            such as ("v", 0), or a list of these. A step that makes one negative is rejected; a member stops where no step is
+            small enough.
         progress: show a progress bar, in a terminal or in a notebook.
         threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
         backend: ``"rust"``, or ``"numpy"`` for the reference.
@@ -130,20 +130,20 @@ def integrate(
         A ``Run``.
 
     Raises:
-        ArgumentError: before any work: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system.
+        ArgumentError: before any work, if an argument is wrong; the message says what was expected.
+        UnsupportedError: if the method cannot step the system, or options do not go together.
         KeyboardInterrupt: within a tenth of a second of Ctrl-C.
 
     Warns:
         DivergenceWarning: how many members left the finite range, which first, and when. Nothing computed is lost.
         ToleranceWarning: how many members stopped before the last time of ``at``, and why; or that an absolute tolerance is so
             large that the motion is lost in it.
-        AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
-            sine; a state grew a million times by fixed steps that are beyond the stability limit at the start; bodies that
-            nothing controls ended with an energy of another size, or with a tolerance any system whose energy or declared
-            invariant is constant; a motion along a line passed a barrier that is higher than its energy; bodies met within one
-            step, which is then named. That is looked for where it is little work against the run, or where there is reason to
-            (docs/howto/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
+        AccuracyWarning: if the numbers of a run are finite but mean nothing: a pendulum turned so far that its angle has no sine;
+            a state grew a million times by fixed steps that are beyond the stability limit at the start; bodies without control,
+            or with a tolerance any system whose energy or declared invariant is constant, ended with another energy; a motion
+            along a line passed a barrier that is higher than its energy; bodies met within one step, which is then named. This is
+            checked if it is little work beside the run, or if something suggests it (docs/howto/nbody.md); not in the pieces of a
+            run that carries something. ``Run.encounters`` checks every step.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)

@@ -61,8 +61,8 @@ if TYPE_CHECKING:
     from .continuation import Continuation
     from .events import Event
 
-#: The memory of a run besides its saved states: so many numbers for each number of a state (the start, the carry, the final
-#: state), and so many bytes for each saved time (its step number and the time).
+#: The memory of a run besides its saved states: NUMBERS_PER_STATE for each number of a state (the start, the carry, the final
+#: state), and BYTES_PER_TIME for each saved time (its step number and the time).
 NUMBERS_PER_STATE, BYTES_PER_TIME = 4, 16
 
 #: Default of ``max_steps``: the most steps of a member of a run with a tolerance.
@@ -148,7 +148,7 @@ class Request(NamedTuple):
         if max_step is not None or jumps is not None or positive_components is not None:
             adaptive_only = (("max_step", max_step), ("jumps", jumps), ("positive", positive_components))
             name = next(name for name, option in adaptive_only if option is not None)
-            raise ArgumentError(f"{name}: goes with tolerance= and at= only; steps of fixed length are dt long, whatever comes")
+            raise ArgumentError(f"{name}: goes with tolerance= and at= only; all steps of fixed length are dt long")
         if dt is None or steps is None:
             missing = " and ".join(name for name, value in (("dt", dt), ("steps", steps)) if value is None)
             raise ArgumentError(f"{missing}: needed for fixed steps, got None; for adaptive steps give tolerance= and at=")

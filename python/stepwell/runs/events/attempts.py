@@ -105,7 +105,7 @@ def _by_numpy(
     y: Array,
     jumps: Array | None,
 ) -> Attempts:
-    """The same by the reference."""
+    """``attempted`` by the reference."""
     pace = engine.begun(plan, paces, v, y) if begins else engine.pace_of(plan, paces)
     pace = engine.pace_of(plan, engine.numbers_of(pace))._replace(held=np.zeros(plan.batch))
     walls = engine.jumps_of(plan, engine.Pacing(np.atleast_1d(until), budget, begins, jumps))

@@ -27,11 +27,11 @@ class Event(Immutable, ValueEquality):
             in NumPy style, as your own equations are. Further arguments are parameters of the system, by name.
         direction: 1 or "rising" for changes from below zero to above, −1 or "falling" for those from above to below, 0 or "both".
             If None, as an attribute ``direction`` of the function says, as SciPy reads it; 0 without one.
-        terminal: whether a member stops at the first such change; a whole number stops it at so many. If None, as an attribute
+        terminal: whether a member stops at the first such change; a whole number n stops it at the n-th. If None, as an attribute
             ``terminal`` of the function says; False without one.
         then: ``then(t, v, y)``, which returns the state (v, y) from which a member goes on at each such change; for a system
             without velocities ``then(t, y)``, which returns y. It is written as ``function`` is, and may take parameters too.
-        most: so many occurrences are kept for each member, the first ones; all are counted.
+        most: for each member the first ``most`` occurrences are kept; all are counted.
         name: its name in ``run.events``; if None, that of the function.
 
     Raises:
