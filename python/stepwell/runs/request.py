@@ -30,16 +30,6 @@ from ..model.systems import System
 from ..model.systems.base import TINY, a_system
 from ..reference.acceptance import Acceptance
 from . import continuation, engine, positive
-from .adaptive_options import (
-    check_adaptive,
-    check_ascending,
-    check_estimates,
-    is_backward,
-    jump_times,
-    pace_of,
-    relative_tolerances,
-    times_of_run,
-)
 from .options import (
     BACKENDS,
     FORMS,
@@ -240,14 +230,16 @@ class Request(NamedTuple):
     @classmethod
     def adaptive(cls, system: System, method: str | Method, options: Options, before: Continuation | None = None) -> Request:
         """A run in which every member has steps of its own."""
+        from . import adaptive_options  # only such runs need it
+
         method, system, v = checked_system(system, method, options.v, options.y)
         fused, single = arithmetic(options.fused, options.dtype)
         if before is not None:
             continuation.changes_on(before, options.events)
-        check_adaptive(options, before)
+        adaptive_options.check_adaptive(options, before)
         watched = None if options.events is None else event_list(options.events, "direct")
         control = a_control(options.control)
-        check_estimates(system, method, control, options, before)
+        adaptive_options.check_estimates(system, method, control, options, before)
         if single:
             from . import float32  # only such runs need it
 
@@ -261,7 +253,7 @@ class Request(NamedTuple):
         batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
         batches |= {"t0": t0.shape, "at": times.shape[1:]}
         checks.batch_shape(batches)  # before t0 and at are compared
-        backward = is_backward(times, t0)
+        backward = adaptive_options.is_backward(times, t0)
         acting = system.keeper if control is None else control
         if backward and acting is not None and getattr(acting, "acts_on_rates", True):
             raise UnsupportedError(
@@ -276,7 +268,7 @@ class Request(NamedTuple):
         groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))
         pace = None
         if before is not None:
-            pace = pace_of(before, method, groups)
+            pace = adaptive_options.pace_of(before, method, groups)
             acceptance = acceptance._replace(own=len(pace) == engine.PACE_NUMBERS + 3 * groups)
         first = most_step = None
         if pace is not None:
@@ -294,7 +286,7 @@ class Request(NamedTuple):
         if options.max_step is not None:
             most_step = checks.numbers("max_step", options.max_step, positive=True, unit="units of time")
             batches["max_step"] = most_step.shape
-        jumps = jump_times(system, options.jumps, t0, times)
+        jumps = adaptive_options.jump_times(system, options.jumps, t0, times)
         if jumps is not None:
             batches["jumps"] = jumps.shape[1:]
         if control is not None:
@@ -340,9 +332,9 @@ class Request(NamedTuple):
                 batch,
                 "give a smaller max_steps= or a larger every=, or split the batch",
             )
-        t0, times = times_of_run(t0, times, batch)
+        t0, times = adaptive_options.times_of_run(t0, times, batch)
         since = sign * t0 if pace is None else np.maximum(pace[engine.TARGET], sign * t0)
-        check_ascending(sign * times, since, sign, pace is not None)
+        adaptive_options.check_ascending(sign * times, since, sign, pace is not None)
         v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)
         if single:
             v, y = float32.rounded_state(v, y)
@@ -354,7 +346,9 @@ class Request(NamedTuple):
         progress = checks.flag("progress", options.progress)
         if control is not None:
             system = system.controlled(control, v, y, TINY)
-        relative = tolerances.relative if tolerances is not None else relative_tolerances(pace, acceptance, groups)
+        relative = (
+            tolerances.relative if tolerances is not None else adaptive_options.relative_tolerances(pace, acceptance, groups)
+        )
         order = order_of_series(method, relative.min(axis=0) if acceptance.own else relative)
         begin: Any = sign * t0 if t0.ndim else float(sign * t0)
         plan = engine.Plan(
