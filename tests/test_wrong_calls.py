@@ -12,6 +12,8 @@ import signal
 import time
 import warnings
 from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 import pytest
@@ -31,6 +33,14 @@ sw.integrate(own.pendulum, "rk4", v=0.0, y=1.0, dt=0.1, steps=3).save(SAVED_OWN)
 
 
 timer = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there is no timer here")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def slow_imports() -> None:
+    """What calls import: an import that the timer cuts short would break all later ones."""
+    for name in ("pandas", "xarray", "matplotlib.figure"):
+        if find_spec(name.partition(".")[0]):
+            import_module(name)
 
 
 class TookLongError(Exception):
