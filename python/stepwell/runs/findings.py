@@ -13,12 +13,12 @@ from ..base.immutable import by_value
 
 @by_value
 class Finding(NamedTuple):
-    """Something that a run noticed.
+    """What ``integrate`` noticed about a run and warns of.
 
     Attributes:
         category: the class of the warning, such as ``stepwell.DivergenceWarning``.
-        message: what was noticed, in words.
-        members: of which members, an array of truths of shape (*batch); ``run.select(members)`` is a run of them alone.
+        message: the text of the warning.
+        members: which members it is about, an array of truths of shape (*batch).
     """
 
     category: type[Warning]

@@ -83,8 +83,8 @@ class AdaptiveState(NamedTuple):
         y: coordinates, likewise.
         pace: the state of the step-size controller, shape (numbers, *batch), with the last output time in it.
         last: the last output time.
-        method: name of the method to which the pace belongs.
-        options: further arguments of ``integrate`` that go on: ``max_step``, ``jumps``, ``positive``.
+        method: name of the method.
+        options: arguments of ``integrate`` that hold for the run that goes on, too: ``max_step``, ``jumps``, ``positive``.
     """
 
     v: Array
@@ -125,7 +125,7 @@ class Run(ValueEquality):
         work: the energy that a control or a projection added to each member in this run, or None, shape (*batch). For a control
             it is the sum over the steps of ((1 − g)² − 1)·K, the change by its push −g·v alone, averaged over the evaluations.
             None in a run of fixed steps with events; with adaptive steps NaN for members that stopped at one.
-        findings: what was noticed of the run and warned of: each a class of warning, a message, and of which members.
+        findings: what ``integrate`` warned of, each with the class of the warning, a message and the members.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
@@ -200,7 +200,7 @@ class Run(ValueEquality):
 
     @property
     def dtype(self) -> str:
-        """Of the states, and of the arithmetic of the steps: "float64" or "float32"."""
+        """The type of the states and of the arithmetic of the steps: "float64" or "float32"."""
         return str(self.y.dtype)
 
     def select(self, saved: Any) -> Run:
