@@ -134,7 +134,7 @@ class Request(NamedTuple):
         if before is not None:
             continuation.changes_on(before, events)
         if max_steps is not None:
-            raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
+            raise ArgumentError("max_steps: goes with tolerance= and at= only; steps= is the number of steps of fixed length")
         if max_step is not None or jumps is not None or positive_components is not None:
             adaptive_only = (("max_step", max_step), ("jumps", jumps), ("positive", positive_components))
             name = next(name for name, option in adaptive_only if option is not None)

@@ -142,7 +142,7 @@ def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
 def refuse_fixed(outcomes: Iterable[Outcome], options: Mapping[str, Any]) -> None:
     """Raise if there is an argument that needs a tolerance."""
     if options["max_steps"] is not None:
-        raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
+        raise ArgumentError("max_steps: goes with tolerance= and at= only; steps= is the number of steps of fixed length")
     if wrong := [name for name, value in options.items() if value is not None]:
         raise ArgumentError(f"{', '.join(wrong)}: goes with tolerance= and at= only; steps of fixed length are dt long")
     if any(isinstance(each, Evaluations) for each in outcomes):
