@@ -70,9 +70,9 @@ def tried(file: Path) -> None:
         folder = Path(name)
         programs = install(file, folder / "environment")
         run([programs / "python", "-I", "-c", TRIAL], folder)
-        for words, told in COMMANDS.items():
-            if told not in (out := run([programs / "stepwell", *words], folder)):
-                raise SystemExit(f"stepwell {' '.join(words)}: {told!r} is not in {out}")
+        for words, text in COMMANDS.items():
+            if text not in (out := run([programs / "stepwell", *words], folder)):
+                raise SystemExit(f"stepwell {' '.join(words)}: {text!r} is not in {out}")
         run([programs / "python", "-m", "pip", "check"], folder)
 
 

@@ -212,9 +212,9 @@ def test_what_stopped_goes_on_with_more_steps() -> None:
 )
 def test_what_does_not_go_on(more: dict[str, Any], message: str) -> None:
     run = sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0])
-    given: dict[str, Any] = {"method": "merson", "at": [2.0], "resume": run} | more
+    arguments: dict[str, Any] = {"method": "merson", "at": [2.0], "resume": run} | more
     with pytest.raises(ArgumentError, match=message):
-        sw.integrate(sw.Oscillator(1.0), **given)
+        sw.integrate(sw.Oscillator(1.0), **arguments)
 
 
 # ---- amplitudes and units
@@ -407,9 +407,9 @@ def test_each_member_its_tolerance() -> None:
     ],
 )
 def test_bad_input_before_any_work(more: dict[str, Any], error: type[StepwellError], message: str) -> None:
-    given: dict[str, Any] = {"method": "merson", "v": 0.0, "y": 1.0, "tolerance": 1e-3, "at": [1.0]} | more
+    arguments: dict[str, Any] = {"method": "merson", "v": 0.0, "y": 1.0, "tolerance": 1e-3, "at": [1.0]} | more
     with pytest.raises(error, match=message):
-        sw.integrate(sw.Oscillator(1.0), given.pop("method"), **given)
+        sw.integrate(sw.Oscillator(1.0), arguments.pop("method"), **arguments)
 
 
 def test_fixed_steps_need_dt_and_steps() -> None:

@@ -120,9 +120,9 @@ def test_a_largest_step(method: str) -> None:
 
 def test_in_one_piece_or_in_several() -> None:
     """Jumps, the largest step and what must stay positive go on with the run."""
-    asked: dict[str, Any] = {"tolerance": 1e-6, "jumps": [5.0, 6.0], "max_step": 0.3, "positive": True}
-    whole = sw.integrate(gated(), "merson", y=0.0, at=[4.9, 5.5, 8.0], **asked)
-    first = sw.integrate(gated(), "merson", y=0.0, at=[4.9, 5.5], **asked)
+    options: dict[str, Any] = {"tolerance": 1e-6, "jumps": [5.0, 6.0], "max_step": 0.3, "positive": True}
+    whole = sw.integrate(gated(), "merson", y=0.0, at=[4.9, 5.5, 8.0], **options)
+    first = sw.integrate(gated(), "merson", y=0.0, at=[4.9, 5.5], **options)
     rest = sw.integrate(gated(), "merson", at=[8.0], resume=first)
     assert np.array_equal(whole.y[2:], rest.y)
 
@@ -202,8 +202,8 @@ def test_tolerances_of_components() -> None:
     assert fine.paces is not None
     assert loose.paces is not None
     assert loose.paces.accepted < fine.paces.accepted
-    found = sw.solve_ivp(rober().definition, (0.0, 0.4), [1.0, 0.0, 0.0], rtol=1e-9, atol=[1e-9, 1e-14, 1e-9])
-    assert found.y[:, -1] == pytest.approx(right, rel=1e-8)
+    solution = sw.solve_ivp(rober().definition, (0.0, 0.4), [1.0, 0.0, 0.0], rtol=1e-9, atol=[1e-9, 1e-14, 1e-9])
+    assert solution.y[:, -1] == pytest.approx(right, rel=1e-8)
     of_each = np.array([[1e-9], [1e-14], [1e-9]])
     batch = sw.integrate(rober(), "dop853", y=np.tile([[1.0], [0.0], [0.0]], 2), tolerance=(1e-9, of_each), at=[0.4])
     assert np.array_equal(batch.y[-1], np.stack(2 * [fine.y[-1]], -1))
@@ -283,8 +283,8 @@ def test_backward(method: str) -> None:
     assert back.y[1] == pytest.approx([1.0, 0.0], abs=1e-8)
     again = sw.integrate(reversed_time(), method, y=there.y[-1], t0=-5.0, tolerance=1e-11, at=[-2.5, 0.0, 1.0])
     assert np.array_equal(back.y, again.y)
-    asked: dict[str, Any] = {"y": there.y[-1], "t0": 5.0, "tolerance": 1e-11}
-    assert np.array_equal(back.y, sw.integrate(driven(), method, at=[2.5, 0.0, -1.0], backend="numpy", **asked).y)
+    arguments: dict[str, Any] = {"y": there.y[-1], "t0": 5.0, "tolerance": 1e-11}
+    assert np.array_equal(back.y, sw.integrate(driven(), method, at=[2.5, 0.0, -1.0], backend="numpy", **arguments).y)
     piece = sw.integrate(driven(), method, y=there.y[-1], t0=5.0, tolerance=1e-11, at=[2.5])
     assert np.array_equal(sw.integrate(driven(), method, at=[0.0, -1.0], resume=piece).y, back.y[1:])
 
@@ -372,7 +372,7 @@ def test_equal_bits_with_everything(method: str) -> None:
     """Jumps of each member, largest steps, positive states, tolerances of components; on every way through the core."""
     random = np.random.default_rng(11)
     start = random.uniform(0.05, 1.0, (3, 40))
-    asked: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         "y": start,
         "tolerance": (random.uniform(1e-7, 1e-5, (3, 1)), random.uniform(1e-9, 1e-7, 40)),
         "at": [0.5, 3.0, 9.0],
@@ -380,7 +380,7 @@ def test_equal_bits_with_everything(method: str) -> None:
         "max_step": random.uniform(0.1, 2.0, 40),
         "positive": [0, 2],
     }
-    runs = [sw.integrate(may_leonard(), method, backend=backend, **asked) for backend in ("rust", "numpy")]
+    runs = [sw.integrate(may_leonard(), method, backend=backend, **arguments) for backend in ("rust", "numpy")]
     assert np.array_equal(runs[0].y, runs[1].y)
     for name in ("t", "h", "accepted", "rejected"):
         assert np.array_equal(getattr(runs[0].paces, name), getattr(runs[1].paces, name))
@@ -419,8 +419,8 @@ def test_scenes_sweeps_and_solve_ivp() -> None:
     scene = sw.scenes.Scene(system, y=0.1, horizon=8.0, **options)
     assert np.array_equal(scene.run("merson", tolerance=1e-8, at=at).y, run.y)
     pytest.importorskip("xarray")
-    found = sw.sweep(gated, {"begin": ("run", [7.3]), "end": ("run", [7.33])}, "merson", y=0.1, tolerance=1e-8, at=at, **options)
-    assert found.y_last.values[0] == run.y[-1]
+    swept = sw.sweep(gated, {"begin": ("run", [7.3]), "end": ("run", [7.33])}, "merson", y=0.1, tolerance=1e-8, at=at, **options)
+    assert swept.y_last.values[0] == run.y[-1]
     with pytest.raises(ArgumentError, match="max_step: goes with tolerance= and at= only"):
         sw.integrate(system, "merson", y=0.1, dt=0.1, steps=2, max_step=0.1)
 
@@ -433,8 +433,13 @@ def test_equal_bits_of_a_batch_with_two_blocks(method: str) -> None:
     def hangs(t: Any, v: Any, y: Any) -> Any:
         return -np.sin(y)
 
-    asked: dict[str, Any] = {"v": np.array([0.0, 0.0, 1.0]), "y": np.array([1.0, 0.0, 0.0]), "tolerance": 1e-6, "at": [0.01, 4.0]}
-    runs = [sw.integrate(hangs(), method, backend=backend, **asked) for backend in ("rust", "numpy")]
+    arguments: dict[str, Any] = {
+        "v": np.array([0.0, 0.0, 1.0]),
+        "y": np.array([1.0, 0.0, 0.0]),
+        "tolerance": 1e-6,
+        "at": [0.01, 4.0],
+    }
+    runs = [sw.integrate(hangs(), method, backend=backend, **arguments) for backend in ("rust", "numpy")]
     assert np.array_equal(runs[0].y, runs[1].y)
     assert runs[0].paces is not None
     assert runs[0].paces.accepted[0] < 100

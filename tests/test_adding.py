@@ -32,7 +32,7 @@ pytestmark = pytest.mark.skipif(shutil.which("cargo") is None, reason="there is 
 def changed(text: str, change: str) -> str:
     """The text with the lines behind + in the place of those behind −; the lines behind a space say where."""
     lines = change.splitlines(keepends=True)
-    old, new = ("".join(line[1:] for line in lines if line[0] in kept) for kept in (" -", " +"))
+    old, new = ("".join(line[1:] for line in lines if line[0] in signs) for signs in (" -", " +"))
     assert text.count(old) == 1, f"{old!r} is there {text.count(old)} times"
     return text.replace(old, new)
 

@@ -140,13 +140,13 @@ def test_the_worst_frame_is_counted() -> None:
     advice = sw.advise("kepler", frame=0.1, tolerance=1e-3, methods=["fehlberg_5"], cost="evaluations")
     (row,) = (row for row in advice.ranked if row.tolerance is not None)
     scene, times = advice.scene, advice.asked
-    made = [0]
+    counts = [0]
     for k in range(1, len(times) + 1):
         end = sw.integrate(scene.system, row.method, v=scene.v, y=scene.y, tolerance=row.tolerance, at=times[:k])
         assert end.paces is not None
-        made.append(int(end.paces.evaluations))
-    assert made[-1] == row.steps * row.method.evaluations
-    assert row.worst_evaluations == max(np.diff(made))
+        counts.append(int(end.paces.evaluations))
+    assert counts[-1] == row.steps * row.method.evaluations
+    assert row.worst_evaluations == max(np.diff(counts))
     assert row.worst_evaluations > 5 * row.evaluations_per_frame  # type: ignore[operator]
     assert f"{row.worst_evaluations} in the worst frame" in str(advice)
     assert row.objects == int(0.1 / (1e-9 * row.ns_per_step * row.worst_evaluations / row.method.evaluations))
@@ -221,8 +221,8 @@ def test_the_cheapest_by_price_is_the_cheapest(name: str, tolerance: float, monk
         assert row.ns_per_step == prices[row.name]
     brute = Brute(scene_of(name), None, RATIO, prices)
     assert brute.best(tolerance, brute.cost(advice) / WORTH) is None
-    found = brute.best(tolerance, WORTH * brute.cost(advice))
-    assert found is not None
+    choice = brute.best(tolerance, WORTH * brute.cost(advice))
+    assert choice is not None
 
 
 class Made:
@@ -252,9 +252,9 @@ class Made:
 
 def searched(error: Any, tolerance: float) -> int:
     candidate: Candidate = Made(error)
-    found, missed = Search(tolerance, 1, {"made": 1.0}, 1e7).run([candidate])
+    choices, missed = Search(tolerance, 1, {"made": 1.0}, 1e7).run([candidate])
     assert not missed
-    return found["made"].k
+    return choices["made"].k
 
 
 def test_the_search_finds_where_the_order_says() -> None:
@@ -295,9 +295,9 @@ def test_advise_takes_the_better_of_equal_costs(noise: float, best: str, monkeyp
     prices = {"damped_euler": 7.70, "leapfrog": 7.74, "false_euler": 7.91}
 
     def times(scene: sw.Scene, methods: Sequence[sw.Method], singles: Sequence[sw.Method]) -> Times:
-        found = Times({m.name: prices[m.name] for m in methods})
-        found.noise = noise
-        return found
+        measured = Times({m.name: prices[m.name] for m in methods})
+        measured.noise = noise
+        return measured
 
     monkeypatch.setattr("stepwell.advice.step_times", times)
     advice = sw.advise("oscillator", methods=list(prices))
@@ -312,8 +312,8 @@ def test_advise_takes_the_better_of_equal_costs(noise: float, best: str, monkeyp
 
 
 @pytest.mark.parametrize(
-    ("number", "told"),
+    ("number", "text"),
     [(216563143, "about 2·10⁸"), (70_123_456, "about 7·10⁷"), (9_999, "about 10000"), (1234, "about 1000"), (99, "99"), (1, "1")],
 )
-def test_a_number_of_objects_is_told_to_the_digits_that_mean_something(number: int, told: str) -> None:
-    assert about(number) == told
+def test_a_number_of_objects_is_told_to_the_digits_that_mean_something(number: int, text: str) -> None:
+    assert about(number) == text

@@ -32,10 +32,10 @@ def prices(single: float, noise: float = 0.05) -> Any:
     """Measured times of a step, where one of float32 takes that share of one of float64."""
 
     def times(scene: Scene, methods: Any, singles: Any) -> Times:
-        found = Times({m.name: float(m.evaluations) for m in methods})
-        found.update({single_name(m): single * m.evaluations for m in singles})
-        found.noise = noise
-        return found
+        measured = Times({m.name: float(m.evaluations) for m in methods})
+        measured.update({single_name(m): single * m.evaluations for m in singles})
+        measured.noise = noise
+        return measured
 
     return times
 
@@ -66,7 +66,7 @@ def test_the_advice_in_float32_is_true(name: str, tolerance: float, frame: float
 def test_float64_in_the_place_of_float32_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A deliberately wrong search, whose runs in float32 are made in float64: its errors are not those of its rows."""
     init = Trials.__init__
-    monkeypatch.setattr(Trials, "__init__", lambda self, *given: init(self, *given[:3]))
+    monkeypatch.setattr(Trials, "__init__", lambda self, *arguments: init(self, *arguments[:3]))
     advice = sw.advise("oscillator", None, 1e-5, methods=["rk4"], dtype="float32")
     assert advice.ranked
     assert all(error_of(advice, row, "float32") != pytest.approx(row.error, rel=1e-3, abs=1e-9) for row in advice.ranked)
@@ -102,18 +102,18 @@ def test_the_search_ends_where_shorter_steps_only_round_more() -> None:
 
 def test_float32_is_chosen_where_it_costs_less(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stepwell.advice.step_times", prices(0.5))
-    given: dict[str, Any] = {"frame": 0.1, "tolerance": 0.1, "methods": ["leapfrog", "rk4"], "fixed": True}
-    advice = sw.advise("oscillator", **given, dtype="both")
+    options: dict[str, Any] = {"frame": 0.1, "tolerance": 0.1, "methods": ["leapfrog", "rk4"], "fixed": True}
+    advice = sw.advise("oscillator", **options, dtype="both")
     assert advice.best is not None
     assert (advice.best.name, advice.best.ns_per_step, advice.best.float64_ns_per_step) == ("leapfrog, float32", 0.5, 1.0)
     wide = next(row for row in advice.ranked if row.name == "leapfrog")
     assert advice.best.seconds_per_frame == pytest.approx(0.5 * (wide.seconds_per_frame or 0.0))
-    said = f"In float64 these steps have an error of {advice.best.float64_error:.2g}, and a step takes 2 times as long."
-    assert said in str(advice)
+    sentence = f"In float64 these steps have an error of {advice.best.float64_error:.2g}, and a step takes 2 times as long."
+    assert sentence in str(advice)
     assert "Use leapfrog in float32 with 1 step a frame" in str(advice)
     assert repr(advice).startswith("<advice for oscillator: leapfrog, float32, dt = 0.1")
     # By default it is not even tried.
-    assert {row.dtype for row in sw.advise("oscillator", **given).ranked} == {"float64"}
+    assert {row.dtype for row in sw.advise("oscillator", **options).ranked} == {"float64"}
 
 
 def test_of_equal_costs_float64_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,7 +136,7 @@ def test_what_float32_does_not_go_with_is_refused_in_words() -> None:
     # A drive of no strength, whose angle is far beyond what float32 can tell: the motion is the free one.
     far = Scene(sw.Oscillator(1.0, a=sw.Sinusoid(0.0, 1e6)), v=0.0, y=1.0, horizon=10.0, exact=turning)
     large = Scene(sw.Oscillator(1.0), v=0.0, y=1e39, horizon=10.0, exact=lambda t: (-1e39 * np.sin(t), 1e39 * np.cos(t)))
-    for scene, said in (
+    for scene, message in (
         (far, "in float32 a sinusoid's angle may grow to"),
         (large, "y: expected numbers up to 3.4e38, the largest of float32"),
     ):
@@ -144,7 +144,7 @@ def test_what_float32_does_not_go_with_is_refused_in_words() -> None:
         assert [row.name for row in advice.ranked if row.by == "step"] == ["rk4"]
         (refused,) = (each for each in advice.rejected if each.kind == "refused")
         assert refused.name == "rk4, float32"
-        assert said in refused.reason
+        assert message in refused.reason
 
 
 def test_steps_that_round_up_end_after_what_is_known() -> None:
@@ -172,9 +172,9 @@ def test_what_is_wrong_is_said() -> None:
 def test_the_command_tries_both(capsys: Any) -> None:
     words = ["advise", "clover", "--frame", "0.3", "--tolerance", "0.01", "--cost", "evaluations", "--float32"]
     assert cli.main([*words, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["dtype"] == "both"
-    assert {row["dtype"] for row in found["ranked"]} == {"float64", "float32"}
-    assert all((row["float64_error"] is None) == (row["dtype"] == "float64") for row in found["ranked"])
+    report = json.loads(capsys.readouterr().out)
+    assert report["dtype"] == "both"
+    assert {row["dtype"] for row in report["ranked"]} == {"float64", "float32"}
+    assert all((row["float64_error"] is None) == (row["dtype"] == "float64") for row in report["ranked"])
     assert cli.main(words) == 0
     assert "rk4, float32" in capsys.readouterr().out

@@ -139,8 +139,8 @@ def test_nothing_meets_the_tolerance() -> None:
 def test_the_least_error_is_that_of_a_whole_run(budget: float) -> None:
     """A run that ends far out shows little there of how late it is where it is fast: half a per cent of its largest error."""
     scene = replace(sw.scenes.kepler(0.9), horizon=5.0 * math.pi)
-    given = {"frame": None, "methods": ["fehlberg_5", "merson"], "cost": "evaluations"}
-    advice = sw.advise(scene, tolerance=1e-9, budget=budget, **given)
+    options = {"frame": None, "methods": ["fehlberg_5", "merson"], "cost": "evaluations"}
+    advice = sw.advise(scene, tolerance=1e-9, budget=budget, **options)
     gap = advice.shortfall
     assert gap is not None
     assert gap.tolerance is not None
@@ -180,7 +180,7 @@ def test_a_choice_whose_neighbours_fail_says_so() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "error", "said"),
+    ("arguments", "error", "message"),
     [
         ({"scene": 3}, DTypeError, "scene: expected a Scene or its name, got int"),
         ({"scene": "cloverr"}, ArgumentError, "did you mean 'clover'?"),
@@ -195,10 +195,10 @@ def test_a_choice_whose_neighbours_fail_says_so() -> None:
         ({"cost": "energy"}, ArgumentError, "Known: time, evaluations"),
     ],
 )
-def test_what_is_wrong_is_said(arguments: dict[str, Any], error: type[Exception], said: str) -> None:
+def test_what_is_wrong_is_said(arguments: dict[str, Any], error: type[Exception], message: str) -> None:
     with pytest.raises(error) as raised:
         sw.advise(**({"scene": "clover"} | arguments))
-    assert said in str(raised.value)
+    assert message in str(raised.value)
 
 
 # ---- telling
@@ -219,7 +219,7 @@ def test_the_text_fits_a_screen(tmp_path: Any) -> None:
     assert json.loads(advice.to_json())["best"]["method"] == advice.best.method.name
 
 
-def told(capsys: Any, *words: str) -> tuple[int, str, str]:
+def run_command(capsys: Any, *words: str) -> tuple[int, str, str]:
     code = cli.main(list(words))
     return code, *capsys.readouterr()
 
@@ -227,12 +227,12 @@ def told(capsys: Any, *words: str) -> tuple[int, str, str]:
 @pytest.mark.usefixtures("unmeasured")
 def test_the_command_says_what_advise_says(capsys: Any, tmp_path: Any) -> None:
     words = ("advise", "clover", "--frame", "3/10", "--tolerance", "0.01", "--cost", "evaluations")
-    code, out, err = told(capsys, *words, "--json")
+    code, out, err = run_command(capsys, *words, "--json")
     assert (code, err) == (0, "")
-    found, direct = json.loads(out), json.loads(sw.advise("clover", 0.3, 0.01, cost="evaluations").to_json())
+    report, direct = json.loads(out), json.loads(sw.advise("clover", 0.3, 0.01, cost="evaluations").to_json())
     for key in ("scene", "horizon", "frame", "tolerance", "cost"):
-        assert found[key] == direct[key]
-    kept = (
+        assert report[key] == direct[key]
+    keys = (
         "method",
         "substeps",
         "dt",
@@ -244,28 +244,28 @@ def test_the_command_says_what_advise_says(capsys: Any, tmp_path: Any) -> None:
         "margin",
         "robust",
     )
-    assert [[row[k] for k in kept] for row in found["ranked"]] == [[row[k] for k in kept] for row in direct["ranked"]]
-    assert found["rejected"] == direct["rejected"]
-    code, out, err = told(capsys, *words, "-o", str(tmp_path / "a.json"))
+    assert [[row[k] for k in keys] for row in report["ranked"]] == [[row[k] for k in keys] for row in direct["ranked"]]
+    assert report["rejected"] == direct["rejected"]
+    code, out, err = run_command(capsys, *words, "-o", str(tmp_path / "a.json"))
     assert (code, err) == (0, "")
-    assert f"Use {found['best']['method']} with {found['best']['substeps']} step" in out
+    assert f"Use {report['best']['method']} with {report['best']['substeps']} step" in out
     assert "written:" in out
     assert (tmp_path / "a.json").exists()
-    for row in found["ranked"]:
+    for row in report["ranked"]:
         assert row["method"] in out
 
 
 def test_the_command_says_when_nothing_fits(capsys: Any) -> None:
-    code, out, err = told(capsys, "advise", "oscillator", "--budget", "1e-15", "--methods", "rk4, leapfrog")
+    code, out, err = run_command(capsys, "advise", "oscillator", "--budget", "1e-15", "--methods", "rk4, leapfrog")
     assert (code, err) == (0, "")
     assert "Nothing fits." in out
-    code, out, _ = told(capsys, "advise", "oscillator", "--budget", "1e-15", "--methods", "rk4", "--json")
+    code, out, _ = run_command(capsys, "advise", "oscillator", "--budget", "1e-15", "--methods", "rk4", "--json")
     assert code == 0
     assert json.loads(out)["best"] is None
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["advise", "cloverr"], "did you mean 'clover'?"),
         (["advise", "clover", "--frame", "x"], "--frame: expected a time such as 0.02 or 1/60, or any, got 'x'"),
@@ -276,7 +276,7 @@ def test_the_command_says_when_nothing_fits(capsys: Any) -> None:
         (["advise", "clover", "-o", "a.txt"], "-o: expected a file ending in .json"),
     ],
 )
-def test_the_command_says_what_is_wrong(capsys: Any, words: list[str], said: str) -> None:
-    code, out, err = told(capsys, *words)
+def test_the_command_says_what_is_wrong(capsys: Any, words: list[str], message: str) -> None:
+    code, out, err = run_command(capsys, *words)
     assert (code, out) == (2, "")
-    assert said in err
+    assert message in err

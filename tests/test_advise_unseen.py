@@ -330,13 +330,15 @@ def test_a_scene_that_adaptive_steps_do_not_go_with_needs_an_exact_solution(arou
 @pytest.mark.parametrize(("scene", "exact"), [(lambda: sw.scenes.kepler(0.95), None), (lambda: sw.scenes.pendulum(179.0), None)])
 def test_a_hard_part_does_not_end_what_is_known(scene: Any, exact: None) -> None:
     """A loose tolerance asks for a truth that is a tenth as loose, so it is judged to the end and true there."""
-    given = scene()
-    advice = sw.advise(replace(given, exact=exact), frame=None, tolerance=1e-1, methods=["dop853", "merson"], cost="evaluations")
+    instance = scene()
+    advice = sw.advise(
+        replace(instance, exact=exact), frame=None, tolerance=1e-1, methods=["dop853", "merson"], cost="evaluations"
+    )
     assert not advice.cut
-    assert advice.scene.horizon == given.horizon
+    assert advice.scene.horizon == instance.horizon
     for row in advice.ranked:
         run = advice.run(row)
-        assert given.state_error(run).max() <= 1e-1
+        assert instance.state_error(run).max() <= 1e-1
 
 
 @pytest.mark.usefixtures("unmeasured")
@@ -355,7 +357,7 @@ def test_a_row_with_a_tolerance_is_true_whenever_it_is_asked() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "error", "said"),
+    ("arguments", "error", "message"),
     [
         ({"system": 3}, DTypeError, "system: expected a stepwell system such as Oscillator(), got int"),
         ({"v": "fast"}, DTypeError, "v: expected real numbers"),
@@ -383,14 +385,14 @@ def test_a_row_with_a_tolerance_is_true_whenever_it_is_asked() -> None:
         ),
     ],
 )
-def test_what_is_no_scene(given: dict[str, Any], error: type[Exception], said: str) -> None:
+def test_what_is_no_scene(arguments: dict[str, Any], error: type[Exception], message: str) -> None:
     with pytest.raises(error) as raised:
-        Scene(**({"system": sw.Pendulum(), "v": 0.0, "y": 1.0, "horizon": 10.0} | given))
-    assert said in str(raised.value)
+        Scene(**({"system": sw.Pendulum(), "v": 0.0, "y": 1.0, "horizon": 10.0} | arguments))
+    assert message in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("exact", "error", "said"),
+    ("exact", "error", "message"),
     [
         (
             lambda t: (np.cos(t), np.where(t < 3.0, t, np.nan)),
@@ -405,11 +407,11 @@ def test_what_is_no_scene(given: dict[str, Any], error: type[Exception], said: s
         ),
     ],
 )
-def test_what_is_no_exact_solution(exact: Any, error: type[Exception], said: str) -> None:
+def test_what_is_no_exact_solution(exact: Any, error: type[Exception], message: str) -> None:
     scene = Scene(sw.Pendulum(), v=0.0, y=1.0, horizon=10.0, exact=exact)
     with pytest.raises(error) as raised:
         sw.advise(scene, frame=None)
-    assert said in str(raised.value)
+    assert message in str(raised.value)
 
 
 @pytest.mark.usefixtures("unmeasured")

@@ -45,7 +45,7 @@ def printed(
     w_rad = math.pi / 180
     d_t1 = step / w_rad
     (wxo, wyo, wzo), (phi, the, psi) = map(float, v), map(float, y)
-    kept = [(wxo, wyo, wzo, phi, the, psi)]
+    rows = [(wxo, wyo, wzo, phi, the, psi)]
     for _ in range(steps):
         s_phi, c_phi = math.sin(w_rad * phi), math.cos(w_rad * phi)
         s_the, c_the = math.sin(w_rad * the), math.cos(w_rad * the)
@@ -73,8 +73,8 @@ def printed(
         phi += d_t1 * (wx + wy * s_phi * s_the * ic_the + wz * c_phi * s_the * ic_the)
         the += d_t1 * (wy * c_phi - wz * s_phi)
         psi += d_t1 * (wy * s_phi * ic_the + wz * c_phi * ic_the)
-        kept.append((wxo, wyo, wzo, phi, the, psi))
-    states = np.array(kept)
+        rows.append((wxo, wyo, wzo, phi, the, psi))
+    states = np.array(rows)
     return states[:, :3], states[:, 3:]
 
 
@@ -97,8 +97,8 @@ def like_printed(kind: Any, case: dict[str, Any]) -> bool:
     largest, and 1/57 of it in rad. In "the trap" both divide by the same 10⁻⁵. Under the controllers errors decay, by 0.89 a
     step: 10 steps' errors are left. ψ, and without controllers all, adds up.
     """
-    given = {name: case[name] for name in ("commands", "torques", "on") if name in case}
-    v, y = printed(case["steps"], case["v"], case["y"], **given)
+    options = {name: case[name] for name in ("commands", "torques", "on") if name in case}
+    v, y = printed(case["steps"], case["v"], case["y"], **options)
     command, torque = case.get("commands", (0.0, 0.0)), case.get("torques", (0.0, 0.0, 0.0))
     system = kind(command, torque, case.get("on", True))
     with warnings.catch_warnings():
@@ -153,10 +153,10 @@ def mutant(old: str, new: str) -> Any:
     with open(aircraft_equations.__file__, encoding="utf-8") as file:
         text = file.read()
     assert text.count(old) == 1, f"the mistake no longer fits: {old}"
-    made = types.ModuleType("mutant")
-    made.__package__ = aircraft_equations.__package__
-    exec(compile(text.replace(old, new), "mutant", "exec"), made.__dict__)
-    return made
+    module = types.ModuleType("mutant")
+    module.__package__ = aircraft_equations.__package__
+    exec(compile(text.replace(old, new), "mutant", "exec"), module.__dict__)
+    return module
 
 
 @pytest.mark.mutant
@@ -167,8 +167,8 @@ def test_a_mistake_in_the_rates_is_noticed(old: str, new: str) -> None:
     def kind(command: Any, torque: Any, on: bool) -> sw.System:
         gains = np.array([0.06, 0.10, 1.0]) * (1.0 if on else np.array([0.0, 0.0, 1.0]))
         names = dict(zip(("roll_torque", "pitch_torque", "yaw_torque"), torque, strict=True))
-        made: sw.System = wrong.euler(gains=gains, roll=command[0], pitch=command[1], **names)
-        return made
+        system: sw.System = wrong.euler(gains=gains, roll=command[0], pitch=command[1], **names)
+        return system
 
     assert not all(like_printed(kind, case) for case in PRINTED.values())
 
@@ -222,8 +222,8 @@ def test_the_controllers_are_oscillators_with_their_limits(axis: int, omega_damp
     assert exact == pytest.approx(limit, abs=5e-7)
     gains = np.array([0.06, 0.10, 1.0])
     gains[1 - axis] = 0.01  # the other controller, so weak that it ends later
-    found = sw.stability_limit(sw.Aircraft(gains=gains), "false_euler", at=(ZERO, ZERO))
-    assert float(found) == pytest.approx(exact, rel=1e-9)
+    computed = sw.stability_limit(sw.Aircraft(gains=gains), "false_euler", at=(ZERO, ZERO))
+    assert float(computed) == pytest.approx(exact, rel=1e-9)
     start = 1e-6 * np.eye(3)[axis]
     for step, stable in zip(sides, (True, False), strict=True):
         run = sw.integrate(sw.Aircraft(), "false_euler", v=0.0, y=start, dt=step, steps=400, every=1)
@@ -243,7 +243,7 @@ def test_the_controllers_are_oscillators_with_their_limits(axis: int, omega_damp
 def test_steady_turns(form: str, command: Any, turn: Any) -> None:
     """A commanded roll ends in a turn, which does not depend on the step: the rates of ω, φ and θ are zero."""
     system = sw.Aircraft(form, roll=command[0], pitch=command[1])
-    run = sw.integrate(system, "rk4", v=0.0, y=system.attitude(), dt=0.05, steps=1200, every=1, control=kept(form))
+    run = sw.integrate(system, "rk4", v=0.0, y=system.attitude(), dt=0.05, steps=1200, every=1, control=projection(form))
     roll, pitch, yaw = system.angles(run.y, axis=1).T
     assert (roll[-1], pitch[-1]) == (pytest.approx(turn[0], abs=5.1e-6), pytest.approx(turn[1], abs=5.1e-6))
     rate = (np.diff(yaw)[-1] + 180.0) % 360.0 - 180.0
@@ -262,7 +262,7 @@ def test_a_commanded_pitch_is_reached_with_the_overshoot_of_the_facts() -> None:
 # ---- without torques
 
 
-def kept(form: str) -> Any:
+def projection(form: str) -> Any:
     return sw.Projection("norm") if form == "quaternion" else None
 
 
@@ -273,12 +273,12 @@ def kept(form: str) -> Any:
 def test_false_euler_does_not_keep_the_energy_of_a_free_aircraft(form: str, v: Any, first: float, last: float) -> None:
     """ω by Standard Euler gains energy, more about the middle axis, where the rotation tumbles, whatever the attitude."""
     system = sw.Aircraft(form, **FREE)
-    given = {"v": np.array(v), "y": system.attitude(), "dt": 0.1, "steps": 1000, "every": 1, "record": "energy"}
-    run = sw.integrate(system, "false_euler", **given)
+    arguments = {"v": np.array(v), "y": system.attitude(), "dt": 0.1, "steps": 1000, "every": 1, "record": "energy"}
+    run = sw.integrate(system, "false_euler", **arguments)
     assert run.energy[0] == pytest.approx(0.5 * np.dot([0.6, 1.0, 1.5], np.square(v)), rel=4 * U)
     assert (run.energy[0], run.energy[-1]) == (pytest.approx(first, abs=5e-5), pytest.approx(last, abs=5e-5))
     np.testing.assert_array_equal(run.recorded["energy"], run.energy)
-    onto = sw.integrate(system, "false_euler", **given, control=sw.Projection("energy"))
+    onto = sw.integrate(system, "false_euler", **arguments, control=sw.Projection("energy"))
     assert np.ptp(onto.energy) < 1e-3 * np.ptp(run.energy)
 
 
@@ -296,19 +296,24 @@ def test_a_free_aircraft_keeps_its_angular_momentum_in_space() -> None:
 
 def test_whether_torques_act() -> None:
     assert not sw.Aircraft(**FREE).torques_act
-    for given in ({}, FREE | {"controllers": True, "gains": [0.1, 0.0, 0.0]}, FREE | {"yaw_torque": 0.1}, {"controllers": False}):
-        assert sw.Aircraft(**given).torques_act
+    for options in (
+        {},
+        FREE | {"controllers": True, "gains": [0.1, 0.0, 0.0]},
+        FREE | {"yaw_torque": 0.1},
+        {"controllers": False},
+    ):
+        assert sw.Aircraft(**options).torques_act
     assert not sw.Aircraft(**FREE | {"gains": [0.1, 0.1, 0.0]}).torques_act
 
 
 # ---- the quaternion
 
 
-def turned(form: str, method: str, dt: float, **given: Any) -> Any:
+def turned(form: str, method: str, dt: float, **options: Any) -> Any:
     """The rotation at the end of some motion away from the trap."""
     system = sw.Aircraft(form, roll=sw.Sinusoid(40.0, 0.9), pitch=20.0, yaw_torque=0.1)
     start = {"v": np.array([0.1, -0.2, 0.3]), "y": system.attitude(20.0, -10.0, 130.0)}
-    run = sw.integrate(system, method, **start, dt=dt, steps=round(5.0 / dt), **given)
+    run = sw.integrate(system, method, **start, dt=dt, steps=round(5.0 / dt), **options)
     return system.rotation(run.y[-1])
 
 
@@ -371,24 +376,24 @@ def test_the_length_of_the_quaternion_by_each_method() -> None:
 def test_a_control_keeps_the_length_near_one_and_a_projection_at_one() -> None:
     """Standard Euler: |q|² − 1 settles near h|ω|²/(8k), to the next order in hk."""
     system, v = sw.Aircraft("quaternion", **FREE), np.array([0.0, 3.0, 0.0])
-    given: dict[str, Any] = {"v": v, "y": 0.9 * system.attitude(roll=20.0), "dt": 0.01, "steps": 2000, "record": "norm"}
-    made = sw.integrate(system, "standard_euler", **given, control=sw.NormControl([2.0, 4.0]))
+    arguments: dict[str, Any] = {"v": v, "y": 0.9 * system.attitude(roll=20.0), "dt": 0.01, "steps": 2000, "record": "norm"}
+    settled = sw.integrate(system, "standard_euler", **arguments, control=sw.NormControl([2.0, 4.0]))
     expected = 0.01 * 9.0 / (8.0 * np.array([2.0, 4.0]))
-    np.testing.assert_allclose(made.recorded["norm"][0] ** 2 - 1.0, expected, rtol=0.01 + 0.01 * 4.0)
-    assert made.system.keeper == sw.NormControl([2.0, 4.0])
-    assert "NormControl" in repr(made.system)
+    np.testing.assert_allclose(settled.recorded["norm"][0] ** 2 - 1.0, expected, rtol=0.01 + 0.01 * 4.0)
+    assert settled.system.keeper == sw.NormControl([2.0, 4.0])
+    assert "NormControl" in repr(settled.system)
     # A projection is q/|q| with some twenty roundings.
-    onto = sw.integrate(system, "standard_euler", **given, control=sw.Projection("norm"))
+    onto = sw.integrate(system, "standard_euler", **arguments, control=sw.Projection("norm"))
     assert abs(onto.recorded["norm"][0] - 1.0) <= 20 * U
-    once = sw.integrate(system, "standard_euler", **given | {"steps": 1}, control=sw.Projection("norm"))
-    free = sw.integrate(system, "standard_euler", **given | {"steps": 1})
+    once = sw.integrate(system, "standard_euler", **arguments | {"steps": 1}, control=sw.Projection("norm"))
+    free = sw.integrate(system, "standard_euler", **arguments | {"steps": 1})
     np.testing.assert_allclose(once.y[-1], free.y[-1] / free.recorded["norm"][0], rtol=0, atol=20 * U)
     # The control turns about the same axis as the free quaternion, only shorter.
     with pytest.raises(UnsupportedError, match=r"NormControl\(2.0\) keeps a norm, and Aircraft\(form='euler'\) has no such"):
         sw.integrate(sw.Aircraft(), "rk4", v=0.0, y=0.0, dt=0.1, steps=1, control=sw.NormControl(2.0))
     with pytest.raises(UnknownNameError, match="control: there is no 'norm'"):
         sw.integrate(sw.Aircraft(), "rk4", v=0.0, y=0.0, dt=0.1, steps=1, control=sw.Projection("norm"))
-    run = sw.integrate(made.system, "merson", v=v, y=system.attitude(), tolerance=1e-6, at=[1.0])
+    run = sw.integrate(settled.system, "merson", v=v, y=system.attitude(), tolerance=1e-6, at=[1.0])
     np.testing.assert_allclose(np.linalg.norm(run.y[-1], axis=0), 1.0, rtol=0, atol=1e-5)
 
 
@@ -430,10 +435,10 @@ def test_core_and_reference_are_one_graph_under_control(control: Any, method: st
     system = sw.Aircraft("quaternion", roll=np.array([10.0, 30.0]))
     start: dict[str, Any] = {"v": np.array([0.1, 0.2, 0.3]), "y": 1.1 * system.attitude(), "dt": 0.05}
     batch = {name: np.repeat(start[name][:, np.newaxis], 2, axis=1) for name in ("v", "y")}
-    held = system.controlled(control, batch["v"], batch["y"], 0.05)
-    plan = engine.Plan(held, sw.method(method), held.batch, 0.05)
+    controlled = system.controlled(control, batch["v"], batch["y"], 0.05)
+    plan = engine.Plan(controlled, sw.method(method), controlled.batch, 0.05)
     tape = _core.Tape()
-    assert_one_graph(tape, tape.trace(engine.model(plan), "step"), Tracer(held, tape).step(sw.method(method)))
+    assert_one_graph(tape, tape.trace(engine.model(plan), "step"), Tracer(controlled, tape).step(sw.method(method)))
     whole = sw.integrate(system, method, **start, steps=20, control=control)
     assert_same(whole, sw.integrate(system, method, **start, steps=20, control=control, backend="numpy"))
     half = sw.integrate(system, method, **start, steps=10, control=control)
@@ -451,7 +456,7 @@ def test_derivatives_are_those_of_the_rates(form: str) -> None:
     """Central differences: e²/6 of the third derivative and a rounding of u/e, each 1e-10 for e = 1e-5, times some hundred."""
     system, v, e = sw.Aircraft(form, roll=10.0), np.array([0.1, -0.2, 0.3]), 1e-5
     y, rates = system.attitude(200.0 if form == "euler" else 20.0, 30.0, 40.0), system.scaled(1.0, ())
-    found = sw.jacobian(system, v=v, y=y).matrix
+    matrix = sw.jacobian(system, v=v, y=y).matrix
     state = np.concatenate([v, y])
     for column in range(len(state)):
         sides = []
@@ -459,7 +464,7 @@ def test_derivatives_are_those_of_the_rates(form: str) -> None:
             moved = state.copy()
             moved[column] += side
             sides.append(np.concatenate([np.ravel(each(0.0, moved[:3], moved[3:])) for each in (rates.dv, rates.dy)]))
-        np.testing.assert_allclose(found[:, column], (sides[0] - sides[1]) / (2 * e), rtol=0, atol=1e-7)
+        np.testing.assert_allclose(matrix[:, column], (sides[0] - sides[1]) / (2 * e), rtol=0, atol=1e-7)
 
 
 # ---- the trap
@@ -491,8 +496,8 @@ def test_the_loop_past_the_vertical_is_lost_in_euler_angles_and_not_as_a_quatern
         scene = sw.scenes.gimbal_trap(form)
         run = scene.run("false_euler", every=1)
         true = sw.integrate(scene.system, "dop853", v=scene.v, y=scene.y, tolerance=1e-12, at=run.t[1:])
-        made, exact = (scene.system.rotation(y, axis=1) for y in (run.y[1:], true.y))
-        errors[form] = turned_apart(made, exact)
+        rotations, exact = (scene.system.rotation(y, axis=1) for y in (run.y[1:], true.y))
+        errors[form] = turned_apart(rotations, exact)
         lowest = np.abs(np.cos(np.radians(scene.system.angles(true.y, axis=1)[:, 1]))).min()
         assert 0.001 < lowest < 0.05  # near the vertical, but not in the trap
     # The first order of the method leaves the quaternion some degrees; in Euler angles the steps past the vertical add tens.
@@ -595,8 +600,8 @@ def test_a_repr_tells_what_is_not_the_documents() -> None:
 def test_what_is_not_given_is_no_operation() -> None:
     """A torque that is not given, and the controllers that are off, leave nothing on the tape."""
 
-    def operations(**given: Any) -> int:
-        return sum(sw.explain(sw.Aircraft(**given), "false_euler").computed.values())
+    def operations(**options: Any) -> int:
+        return sum(sw.explain(sw.Aircraft(**options), "false_euler").computed.values())
 
     full = operations(roll=10.0)
     assert operations(roll=10.0, yaw_torque=0.0) == full + 1

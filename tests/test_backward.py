@@ -57,10 +57,10 @@ def test_the_forms_agree(case: Case) -> None:
     A step is a sum of some tens of products of numbers of order 1, in another order; 23 steps of damping or of a filter that
     run back multiply that by up to e^(0.1·23·20).
     """
-    made, direct = quietly(case), quietly(Case(case.method, case.system, "direct", case.start))
+    run, direct = quietly(case), quietly(Case(case.method, case.system, "direct", case.start))
     size = max(1.0, float(np.abs(direct.y).max(initial=0.0)), float(np.abs(direct.v).max(initial=0.0)))
-    np.testing.assert_allclose(made.y, direct.y, rtol=0.0, atol=1e-11 * size)
-    np.testing.assert_allclose(made.v, direct.v, rtol=0.0, atol=1e-11 * size)
+    np.testing.assert_allclose(run.y, direct.y, rtol=0.0, atol=1e-11 * size)
+    np.testing.assert_allclose(run.v, direct.v, rtol=0.0, atol=1e-11 * size)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -72,10 +72,10 @@ def test_blocks_come_first_and_batches_last(backend: str) -> None:
     assert chain.energy.shape == (3, 2, 6)
 
 
-@pytest.mark.parametrize(("steps", "every", "kept"), [(10, 3, [0, 3, 6, 9, 10]), (9, 3, [0, 3, 6, 9]), (5, 100, [0, 5])])
-def test_every_keeps_the_first_and_the_last(steps: int, every: int, kept: list[int]) -> None:
+@pytest.mark.parametrize(("steps", "every", "saved"), [(10, 3, [0, 3, 6, 9, 10]), (9, 3, [0, 3, 6, 9]), (5, 100, [0, 5])])
+def test_every_keeps_the_first_and_the_last(steps: int, every: int, saved: list[int]) -> None:
     run = sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.5, steps=steps, every=every, start_step=100, t0=7.0)
-    np.testing.assert_array_equal(run.t, 7.0 + (100 + np.array(kept, dtype=float)) * 0.5)
+    np.testing.assert_array_equal(run.t, 7.0 + (100 + np.array(saved, dtype=float)) * 0.5)
 
 
 def test_energy_of_each_system() -> None:

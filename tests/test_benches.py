@@ -132,27 +132,27 @@ def test_own_equations_are_the_same_for_stepwell_as_for_all_others(equation: Equ
     for k, s in enumerate(state.T):
         parameters = fixed | {name: row[k] for name, row in zip(equation.own, own, strict=True)}
         expected[:, k] = ours(t, s, **parameters) if equation.system.order == 1 else (ours(t, *s, **parameters), s[0])
-    found = np.array(equation.function(np)(t, state, own))
+    rates = np.array(equation.function(np)(t, state, own))
     # Up to 25 roundings of 1.1e-16 of terms up to 120·50 (the neuron's currents), otherwise of the size of the sums.
     largest = 6000.0 if equation.name == "hodgkin_huxley" else 100.0
-    assert abs(found - expected).max() <= 25 * 1.2e-16 * largest
+    assert abs(rates - expected).max() <= 25 * 1.2e-16 * largest
     assert all(equation.system.parameters[name] == value for name, value in equation.shared.items())
 
 
 def test_a_tolerance_is_the_coarsest_that_is_exact_enough() -> None:
     work = next(work for work in WORKS if work.kind == "own_lorenz")
-    asked = []
+    tolerances = []
 
     def off_by_the_tolerance(part: workloads.Workload, wanted: float) -> Any:
-        asked.append(wanted)
+        tolerances.append(wanted)
         v, y = (block.copy() for block in part.exact())
         y[0] += wanted
         return v, y
 
-    found = tolerance.as_exact(work, off_by_the_tolerance)
-    assert found <= min(work.expected, work.cut(members=tolerance.TRIAL).expected)
-    assert found == next(each for each in tolerance.TOLERANCES if each <= work.cut(members=tolerance.TRIAL).expected)
-    assert asked == sorted(asked, reverse=True)
+    coarsest = tolerance.as_exact(work, off_by_the_tolerance)
+    assert coarsest <= min(work.expected, work.cut(members=tolerance.TRIAL).expected)
+    assert coarsest == next(each for each in tolerance.TOLERANCES if each <= work.cut(members=tolerance.TRIAL).expected)
+    assert tolerances == sorted(tolerances, reverse=True)
     with pytest.raises(peers.WrongResultError):
         tolerance.as_exact(work, lambda part, wanted: off_by_the_tolerance(part, 1.0))
 
@@ -185,7 +185,7 @@ def cells(line: str) -> list[str]:
 @pytest.mark.parametrize("only", [("W2", "chosen"), pytest.param(("",), marks=pytest.mark.long)], ids=["some", "all"])
 def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) -> None:
     out = tmp_path / "report.md"
-    asked = [work for work in workloads.catalogue() if work.name.startswith(only)]
+    works = [work for work in workloads.catalogue() if work.name.startswith(only)]
     command: list[Any] = [sys.executable, "-m", "benches.compare", "--quick", "--only", ",".join(only), "-o", out]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -193,8 +193,8 @@ def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) ->
     lines = [cells(line) for line in report.splitlines() if line.startswith("|")]
     first_chosen = next(i for i, line in enumerate(lines) if line[1] == "1e-03")
     tables = [i for i, line in enumerate(lines[:first_chosen]) if line[0] == "contestant"]
-    assert len(tables) == len(asked) > 0
-    units = {work.unit.name for work in asked}
+    assert len(tables) == len(works) > 0
+    units = {work.unit.name for work in works}
     head: list[str] = []
     for row in lines[first_chosen : next(i for i, line in enumerate(lines) if line[0] == "what")]:
         head = row if row[0] == "contestant" else head
@@ -214,7 +214,7 @@ def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) ->
             assert float(row[1]) > 0
             assert re.fullmatch(r"\d\.\de-\d\d", row[3]), row
     rows = {row[0] for row in lines}
-    assert {c.name for c in peers.catalogue() if any(work.kind in c.kernels for work in asked)} <= rows
+    assert {c.name for c in peers.catalogue() if any(work.kind in c.kernels for work in works)} <= rows
     assert {"wheel", "`import stepwell` after NumPy"} <= rows
     assert sw.isa() in report
 
@@ -222,21 +222,21 @@ def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) ->
 def test_works_that_are_done_again_replace_their_own_part_of_a_report() -> None:
     before = "# Title\n\n- date: 1999-01-01\n\n## How to read\n\nText.\n\n## W1: old\n\n| 1 |\n\n## W2: kept\n\n| 2 |\n"
     now = "# Title\n\n- date: 2000-01-01\n\n## How to read\n\nText.\n\n## W1: old\n\n| 3 |\n\n## W3: new\n\n| 4 |\n"
-    told = report.renewed(before, now, "W1,W3")
-    assert told == (
+    text = report.renewed(before, now, "W1,W3")
+    assert text == (
         "# Title\n\n- date: 1999-01-01\n- done again in a run of their own, 2000-01-01: W1,W3\n\n## How to read\n\nText.\n\n"
         "## W1: old\n\n| 3 |\n\n## W2: kept\n\n| 2 |\n\n## W3: new\n\n| 4 |\n"
     )
-    assert report.renewed(told, now, "W1,W3") == told
+    assert report.renewed(text, now, "W1,W3") == text
 
 
 def test_who_does_not_end_is_ended_and_told() -> None:
     """A hundred million years take hours; a process of its own has some seconds, most of which its imports may need."""
     begin = time.perf_counter()
-    found = solar.measured("stepwell taylor", (10.0, 1e8), 10.0)
+    measured = solar.measured("stepwell taylor", (10.0, 1e8), 10.0)
     assert time.perf_counter() - begin < 20.0
-    assert found is not None
-    assert len(found) <= 1
+    assert measured is not None
+    assert len(measured) <= 1
     _, head, lines = solar.table((1.0, 1e8), 5.0)
     row = next(line for line in lines if line[0] == "stepwell taylor")
     assert row[-2:] == ["—", "not in 5 s"]

@@ -149,10 +149,10 @@ def test_nothing_in_the_core_breaks_the_promise() -> None:
         lines = [line.split("//")[0] for line in code.splitlines()]
         # What a fused multiply-add is, is said in one place; only a tape that was fused has some.
         wrong = [word for word in forbidden if (word, path.name) != ("mul_add", "eval.rs")]
-        found = [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) for word in wrong if word in line]
+        breaches = [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) for word in wrong if word in line]
         if path.name not in ("isa.rs", "pages.rs"):
-            found += [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) if "unsafe" in line]
-        assert not found
+            breaches += [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) if "unsafe" in line]
+        assert not breaches
 
 
 def test_the_reference_sums_in_a_written_order() -> None:

@@ -131,19 +131,19 @@ def test_no_public_class_is_left_out() -> None:
 
 @pytest.mark.parametrize(("make", "arguments"), CASES)
 def test_nothing_of_it_changes(make: Any, arguments: Callable[[], dict[str, Any]]) -> None:
-    given = arguments()
-    one = make(**given)
-    assert not any(np.may_share_memory(a, b) for a in arrays(one) for b in of_caller(given))
-    before, said = [each.copy() for each in arrays(one)], repr(one)
-    write(given)
-    assert repr(one) == said
+    options = arguments()
+    one = make(**options)
+    assert not any(np.may_share_memory(a, b) for a in arrays(one) for b in of_caller(options))
+    before, text = [each.copy() for each in arrays(one)], repr(one)
+    write(options)
+    assert repr(one) == text
     for was, each in zip(before, arrays(one), strict=True):
         np.testing.assert_array_equal(was, each)
         assert not each.flags.writeable
 
 
-@pytest.mark.parametrize("how", ["an array", "a view", "a read-only view", "a broadcast", "a memory view", "another order"])
-def test_however_the_array_is_given(how: str) -> None:
+@pytest.mark.parametrize("kind", ["an array", "a view", "a read-only view", "a broadcast", "a memory view", "another order"])
+def test_however_the_array_is_given(kind: str) -> None:
     mine = np.ones((3, 4))
     seen = mine.view()
     seen.flags.writeable = False
@@ -155,8 +155,8 @@ def test_however_the_array_is_given(how: str) -> None:
         "a memory view": (memoryview(mine), mine),
         "another order": (mine.T, mine),
     }
-    given, owner = views[how]
-    system = sw.Oscillator(given)
+    array, owner = views[kind]
+    system = sw.Oscillator(array)
     shape = system.omega.shape
     owner[...] = np.nan
     np.testing.assert_array_equal(system.omega, np.ones(shape))

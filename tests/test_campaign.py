@@ -38,9 +38,9 @@ def alone(expression: str) -> str:
     """
     words = [sys.executable, "-c", f"from campaign import memory, processes; print({expression})"]
     paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
-    made = subprocess.run(words, env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, timeout=300)
-    assert made.returncode == 0, made.stderr
-    return made.stdout.strip()
+    process = subprocess.run(words, env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, timeout=300)
+    assert process.returncode == 0, process.stderr
+    return process.stdout.strip()
 
 
 @pytest.fixture
@@ -62,8 +62,8 @@ def _quiet() -> Iterator[None]:
 def test_fuzzed_calls_work_or_say_what_is_wrong(example: fuzz.Example, data: Any) -> None:
     with oracle.Timer() as watch:
         for call in data.draw(st.just(fuzz.variations(example)[:25])):
-            outcome = fuzz.made(watch, call)
-            assert outcome.kind != "failed", f"{json.dumps(call)}\n{fuzz.told(call)}: {outcome.text}"
+            outcome = fuzz.make(watch, call)
+            assert outcome.kind != "failed", f"{json.dumps(call)}\n{fuzz.in_words(call)}: {outcome.text}"
 
 
 @timer
@@ -72,7 +72,7 @@ def test_fuzzed_calls_work_or_say_what_is_wrong(example: fuzz.Example, data: Any
 def test_what_was_found_stays_mended(case: dict[str, Any]) -> None:
     """Each of these calls once ended otherwise."""
     outcome = fuzz.once(case["call"])
-    assert outcome.kind in case["kinds"], f"{fuzz.told(case['call'])}: {outcome}"
+    assert outcome.kind in case["kinds"], f"{fuzz.in_words(case['call'])}: {outcome}"
 
 
 @pytest.mark.mutant
@@ -204,9 +204,9 @@ def test_a_full_disk_leaves_what_was_there(way: str, tmp_path: Path) -> None:
     before = disks.contents(tmp_path)
     largest = max(map(len, before.values()))
     for limit in (0, 100, largest // 2):
-        said = disks.aside(way, tmp_path, limit)
-        assert said, f"{limit} bytes"
-        assert disks.contents(tmp_path) == before, f"{limit} bytes: {said}"
+        message = disks.aside(way, tmp_path, limit)
+        assert message, f"{limit} bytes"
+        assert disks.contents(tmp_path) == before, f"{limit} bytes: {message}"
     assert disks.aside(way, tmp_path, 10**9) == ""
 
 
@@ -222,9 +222,9 @@ def test_a_sweep_goes_on_when_there_is_room_again(way: str, tmp_path: Path) -> N
         assert disks.aside(way, tmp_path, limit), f"{limit} bytes"
     assert disks.aside(way, tmp_path, 10**9) == ""
     of = {"engine": "zarr", "consolidated": False} if name.endswith("zarr") else {"engine": "h5netcdf"}
-    with xarray.open_dataset(tmp_path / f"whole-{name}", **of) as whole, xarray.open_dataset(tmp_path / name, **of) as made:
-        assert made.attrs["bits"] == whole.attrs["bits"]
-        xarray.testing.assert_identical(made[["v", "y"]].load(), whole[["v", "y"]].load())
+    with xarray.open_dataset(tmp_path / f"whole-{name}", **of) as whole, xarray.open_dataset(tmp_path / name, **of) as resumed:
+        assert resumed.attrs["bits"] == whole.attrs["bits"]
+        xarray.testing.assert_identical(resumed[["v", "y"]].load(), whole[["v", "y"]].load())
 
 
 def test_a_file_that_would_not_fit_on_its_disk_is_not_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -99,8 +99,8 @@ def test_the_true_motion_between_its_nodes_is_that_of_a_run():
     scene, floor = known.chartable(sw.scenes.energy_control())
     times = np.linspace(0.0, scene.horizon, 7)[1:] - 0.0123
     run = sw.integrate(scene.system, "dop853", v=scene.v, y=scene.y, tolerance=1e-14, at=times)
-    for found, wanted in zip(scene.exact(times), (run.v, run.y), strict=True):
-        assert np.abs(found - wanted).max() < 0.1 * floor * np.abs(wanted).max()
+    for exact, wanted in zip(scene.exact(times), (run.v, run.y), strict=True):
+        assert np.abs(exact - wanted).max() < 0.1 * floor * np.abs(wanted).max()
 
 
 def test_no_ladder_is_so_long_that_it_takes_minutes(monkeypatch):
@@ -268,9 +268,9 @@ def test_everything_but_the_time_is_repeatable(small):
 
 
 def test_progress_is_told():
-    told = []
-    sw.charts.work_precision("oscillator", ["rk4", "verlet"], [100], progress=told.append)
-    assert told == [0.5, 1.0]
+    shares = []
+    sw.charts.work_precision("oscillator", ["rk4", "verlet"], [100], progress=shares.append)
+    assert shares == [0.5, 1.0]
 
 
 # ---- errors of the end, of the phase

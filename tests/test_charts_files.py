@@ -174,14 +174,14 @@ def test_the_csv_reads_back_as_the_same_numbers(charts, tmp_path):
         found_rows = read(tmp_path / f"{name}.csv")
         rows = chart.rows()
         assert len(found_rows) == len(rows) == sum(len(c.points) for c in chart.curves) + len(chart.refused)
-        for found, wanted in zip(found_rows, rows, strict=True):
-            assert list(found) == list(wanted)
+        for row, wanted in zip(found_rows, rows, strict=True):
+            assert list(row) == list(wanted)
             for key, value in wanted.items():
-                if value is None or found[key] == "":
-                    assert found[key] == ("" if value is None else value)
+                if value is None or row[key] == "":
+                    assert row[key] == ("" if value is None else value)
                     continue
                 kind = bool if isinstance(value, bool) else type(value)
-                assert {"True": True, "False": False}[found[key]] is value if kind is bool else kind(found[key]) == value
+                assert {"True": True, "False": False}[row[key]] is value if kind is bool else kind(row[key]) == value
 
 
 def test_the_measured_columns_are_those_of_the_counted_step(small):
@@ -251,8 +251,8 @@ def test_every_point_is_in_the_picture(charts):
     chart = charts["oscillator"]
     figure = chart.plot()
     curves, marks = figure.axes[0], figure.axes[2]
-    said = " ".join(text.get_text() for text in (*curves.texts, *figure.texts)).replace("\n", ", ")
-    assert all(curve.title in said for curve in chart.curves)  # beside its curve, or among those for which there is no room
+    words = " ".join(text.get_text() for text in (*curves.texts, *figure.texts)).replace("\n", ", ")
+    assert all(curve.title in words for curve in chart.curves)  # beside its curve, or among those for which there is no room
     assert marks.get_position().height == pytest.approx(0.1 * (marks.get_position().height + curves.get_position().height))
     for row, curve in enumerate(chart.curves):
         line = curves.lines[row]

@@ -299,7 +299,7 @@ def test_explain_takes_a_scene_with_its_control(capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["oscilator", "rk4"], "system: there is no 'oscilator'; expected a scene, aircraft, arenstorf, "),
         (["Chain", "rk4"], "system: Chain needs arguments"),
@@ -309,10 +309,10 @@ def test_explain_takes_a_scene_with_its_control(capsys):
         (["oscillator", "rk4", "-o", "a.pdf"], "-o: expected a file ending in .json, .html or .txt"),
     ],
 )
-def test_explain_says_what_is_wrong(capsys, words, said):
+def test_explain_says_what_is_wrong(capsys, words, message):
     code, out, err = run_command(capsys, "explain", *words)
     assert (code, out) == (2, "")
-    assert said in err
+    assert message in err
 
 
 # ---- export
@@ -341,7 +341,7 @@ def test_export_takes_a_scene_with_its_start_and_its_control(capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["Chain"], "system: Chain needs arguments"),
         (["Pendulum", "--language", "fortran"], "language: there is no 'fortran'"),
@@ -351,10 +351,10 @@ def test_export_takes_a_scene_with_its_start_and_its_control(capsys):
         (["Pendulum", "--dt", "-1"], "dt: expected numbers above zero in units of time, got -1"),
     ],
 )
-def test_export_says_what_is_wrong(capsys, words, said):
+def test_export_says_what_is_wrong(capsys, words, message):
     code, out, err = run_command(capsys, "export", "--method", "rk4", "--language", "c", *words)
     assert (code, out) == (2, "")
-    assert said in err
+    assert message in err
 
 
 # ---- stability

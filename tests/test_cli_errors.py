@@ -119,7 +119,7 @@ def test_a_reader_who_leaves_early_is_no_error():
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("run", "clover"), "stepwell run: still needed: --method\n"),
         (("run", "clover", "--method", "rk4", "--dt", "abc"), "stepwell run: --dt: expected a number, got 'abc'\n"),
@@ -128,11 +128,11 @@ def test_a_reader_who_leaves_early_is_no_error():
         (("run", "clover", "--method", "rk4", "--steps", "1e-3"), "stepwell run: --steps: expected a whole number, got '1e-3'\n"),
     ],
 )
-def test_words_that_are_not_understood_say_what_was_expected(words, said, capsys):
+def test_words_that_are_not_understood_say_what_was_expected(words, message, capsys):
     with pytest.raises(SystemExit) as end:
         cli.main(words)
     assert end.value.code == 2
-    assert capsys.readouterr().err == f"{said}stepwell run --help says what it takes.\n"
+    assert capsys.readouterr().err == f"{message}stepwell run --help says what it takes.\n"
 
 
 def test_a_command_that_is_not_there_is_told_with_the_nearest(capsys):

@@ -13,30 +13,30 @@ from stepwell.views.cli.settings import scene_with
 from stepwell.views.cli.verdict import growth_of, tenfold, verdict
 
 
-def told(capsys: Any, *words: str) -> tuple[int, str, str]:
+def run_command(capsys: Any, *words: str) -> tuple[int, str, str]:
     code = cli.main(["run", *words])
     return code, *capsys.readouterr()
 
 
 def report(capsys: Any, *words: str) -> dict[str, Any]:
-    code, out, err = told(capsys, *words, "--json")
+    code, out, err = run_command(capsys, *words, "--json")
     assert (code, err) == (0, "")
-    found: dict[str, Any] = json.loads(out)
-    return found
+    printed: dict[str, Any] = json.loads(out)
+    return printed
 
 
 def test_a_tolerance_makes_the_run_of_integrate(capsys: Any) -> None:
     scene = sw.scenes.kepler()
     at = np.linspace(0.0, scene.horizon, 101)
     run = sw.integrate(scene.system, "merson", v=scene.v, y=scene.y, tolerance=1e-6, at=at)
-    found = report(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6")
+    printed = report(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6")
     assert run.paces is not None
-    assert found["last_y"] == run.y[-1].tolist()
-    assert (found["steps"], found["rejected_steps"]) == (run.paces.accepted, run.paces.rejected)
-    assert found["function_evaluations"] == run.paces.evaluations
-    assert found["largest_state_error"] == scene.state_error(run).max()
+    assert printed["last_y"] == run.y[-1].tolist()
+    assert (printed["steps"], printed["rejected_steps"]) == (run.paces.accepted, run.paces.rejected)
+    assert printed["function_evaluations"] == run.paces.evaluations
+    assert printed["largest_state_error"] == scene.state_error(run).max()
     for option in ("--steps", "--every"):
-        code, _, err = told(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6", option, "5")
+        code, _, err = run_command(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6", option, "5")
         assert code == 2
         assert err.startswith(f"stepwell: {option}: goes with fixed steps only")
 
@@ -44,28 +44,28 @@ def test_a_tolerance_makes_the_run_of_integrate(capsys: Any) -> None:
 def test_form_and_start_are_those_of_integrate(capsys: Any) -> None:
     scene = sw.scenes.oscillator()
     for form in ("matrix", "power"):
-        found = report(capsys, "oscillator", "--method", "rk4", "--form", form, "--steps", "50")
-        assert found["last_y"] == scene.run("rk4", steps=50, every=1, form=form).y[-1]
-    found = report(capsys, "oscillator", "--method", "verlet", "--start", "first_order", "--steps", "50")
-    assert found["last_y"] == scene.run("verlet", steps=50, start="first_order").y[-1]
-    assert found["last_y"] != scene.run("verlet", steps=50).y[-1]
+        printed = report(capsys, "oscillator", "--method", "rk4", "--form", form, "--steps", "50")
+        assert printed["last_y"] == scene.run("rk4", steps=50, every=1, form=form).y[-1]
+    printed = report(capsys, "oscillator", "--method", "verlet", "--start", "first_order", "--steps", "50")
+    assert printed["last_y"] == scene.run("verlet", steps=50, start="first_order").y[-1]
+    assert printed["last_y"] != scene.run("verlet", steps=50).y[-1]
 
 
 def test_set_changes_the_scene_and_its_exact_solution(capsys: Any) -> None:
-    found = report(capsys, "oscillator", "--method", "rk4", "--set", "omega=3")
+    printed = report(capsys, "oscillator", "--method", "rk4", "--set", "omega=3")
     scene = sw.scenes.oscillator(3.0)
     run = scene.run("rk4", every=1)
-    assert found["last_y"] == run.y[-1]
-    assert found["largest_state_error"] == scene.state_error(run).max()
+    assert printed["last_y"] == run.y[-1]
+    assert printed["largest_state_error"] == scene.state_error(run).max()
     assert scene_with("kepler:e=0.5", []).v.tolist() == scene_with("kepler", ["e=0.5"]).v.tolist()
 
 
 def test_set_changes_the_system_and_the_start(capsys: Any) -> None:
-    found = report(capsys, "oscillator", "--method", "rk4", "--set", "damping=0.1", "--set", "y=2", "--steps", "40")
+    printed = report(capsys, "oscillator", "--method", "rk4", "--set", "damping=0.1", "--set", "y=2", "--steps", "40")
     scene = sw.scenes.oscillator()
     run = sw.integrate(sw.Oscillator(1.0, 0.1), "rk4", v=0.0, y=2.0, dt=scene.dt, steps=40)
-    assert found["last_y"] == run.y[-1]
-    assert "largest_state_error" not in found, "the exact solution is that of another system"
+    assert printed["last_y"] == run.y[-1]
+    assert "largest_state_error" not in printed, "the exact solution is that of another system"
     moved = scene_with("kepler", ["y=1,0,-1,0"])
     assert moved.y.tolist() == [[1.0, 0.0], [-1.0, 0.0]]
     assert moved.exact is None
@@ -85,14 +85,14 @@ def test_set_changes_the_system_and_the_start(capsys: Any) -> None:
     ],
 )
 def test_a_wrong_setting_is_one_line(setting: str, message: str, capsys: Any) -> None:
-    code, out, err = told(capsys, "oscillator", "--method", "rk4", "--set", setting)
+    code, out, err = run_command(capsys, "oscillator", "--method", "rk4", "--set", setting)
     assert (code, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "verdict"),
     [
         (("oscillator", "--method", "false_euler", "--dt", "3", "--steps", "24"), "grew by 10²⁰: unstable"),
         (("oscillator", "--method", "standard_euler"), "grew by 10⁴: unstable"),
@@ -103,12 +103,12 @@ def test_a_wrong_setting_is_one_line(setting: str, message: str, capsys: Any) ->
     ],
 )
 @pytest.mark.filterwarnings("ignore")
-def test_the_verdict_is_in_words(words: tuple[str, ...], said: str, capsys: Any) -> None:
-    code, out, _ = told(capsys, *words)
+def test_the_verdict_is_in_words(words: tuple[str, ...], verdict: str, capsys: Any) -> None:
+    code, out, _ = run_command(capsys, *words)
     assert code == 0
     verdicts = [line.partition("verdict")[2].strip() for line in out.splitlines() if line.startswith("verdict")]
     assert len(verdicts) == 1
-    assert verdicts[0].startswith(said)
+    assert verdicts[0].startswith(verdict)
     assert "None" not in out
 
 
@@ -136,6 +136,6 @@ def test_a_tolerance_that_stops_says_so() -> None:
 
 
 def test_blocks_of_many_numbers_do_not_fill_the_screen(capsys: Any) -> None:
-    _, out, _ = told(capsys, "plummer", "--method", "leapfrog", "--steps", "3")
+    _, out, _ = run_command(capsys, "plummer", "--method", "leapfrog", "--steps", "3")
     assert max(map(len, out.splitlines())) < 120
     assert "last y                64 × 3 numbers; -o FILE writes them" in out

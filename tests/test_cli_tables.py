@@ -33,14 +33,14 @@ def words_of(lines: list[str]) -> list[str]:
 @pytest.mark.parametrize("width", [20, 40, 60, 79, 80, 81, 100, 120, UNLIMITED])
 def test_every_word_is_whole_at_every_width(width: int) -> None:
     lines = lines_of("A title of some words", COLUMNS, ROWS, ["written: /a/very/long/path/of/a/file-1.png"], width=width)
-    found = words_of(lines)
+    words = words_of(lines)
     for row in ROWS:
         for i, cell in enumerate(row):
-            assert set(cell.split()) <= set(found)
+            assert set(cell.split()) <= set(words)
             if i in (0, 1, 2) and cell:  # names and numbers stay on one line, units with them
                 assert any(cell in line for line in lines)
     assert "…" not in "".join(lines)
-    longest = max(length(word) for word in found if "─" not in word)
+    longest = max(length(word) for word in words if "─" not in word)
     assert max(map(length, lines)) <= max(width, longest + len("semi_false_heun") + 3)
 
 

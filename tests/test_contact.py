@@ -100,8 +100,8 @@ def test_flipping_keeps_what_the_method_keeps_in_flight() -> None:
     for method, lag in (("leapfrog", 0.0), ("false_euler", -0.5)):
         run = dropped(sw.Floor(way="flip"), method)
         v, y = run.v[:, 0, 1], run.y[:, 0, 1]
-        kept = 0.5 * v * v + G * y + lag * run.dt * G * v
-        change, met = np.diff(kept), np.diff(v) > 0.0
+        invariant = 0.5 * v * v + G * y + lag * run.dt * G * v
+        change, met = np.diff(invariant), np.diff(v) > 0.0
         assert met.sum() > 5
         assert np.abs(change[~met]).max() <= contacts.ROUNDING * G
         # A flip turns v from −u to u, so the term lag·h·g·v changes by 2·lag·h·g·u, which is 4·lag·h·g/u of ½u².

@@ -65,14 +65,14 @@ def test_the_limited_form_stays_finite_in_all_36_runs(force: str, method: str) -
 def test_the_printed_form_overflows_in_some_of_them_and_says_which() -> None:
     """Which of the 36 is chaos, but with C = 100 h·C·K is above 1 from the start: 0.01·100·1.5."""
     control = sw.EnergyControl(GAINS, "printed")
-    with pytest.warns(sw.DivergenceWarning) as told, pytest.warns(sw.ControlWarning, match=r"h·C·K = 1\.5\d* at the start"):
+    with pytest.warns(sw.DivergenceWarning) as warned, pytest.warns(sw.ControlWarning, match=r"h·C·K = 1\.5\d* at the start"):
         run = sw.integrate(sw.NBody(), "standard_euler", **spread(6, **START), dt=0.01, steps=100_000, control=control)
     bad = np.flatnonzero(run.status)
     assert 5 in bad
     assert run.status[0] == sw.Status.OK
     first = bad[np.argmin(run.first_bad_step[bad])]
     step = run.first_bad_step[first]
-    message = next(str(w.message) for w in told if issubclass(w.category, sw.DivergenceWarning))
+    message = next(str(w.message) for w in warned if issubclass(w.category, sw.DivergenceWarning))
     way = "; the first was" if len(bad) > 1 else ":"
     assert f"{len(bad)} of 6 members diverged{way} member {first} at step {step} (t = {step * 0.01:g})" in message
 
@@ -142,9 +142,11 @@ def test_both_forms_agree_to_first_order(method: str) -> None:
 def test_no_gain_no_change(form: str, force: str, method: str) -> None:
     """g is 0 then, and dv − 0·v is dv."""
     free = sw.integrate(sw.NBody(force=force), method, **START, dt=0.01, steps=50, every=7)
-    held = sw.integrate(sw.NBody(force=force), method, **START, dt=0.01, steps=50, every=7, control=sw.EnergyControl(0.0, form))
-    np.testing.assert_array_equal(free.v, held.v)
-    np.testing.assert_array_equal(free.y, held.y)
+    controlled = sw.integrate(
+        sw.NBody(force=force), method, **START, dt=0.01, steps=50, every=7, control=sw.EnergyControl(0.0, form)
+    )
+    np.testing.assert_array_equal(free.v, controlled.v)
+    np.testing.assert_array_equal(free.y, controlled.y)
 
 
 def test_a_target_is_approached_from_both_sides() -> None:

@@ -128,8 +128,8 @@ def test_files_and_pictures(chart: ControlSweep, tmp_path: Path) -> None:
     for row, method in enumerate(methods):
         assert (float(chart.line(method, "none").energy_error[0]), float(row)) in marks
         if method != "leapfrog":
-            held = chart.line(method, "limited").energy_error
-            assert (float(np.median(held[np.isfinite(held)])), float(row)) in marks
+            errors = chart.line(method, "limited").energy_error
+            assert (float(np.median(errors[np.isfinite(errors)])), float(row)) in marks
 
 
 def test_the_title_says_what_control_changes() -> None:
@@ -139,16 +139,16 @@ def test_the_title_says_what_control_changes() -> None:
     )
     factors = []
     for name in ("standard_euler", "false_euler"):
-        held = chart.line(name, "limited").energy_error
-        factors.append(chart.line(name, "none").energy_error[0] / np.median(held[np.isfinite(held)]))
+        errors = chart.line(name, "limited").energy_error
+        factors.append(chart.line(name, "none").energy_error[0] / np.median(errors[np.isfinite(errors)]))
     better = sum(factor > 1.0 for factor in factors)
     assert factors[0] > 1.0
     # Over 20 units of time it has not yet grown, and control is no help: a title that is always the same would be wrong there.
     short = sw.charts.control("energy_control", ["standard_euler"], horizon=20.0, evaluations=2000, relative=GAINS)
     assert "control lowers the energy error of 0 of 1 runs" in short.plot().texts[0].get_text()
     title = chart.plot().texts[0].get_text()
-    said = f"control lowers the energy error of {better} of 2 runs"
-    assert title.startswith(f"{chart.title}: {said}")
+    claim = f"control lowers the energy error of {better} of 2 runs"
+    assert title.startswith(f"{chart.title}: {claim}")
     assert (", by a factor of " in title) == (better == 2)
     none = sw.charts.control(
         "energy_control", ["rk4"], ways=["scaling"], forms=[], horizon=20.0, evaluations=2000, relative=GAINS
@@ -161,8 +161,8 @@ def test_what_diverged_is_drawn_above_the_frame_and_summed_up() -> None:
     chart = sw.charts.control("energy_control", ["standard_euler"], horizon=20.0, evaluations=2000, relative=GAINS)
     line = chart.line("standard_euler", "printed")
     assert line.diverged.tolist() == [False, False, True]
-    told = next(row for row in chart.summary() if row["kind"] == "printed")
-    assert (told["diverged"], told["diverged_from"]) == (1, 10.0)
+    summary = next(row for row in chart.summary() if row["kind"] == "printed")
+    assert (summary["diverged"], summary["diverged_from"]) == (1, 10.0)
     figure = chart.plot()
     for axes in figure.axes[:2]:
         above = [
@@ -270,9 +270,9 @@ def test_the_document_s_question_is_answered(cone: ControlSweep) -> None:
         "Rods under control, or reset after every step: control is better for False Euler; resetting is better for Runge-Kutta 4"
     )
     for evaluations in cone.evaluations:
-        held, reset = (cone.line("false_euler", kind, evaluations) for kind in ("control", "length"))
-        assert (held.state_error[:2] < reset.state_error).all()
-        assert held.diverged.tolist() == [False, False, True]
+        controlled, reset = (cone.line("false_euler", kind, evaluations) for kind in ("control", "length"))
+        assert (controlled.state_error[:2] < reset.state_error).all()
+        assert controlled.diverged.tolist() == [False, False, True]
         assert reset.length_error < 1e-15
     assert set(cone.refused) == {("pefrl", kind) for kind in ("none", "control", "length")}
     with pytest.raises(ArgumentError, match=r"evaluations: expected one of \[600, 2400\], got 7"):
@@ -336,10 +336,10 @@ def test_files_and_the_picture_of_rods(cone: ControlSweep, tmp_path: Path) -> No
 def test_the_command_line_makes_the_chart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["control", "conical_pendulum", "-o", str(tmp_path), "--methods", "false_euler,rk4", "--gains", "0.1,0.5"]
     assert cli.main([*words, "--evaluations", "600", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["answer"].endswith("control is better for False Euler; resetting is better for Runge-Kutta 4")
-    assert all(Path(file).stat().st_size > 100 for file in told["files"])
-    assert [row["kind"] for row in told["summary"]] == ["none", "control", "length"] * 2
+    report = json.loads(capsys.readouterr().out)
+    assert report["answer"].endswith("control is better for False Euler; resetting is better for Runge-Kutta 4")
+    assert all(Path(file).stat().st_size > 100 for file in report["files"])
+    assert [row["kind"] for row in report["summary"]] == ["none", "control", "length"] * 2
     assert cli.main([*words, "--evaluations", "300"]) == 0
     out = capsys.readouterr().out
     assert "control is better for False Euler" in out

@@ -223,10 +223,10 @@ def test_a_control_that_begins_to_overshoot_is_told_of_when_it_does() -> None:
     assert 0 < first < 3200
     options["steps"] = first + 20
     for every in (None, 10):
-        with pytest.warns(sw.ControlWarning, match=re.escape("gain: h·C·K = 1")) as told:
+        with pytest.warns(sw.ControlWarning, match=re.escape("gain: h·C·K = 1")) as warned:
             sw.integrate(system, "rk4", **options, every=every)
         # The control has hardly changed the orbit by then.
-        step = int(re.search(r"at step (\d+)", str(told[0].message))[1])  # type: ignore[index]
+        step = int(re.search(r"at step (\d+)", str(warned[0].message))[1])  # type: ignore[index]
         assert abs(step - first) <= 3
     sw.integrate(system, "rk4", **options | {"steps": first - 20}, every=10)  # no warning, which would be an error
     sw.integrate(system, "rk4", **options | {"control": sw.EnergyControl(gain)}, every=10)  # nor in the limited form

@@ -58,8 +58,8 @@ def test_operations_have_their_closed_forms(name: str) -> None:
     (both,) = jacobian(tape, [f(x, y)], [x, y])
     one, zero = tape.number(1.0), tape.number(0.0)
     forth = [directional(tape, [f(x, y)], [(x, a), (y, b)])[0] for a, b in ((one, zero), (zero, one))]
-    for found in (back, value(tape, both, X, Y), value(tape, forth, X, Y)):
-        for each, true in zip(found, slopes(X, Y), strict=True):
+    for derivatives in (back, value(tape, both, X, Y), value(tape, forth, X, Y)):
+        for each, true in zip(derivatives, slopes(X, Y), strict=True):
             # Some ten roundings of numbers below 100, which is above x³y and all others, beside those of the closed form.
             np.testing.assert_allclose(np.broadcast_to(each, X.shape), true, rtol=0, atol=20 * EPS * 100)
 
@@ -74,8 +74,8 @@ def test_the_way_not_taken_does_not_count() -> None:
     at = np.array([-4.0, 0.25, 1.44, 4.0])
     slope = np.array([-1 + 1, 0.5 / 0.5 + 0.5 / 0.5, 0.5 / 1.2 + 1 + 0.5 / 1.2, 0.25 + 1 - 0.5 / 8])
     seed = tape.number(1.0)
-    for found in (gradient(tape, shared, [x]), directional(tape, [shared], [(x, seed)])):
-        np.testing.assert_allclose(value(tape, found, at)[0], slope, rtol=8 * EPS)
+    for derivatives in (gradient(tape, shared, [x]), directional(tape, [shared], [(x, seed)])):
+        np.testing.assert_allclose(value(tape, derivatives, at)[0], slope, rtol=8 * EPS)
 
 
 def test_derivatives_of_derivatives() -> None:
@@ -85,14 +85,14 @@ def test_derivatives_of_derivatives() -> None:
         f = trig.sin(x * y) / (x + y)
     first = gradient(tape, f, [x, y], known)
     hessian = jacobian(tape, first, [x, y], known)
-    found = np.array([value(tape, row, X, Y) for row in hessian])
+    second = np.array([value(tape, row, X, Y) for row in hessian])
     s, c, p, q = np.sin(X * Y), np.cos(X * Y), X * Y, X + Y
     of_xx = -Y * Y * s / q - 2 * Y * c / q**2 + 2 * s / q**3
     of_yy = -X * X * s / q - 2 * X * c / q**2 + 2 * s / q**3
     of_xy = (c - p * s) / q - X * c / q**2 - Y * c / q**2 + 2 * s / q**3
     # Twenty roundings and the sine's own ulp, of terms below 40: 2s/q³ at q = 0.4 is above all others.
-    np.testing.assert_allclose(found, [[of_xx, of_xy], [of_xy, of_yy]], rtol=0, atol=30 * EPS * 40)
-    np.testing.assert_allclose(found[0, 1], found[1, 0], rtol=0, atol=30 * EPS * 40)
+    np.testing.assert_allclose(second, [[of_xx, of_xy], [of_xy, of_yy]], rtol=0, atol=30 * EPS * 40)
+    np.testing.assert_allclose(second[0, 1], second[1, 0], rtol=0, atol=30 * EPS * 40)
 
 
 def test_with_respect_to_anything_on_the_tape() -> None:
@@ -101,11 +101,11 @@ def test_with_respect_to_anything_on_the_tape() -> None:
     x, p, h = tape.state(0), tape.param(0), tape.step()
     inner = x * p
     f = inner * inner + h * x
-    found = Evaluation(tape, gradient(tape, f, [p, h, inner, x]), {0: np.array(3.0)})([np.array(2.0)], 0.0, 0.5)
+    derivatives = Evaluation(tape, gradient(tape, f, [p, h, inner, x]), {0: np.array(3.0)})([np.array(2.0)], 0.0, 0.5)
     # Beside ``inner``, x counts only where it stands by itself.
-    assert [float(each) for each in found] == [0.0, 2.0, 12.0, 0.5]
-    found = Evaluation(tape, gradient(tape, f, [p, x]), {0: np.array(3.0)})([np.array(2.0)], 0.0, 0.5)
-    assert [float(each) for each in found] == [24.0, 36.5]
+    assert [float(each) for each in derivatives] == [0.0, 2.0, 12.0, 0.5]
+    derivatives = Evaluation(tape, gradient(tape, f, [p, x]), {0: np.array(3.0)})([np.array(2.0)], 0.0, 0.5)
+    assert [float(each) for each in derivatives] == [24.0, 36.5]
 
 
 def test_the_shorter_way_is_taken() -> None:
@@ -167,12 +167,12 @@ class Standing:
 
     def __call__(self, name: str) -> Callable[..., Any]:
         def function(*arguments: Any) -> Any:
-            given = [
+            values = [
                 value(self.tape, [each], *self.state, numbers=self.numbers)[0] if isinstance(each, _core.Symbol) else each
                 for each in arguments
             ]
             k = len(self.numbers)
-            self.numbers[k] = np.asarray(TRIED[name][0](*given), dtype=float)
+            self.numbers[k] = np.asarray(TRIED[name][0](*values), dtype=float)
             return marks.mark(name, self.tape.param(k), *arguments)
 
         return function
@@ -193,8 +193,8 @@ def assert_rule(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(marks.FUNCTIONS, each, standing(each))
     x = [tape.state(i) for i in range(len(at))]
     with marks.recording() as known:
-        made = standing(name)(*x)
-    found = value(tape, gradient(tape, made, x, known), *at, numbers=standing.numbers)
+        result = standing(name)(*x)
+    derivatives = value(tape, gradient(tape, result, x, known), *at, numbers=standing.numbers)
     for i in range(len(at)):
 
         def along(z: Any, i: int = i) -> Any:
@@ -204,8 +204,8 @@ def assert_rule(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         step = Long(LONG_EPS ** (1 / 3)) * np.abs(at[i]).astype(Long)
         true, bound = central(along, at[i].astype(Long), step, 8 * LONG_EPS * (1.0 + np.abs(at[i])))
         # The rule itself is made of some five double operations on values that NumPy rounds to an ulp or two.
-        bound = bound + 16 * EPS * (1.0 + np.abs(true)) * (1.0 + np.abs(np.broadcast_to(found[i], true.shape)))
-        assert (np.abs(found[i] - true) <= bound).all(), (name, i, found[i], true, bound)
+        bound = bound + 16 * EPS * (1.0 + np.abs(true)) * (1.0 + np.abs(np.broadcast_to(derivatives[i], true.shape)))
+        assert (np.abs(derivatives[i] - true) <= bound).all(), (name, i, derivatives[i], true, bound)
 
 
 @pytest.mark.parametrize(
@@ -226,8 +226,8 @@ def test_elementary_functions_have_their_derivatives(name: str) -> None:
     tape = _core.Tape()
     x = [tape.state(i) for i in range(len(at))]
     with marks.recording() as known:
-        made = getattr(functions, name)(*x)
-    back = value(tape, gradient(tape, made, x, known), *at)
+        result = getattr(functions, name)(*x)
+    back = value(tape, gradient(tape, result, x, known), *at)
     one = tape.number(1.0)
     for i in range(len(at)):
 
@@ -237,9 +237,9 @@ def test_elementary_functions_have_their_derivatives(name: str) -> None:
         step = Long(LONG_EPS ** (1 / 3)) * np.abs(at[i]).astype(Long)
         true, bound = central(along, at[i].astype(Long), step, 8 * LONG_EPS * (1.0 + np.abs(at[i])))
         bound = bound + 16 * EPS * (1.0 + np.abs(true)) ** 2  # as in ``assert_rule``
-        (forth,) = value(tape, directional(tape, [made], [(x[i], one)], known), *at)
-        for found in (back[i], forth):
-            assert (np.abs(found - true) <= bound).all(), (name, i, found, true, bound)
+        (forth,) = value(tape, directional(tape, [result], [(x[i], one)], known), *at)
+        for derivative in (back[i], forth):
+            assert (np.abs(derivative - true) <= bound).all(), (name, i, derivative, true, bound)
 
 
 def test_powers_with_known_exponents() -> None:
@@ -249,8 +249,8 @@ def test_powers_with_known_exponents() -> None:
     at = np.array([0.0, 2.0])
     for p, true in ((0, [0.0, 0.0]), (1, [1.0, 1.0]), (2.0, [0.0, 4.0])):
         with marks.recording() as known:
-            made = marks.mark("power", tape.param(p if isinstance(p, int) else 7), x, p)
-        np.testing.assert_array_equal(np.broadcast_to(value(tape, gradient(tape, made, [x], known), at)[0], 2), true)
+            result = marks.mark("power", tape.param(p if isinstance(p, int) else 7), x, p)
+        np.testing.assert_array_equal(np.broadcast_to(value(tape, gradient(tape, result, [x], known), at)[0], 2), true)
 
 
 def test_functions_that_are_there_are_marked() -> None:
@@ -260,8 +260,8 @@ def test_functions_that_are_there_are_marked() -> None:
     with marks.recording() as known:
         roots = [trig.sin(x), trig.cos(x), log(x)]
         (beside,) = trig.sin(np.array([x * 2.0], dtype=object))
-    found = value(tape, [row[0] for row in jacobian(tape, [*roots, beside], [x], known)], X)
-    for each, true in zip(found, (np.cos(X), -np.sin(X), 1 / X, 2 * np.cos(2 * X)), strict=True):
+    derivatives = value(tape, [row[0] for row in jacobian(tape, [*roots, beside], [x], known)], X)
+    for each, true in zip(derivatives, (np.cos(X), -np.sin(X), 1 / X, 2 * np.cos(2 * X)), strict=True):
         np.testing.assert_allclose(each, true, rtol=0, atol=8 * EPS * 5)  # 1/x is 5 at most
 
 
@@ -310,12 +310,12 @@ def test_what_has_none_says_so(what: Callable[..., Any], says: str) -> None:
     x = tape.state(0)
     marked = "function" in says or "argument" in says
     with marks.recording() as known:
-        made = what(tape, x)
-    given = known if marked else {}
+        result = what(tape, x)
+    recorded = known if marked else {}
     for differentiate in (
-        lambda: gradient(tape, made, [x], given),
-        lambda: jacobian(tape, [made], [x], given),
-        lambda: directional(tape, [made], [(x, tape.number(1.0))], given),
+        lambda: gradient(tape, result, [x], recorded),
+        lambda: jacobian(tape, [result], [x], recorded),
+        lambda: directional(tape, [result], [(x, tape.number(1.0))], recorded),
     ):
         with pytest.raises(UnsupportedError, match=says):
             differentiate()
@@ -327,8 +327,8 @@ def test_what_does_not_change_may_be_made_of_anything() -> None:
     x, t = tape.state(0), tape.time()
     f = x * t.floor() + (x.floor() < 1.0).choose(x, 2.0 * x) + tape.sample(0, t) * 0.0
     tables = [type("Table", (), {"sample": staticmethod(lambda t: 5.0)})]
-    found = Evaluation(tape, gradient(tape, f, [x]), {}, tables)([np.array([0.5, 1.5])], 3.7)[0]
-    np.testing.assert_array_equal(found, [4.0, 5.0])
+    derivatives = Evaluation(tape, gradient(tape, f, [x]), {}, tables)([np.array([0.5, 1.5])], 3.7)[0]
+    np.testing.assert_array_equal(derivatives, [4.0, 5.0])
 
 
 def test_a_fused_tape_is_refused() -> None:

@@ -37,8 +37,8 @@ class OnDevice(Tensor):
 def test_they_are_taken_as_numpys() -> None:
     omega, y = np.linspace(0.5, 2.0, 50), np.ones(50)
     plain = sw.integrate(sw.Oscillator(omega), "rk4", v=0.0, y=y, dt=0.1, steps=10)
-    given = sw.integrate(sw.Oscillator(Tensor(omega)), "rk4", v=0.0, y=Tensor(y), dt=0.1, steps=10)
-    assert given.y.tobytes() == plain.y.tobytes()
+    run = sw.integrate(sw.Oscillator(Tensor(omega)), "rk4", v=0.0, y=Tensor(y), dt=0.1, steps=10)
+    assert run.y.tobytes() == plain.y.tobytes()
     single = sw.integrate(sw.Oscillator(Tensor(omega.astype(np.float32))), "rk4", v=0.0, y=1.0, dt=0.1, steps=10)
     assert single.y.tobytes() != plain.y.tobytes()
     # y is about cos(ω·t) at t = 1, and ω below 2 is rounded by 2⁻²⁴ of it at most.
@@ -68,11 +68,11 @@ def test_a_world_steps_them_in_place() -> None:
 @pytest.mark.parametrize("numbers", [buffer_pool.LEAST_POOLED // 8, 100_000, 600_000])
 def test_large_results_begin_at_a_cache_line(numbers: int) -> None:
     """As JAX asks for, which copies others; where NumPy's own memory begins is chance, so it is tried several times."""
-    kept = []
+    runs = []
     for extra in range(4):
         buffer_pool._free.clear()
         run = sw.integrate(sw.Oscillator(np.ones(numbers + extra)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
-        kept.append(run)
+        runs.append(run)
         assert run.y.ctypes.data % 64 == run.v.ctypes.data % 64 == 0
 
 
@@ -172,8 +172,8 @@ def _run(omega: Any = 1.0, **options: Any) -> None:
     """With fixed or adaptive steps, as the options need."""
     paced = "at" in options or "tolerance" in options
     method = "dop853" if paced else "rk4"
-    given: dict[str, Any] = {"tolerance": 1e-6, "at": [1.0]} if paced else {"dt": 0.1, "steps": 3}
-    sw.integrate(sw.Oscillator(omega), method, **{"v": 0.0, "y": 1.0} | given | options)
+    defaults: dict[str, Any] = {"tolerance": 1e-6, "at": [1.0]} if paced else {"dt": 0.1, "steps": 3}
+    sw.integrate(sw.Oscillator(omega), method, **{"v": 0.0, "y": 1.0} | defaults | options)
 
 
 @pytest.mark.parametrize(

@@ -47,8 +47,8 @@ def anchors(page: Path) -> set[str]:
 def blocks(page: Path) -> list[tuple[int, str, str]]:
     """Line number and code of every Python block, and the module that it says it is, if it does."""
     whole = text(page)
-    found = [m for m in FENCE.finditer(whole) if m[2] == "python"]
-    return [(whole[: m.start(3)].count("\n"), m[3], (m[1] or "").replace("/", ".")) for m in found]
+    matches = [m for m in FENCE.finditer(whole) if m[2] == "python"]
+    return [(whole[: m.start(3)].count("\n"), m[3], (m[1] or "").replace("/", ".")) for m in matches]
 
 
 @pages
@@ -65,8 +65,8 @@ def test_python_blocks_run_and_print_what_they_say(page, tmp_path, monkeypatch):
             exec(compile("\n" * line + code, str(page), "exec"), namespace)
         if module:  # later blocks may import it
             monkeypatch.setitem(sys.modules, module, types.SimpleNamespace(**namespace))
-        said = SAID.findall(code)
-        assert printed.getvalue().splitlines() == said, f"{page.name}, block at line {line}"
+        expected = SAID.findall(code)
+        assert printed.getvalue().splitlines() == expected, f"{page.name}, block at line {line}"
 
 
 def test_blocks_are_found_and_compared():
@@ -106,8 +106,8 @@ def test_named_files_exist(page):
         head, brace, rest = name.partition("{")
         choices, _, tail = rest.partition("}")
         for each in (head + choice + tail for choice in choices.split(",")) if brace else [name]:
-            found = list(ROOT.glob(each)) or [f for folder in FOLDERS for f in (ROOT / folder).rglob(each)]
-            assert found, f"{page.name} names {each}"
+            files = list(ROOT.glob(each)) or [f for folder in FOLDERS for f in (ROOT / folder).rglob(each)]
+            assert files, f"{page.name} names {each}"
 
 
 @pages

@@ -64,12 +64,12 @@ def test_examples_print_what_they_say(name: str, tmp_path: Any, monkeypatch: pyt
     monkeypatch.chdir(tmp_path)
     examples = doctest.DocTestParser().get_doctest(PUBLIC[name].__doc__, names(), name, None, None)
     assert examples.examples
-    told: list[str] = []
+    output: list[str] = []
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         runner = doctest.DocTestRunner(optionflags=OPTIONS, verbose=False)
-        runner.run(examples, out=told.append)
-    assert runner.failures == 0, "".join(told)
+        runner.run(examples, out=output.append)
+    assert runner.failures == 0, "".join(output)
 
 
 @pytest.mark.mutant

@@ -58,13 +58,13 @@ def test_methods_that_treat_both_blocks_alike() -> None:
 def test_a_jordan_block_has_the_limit_of_its_rate(method: str, n: int) -> None:
     """Eigenvalues of P are those of one state: R(−h), whatever the others do to it."""
     one = sw.stability_limit(sw.LinearSystem([[-1.0]]), method)
-    found = sw.stability_limit(sw.LinearSystem(jordan(n), velocities=0), method)
-    assert found.decided
-    assert found == pytest.approx(one, rel=1e-14)
-    assert found.mode.rate == -1.0
-    assert found.mode.kind == one.mode.kind
+    limit = sw.stability_limit(sw.LinearSystem(jordan(n), velocities=0), method)
+    assert limit.decided
+    assert limit == pytest.approx(one, rel=1e-14)
+    assert limit.mode.rate == -1.0
+    assert limit.mode.kind == one.mode.kind
     # Of the states only the last is the mode's own.
-    np.testing.assert_allclose(np.abs(found.mode.y), np.eye(n)[-1], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(np.abs(limit.mode.y), np.eye(n)[-1], rtol=0, atol=1e-6)
     near = sw.stability_limit(sw.LinearSystem(jordan(n) - 1e-6 * np.diag(np.arange(n) % 2), velocities=0), method)
     assert near == pytest.approx(one / (1.0 + 1e-6), rel=1e-14)
 
@@ -76,10 +76,10 @@ def test_a_row_of_filters_in_one_equation(method: str, n: int) -> None:
     one = sw.stability_limit(sw.LinearSystem([[-1.0]]), method)
     for a in (companion([-1] * n), (s := whole(n, n))[0] @ jordan(n) @ s[1]):
         system = sw.LinearSystem(a)
-        found = sw.stability_limit(system, method)
-        assert found.decided
-        assert found == pytest.approx(one, rel=1e-14)
-        assert found.mode.rate == pytest.approx(-1.0, rel=1e-14)
+        limit = sw.stability_limit(system, method)
+        assert limit.decided
+        assert limit == pytest.approx(one, rel=1e-14)
+        assert limit.mode.rate == pytest.approx(-1.0, rel=1e-14)
         below, above = (sw.analyse(system, method, dt=f * one) for f in (1 - 1e-9, 1 + 1e-9))
         assert (below.stable, above.stable) == (True, False)
         assert below.radius == pytest.approx(sw.analyse(sw.LinearSystem([[-1.0]]), method, dt=(1 - 1e-9) * one).radius, rel=1e-13)
@@ -100,10 +100,10 @@ def test_oscillators_in_a_row(method: str, damping: float) -> None:
         mixed = (
             np.block([[s_v, zero], [zero, s_y]]) @ (16.0 * a[np.ix_(order, order)]) @ np.block([[i_v, zero], [zero, i_y]]) / 16.0
         )
-        found = sw.stability_limit(sw.LinearSystem(mixed, velocities=n), method)
+        limit = sw.stability_limit(sw.LinearSystem(mixed, velocities=n), method)
         # 2D is a number of 53 bits, of which the sums of whole multiples lose some: eps^(1/n) of a limit that n rates share.
-        assert found == pytest.approx(one, rel=20 * np.finfo(float).eps ** (1 / n) if damping == 0.3 else 1e-12)
-        assert found.decided
+        assert limit == pytest.approx(one, rel=20 * np.finfo(float).eps ** (1 / n) if damping == 0.3 else 1e-12)
+        assert limit.decided
 
 
 def test_the_row_of_oscillators_by_standard_euler() -> None:
@@ -118,9 +118,9 @@ def test_undamped_oscillators_of_one_frequency_that_drive_each_other(method: str
     s, inverse = whole(n, 3)
     k = s @ jordan(n, 4.0) @ inverse
     a = np.block([[np.zeros((n, n)), -k], [np.eye(n), np.zeros((n, n))]])
-    found = sw.stability_limit(sw.LinearSystem(a, velocities=n), method)
-    assert found == pytest.approx(sw.method(method).limit / 2.0, rel=1e-13)
-    assert found.mode.rate == pytest.approx(2j, rel=1e-14)
+    limit = sw.stability_limit(sw.LinearSystem(a, velocities=n), method)
+    assert limit == pytest.approx(sw.method(method).limit / 2.0, rel=1e-13)
+    assert limit.mode.rate == pytest.approx(2j, rel=1e-14)
     resonant = sw.analyse(sw.LinearSystem(a, velocities=n), "false_euler", dt=0.25)
     assert (resonant.kind, resonant.stable) == ("unstable oscillation (double pair)", False)
     assert resonant.radius == pytest.approx(1.0, abs=1e-15)

@@ -19,7 +19,7 @@ PAIR = sw.NBody([1.0, 1.0], force="newton")
 TIME = math.pi * math.sqrt(2.0**3 / (8.0 * 2.0))
 
 
-def told(*arguments: Any, **options: Any) -> tuple[sw.Run, str]:
+def integrated(*arguments: Any, **options: Any) -> tuple[sw.Run, str]:
     """A run, and all that it warns of."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -35,7 +35,7 @@ def test_head_on(method: str, dt: float) -> None:
     At the distance r they move at 2·√(1/r − 1/2); from 2r = h·2/√r on, r = h^(2/3), a step is too long. From there it takes less
     than r^(3/2) = h. The first methods of all are late by some steps.
     """
-    run, words = told(PAIR, method, **FALL, dt=dt, steps=round(4.0 / dt), every=round(1.0 / dt))
+    run, words = integrated(PAIR, method, **FALL, dt=dt, steps=round(4.0 / dt), every=round(1.0 / dt))
     (met,) = run.encounters
     assert met.bodies == (0, 1)
     # Methods of the first order are late by a fraction h of the fall, twice over, or early.
@@ -49,7 +49,7 @@ def test_an_energy_that_recovers() -> None:
     """Through each other half a step after a state, 9.5 steps from the start: the pulls before and after cancel."""
     speed = 1.0 / (9.5 * 0.01)
     through = {"v": np.array([[speed, 0.0], [-speed, 0.0]]), "y": FALL["y"]}
-    run, words = told(PAIR, "leapfrog", **through, dt=0.01, steps=200)
+    run, words = integrated(PAIR, "leapfrog", **through, dt=0.01, steps=200)
     changed = abs(run.energy[-1] - PAIR.energy(through["v"], through["y"]))
     assert changed < diagnostics.DOUBTFUL_CHANGE * speed**2
     assert "another energy" not in words
@@ -59,7 +59,9 @@ def test_an_energy_that_recovers() -> None:
 def test_what_is_softened_enough_is_not_told_of() -> None:
     """Through the middle of a softened pair at 2·√(1/ε − 1/2) at most: h·w < 2ε at ε = 0.1, not at 0.001."""
     for softening, expected in ((0.1, ()), (0.001, ((0, 1),))):
-        run, words = told(sw.NBody([1.0, 1.0], force="newton", softening=softening), "leapfrog", **FALL, dt=0.01, steps=1000)
+        run, words = integrated(
+            sw.NBody([1.0, 1.0], force="newton", softening=softening), "leapfrog", **FALL, dt=0.01, steps=1000
+        )
         assert tuple(each.bodies for each in run.encounters) == expected
         assert bool(words) == bool(expected)
 
@@ -69,7 +71,7 @@ def test_the_documents_symmetric_start() -> None:
     when = math.sqrt(math.pi * math.e / 2) * (1.0 + math.erf(math.sqrt(0.5)))
     for form, pair in (("limited", "matching"), ("limited", "printed"), ("printed", "matching")):
         scene = sw.scenes.energy_control(pair, 0.0, form)
-        run, words = told(scene.system, "standard_euler", v=scene.v, y=scene.y, dt=0.01, steps=1000, control=scene.control)
+        run, words = integrated(scene.system, "standard_euler", v=scene.v, y=scene.y, dt=0.01, steps=1000, control=scene.control)
         assert "met within step" in words
         # Standard Euler is of first order, and the printed potential pushes what needs no push: later by some tenths.
         assert run.encounters[0].step * 0.01 == pytest.approx(when, abs=0.05 if pair == "matching" else 0.5)
@@ -79,11 +81,11 @@ def test_the_pythagorean_run_past_its_encounter() -> None:
     """Masses 4 and 5 at t = 1.879, 0.0097 apart: at some 43 units of time a step of 0.001 goes four times that."""
     scene = sw.scenes.pythagorean()
     for method in ("leapfrog", "rk4", "dop853"):
-        run, words = told(scene.system, method, v=scene.v, y=scene.y, dt=0.001, steps=10_000)
+        run, words = integrated(scene.system, method, v=scene.v, y=scene.y, dt=0.001, steps=10_000)
         (met,) = run.encounters
         assert (met.bodies, met.step * 0.001) == ((1, 2), pytest.approx(1.879, abs=0.002))
         assert f"bodies 1 and 2 met within step {met.step}" in words
-    run, words = told(scene.system, "dop853", v=scene.v, y=scene.y, dt=0.00002, steps=100_000)
+    run, words = integrated(scene.system, "dop853", v=scene.v, y=scene.y, dt=0.00002, steps=100_000)
     assert (run.encounters, words) == ((), "")
 
 
@@ -93,9 +95,9 @@ def test_members_of_a_batch() -> None:
     v = np.zeros((2, 2, 3))
     v[0, 1], v[1, 1] = speed, -speed
     y = np.repeat(FALL["y"][..., np.newaxis], 3, axis=-1)
-    run, words = told(PAIR, "leapfrog", v=v, y=y, dt=0.001, steps=40_000)
+    run, words = integrated(PAIR, "leapfrog", v=v, y=y, dt=0.001, steps=40_000)
     assert [each.member for each in run.encounters] == [(1,)]
-    alone, _ = told(PAIR, "leapfrog", **FALL, dt=0.001, steps=40_000)
+    alone, _ = integrated(PAIR, "leapfrog", **FALL, dt=0.001, steps=40_000)
     assert run.encounters[0]._replace(member=()) == alone.encounters[0]
     assert "met within step" in words
     assert "member 1" in words
@@ -111,7 +113,7 @@ def test_dust_that_passes_is_no_encounter() -> None:
     """Masses so small that the passage turns nobody by 0.01 rad: 2·G·m/(q·w²) = 2e-7. Without any mass nothing happens at all."""
     past = {"v": np.array([[100.0, 0.0], [-100.0, 0.0]]), "y": np.array([[-1.0, 0.1], [1.0, -0.1]])}
     for mass, met in ((1e-4, False), (0.0, False), (1e4, True)):
-        run, _ = told(sw.NBody([mass, mass], force="newton"), "rk4", **past, dt=0.0083, steps=10)
+        run, _ = integrated(sw.NBody([mass, mass], force="newton"), "rk4", **past, dt=0.0083, steps=10)
         assert bool(run.encounters) == met
 
 
@@ -124,13 +126,13 @@ def test_who_does_not_listen_pays_nothing(monkeypatch: pytest.MonkeyPatch) -> No
         warnings.simplefilter("ignore", sw.AccuracyWarning)
         sw.integrate(PAIR, "leapfrog", **FALL, dt=0.001, steps=4000)
     with pytest.raises(AssertionError):
-        told(PAIR, "leapfrog", **FALL, dt=0.001, steps=4000)
+        integrated(PAIR, "leapfrog", **FALL, dt=0.001, steps=4000)
 
 
 @pytest.mark.parametrize("force", ["newton", "logarithmic", "printed"])
 def test_the_look_ahead_of_floats_and_of_arrays_agree(force: str) -> None:
     rng = np.random.default_rng(5)
-    found = []
+    answers = []
     for softening in (0.0, 0.01):
         bodies = sw.NBody([1.0, 0.0, 2.0], force=force, softening=softening, G=1.5)
         v, y = rng.normal(size=(3, 2, 400)), rng.normal(size=(3, 2, 400))
@@ -138,8 +140,8 @@ def test_the_look_ahead_of_floats_and_of_arrays_agree(force: str) -> None:
             each = encounters.may_meet_each(bodies, h, 3.0, v, y)
             one = [encounters.may_meet(bodies, h, 3.0, v[..., i].tolist(), y[..., i].tolist()) for i in range(400)]
             assert each.tolist() == one
-            found += one
-    assert 0.02 < np.mean(found) < 0.9
+            answers += one
+    assert 0.02 < np.mean(answers) < 0.9
 
 
 def test_the_look_at_many_bodies_is_little_work(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -157,7 +159,7 @@ def test_the_look_at_many_bodies_is_little_work(monkeypatch: pytest.MonkeyPatch)
     rng = np.random.default_rng(1)
     bodies = sw.NBody(np.full(64, 1 / 64), force="newton", dim=3, softening=0.05)
     v, y = 0.1 * rng.normal(size=(64, 3)), rng.normal(size=(64, 3))
-    _, text = told(bodies, "false_euler", v=v, y=y, dt=1e-4, steps=2500)
+    _, text = integrated(bodies, "false_euler", v=v, y=y, dt=1e-4, steps=2500)
     assert text == ""
     pairs, states = 64 * 63 // 2, 2
     assert 0 < sum(sizes) <= states * pairs
@@ -198,7 +200,7 @@ def test_runs_without_bodies_or_with_a_tolerance_are_refused() -> None:
 
 def test_arrays_that_change_later_do_not_matter() -> None:
     v, y = FALL["v"].copy(), FALL["y"].copy()
-    run, _ = told(PAIR, "leapfrog", v=v, y=y, dt=0.01, steps=300)
+    run, _ = integrated(PAIR, "leapfrog", v=v, y=y, dt=0.01, steps=300)
     expected = run.encounters
     v[:], y[:] = 7.0, 8.0
     assert run.encounters == expected
@@ -225,6 +227,8 @@ def test_bodies_that_others_pull_apart_are_not_looked_for(monkeypatch):
         assert encounters.may_meet(bodies, 1e-3, 100.0, v.tolist(), y.tolist()) == expected
     runs = []
     advance = encounters.engine.advance
-    monkeypatch.setattr(encounters.engine, "advance", lambda *given, **how: runs.append(1) or advance(*given, **how))
+    monkeypatch.setattr(
+        encounters.engine, "advance", lambda *arguments, **options: runs.append(1) or advance(*arguments, **options)
+    )
     sw.integrate(scene.system, "leapfrog", v=scene.v, y=scene.y, dt=6.3e-4, steps=20_000)
     assert len(runs) == 1

@@ -30,9 +30,9 @@ def known(request: pytest.FixtureRequest) -> Any:
 def share(name: str, contestant: str, right: Any) -> float:
     """Of right outcomes."""
     module = importlib.import_module(f"benches.ensembles.{contestant}_{name}")
-    found = module.run(SMALL[name])
-    assert len(found) == work.members(name, SMALL[name])
-    return truth.right(name, found[truth.sampled(name, SMALL[name])], *right)
+    outcomes = module.run(SMALL[name])
+    assert len(outcomes) == work.members(name, SMALL[name])
+    return truth.right(name, outcomes[truth.sampled(name, SMALL[name])], *right)
 
 
 #: What two very exact computations agree on is found again by others, but for what is nearly chaotic.
@@ -62,8 +62,8 @@ def test_a_wrong_one_is_told_of(name: str, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_right_is_counted_among_what_is_known() -> None:
-    found, right = np.array([0, 1, 2, 2]), np.array([0, 1, 1, 2])
-    assert truth.right("basins", found, right, np.array([True, True, True, False])) == pytest.approx(2 / 3)
+    outcomes, right = np.array([0, 1, 2, 2]), np.array([0, 1, 1, 2])
+    assert truth.right("basins", outcomes, right, np.array([True, True, True, False])) == pytest.approx(2 / 3)
     never = np.array([np.nan, 1.0, np.nan, 5.0])
     assert truth.right("figure_eight", never, np.array([np.nan, 1.05, 2.0, np.nan]), np.ones(4, dtype=bool)) == 0.5
     states = np.zeros((2, 3))
@@ -80,11 +80,11 @@ def test_lines_are_those_of_code() -> None:
 
 def test_the_page_has_what_was_measured(tmp_path: Path) -> None:
     each = {"seconds": 12.34, "ready": 1.5, "peak": 2**30, "right": 0.915}
-    told: dict[str, Any] = {"machine": "this one."}
-    told["basins"] = {"size": 2000, "contestants": {"stepwell": each, "numba": {"missing": "no numba"}}}
+    numbers: dict[str, Any] = {"machine": "this one."}
+    numbers["basins"] = {"size": 2000, "contestants": {"stepwell": each, "numba": {"missing": "no numba"}}}
     page = tmp_path / "page.md"
     page.write_text(ensembles.PAGE.read_text(encoding="utf-8"), encoding="utf-8")
-    ensembles.write(told, page)
+    ensembles.write(numbers, page)
     text = page.read_text(encoding="utf-8")
     lines = ensembles.lines("stepwell", "basins")
     assert f"| stepwell | 12.3 | 1.5 s | {lines} | 1024 MiB | 91.5% |" in text
@@ -94,11 +94,11 @@ def test_the_page_has_what_was_measured(tmp_path: Path) -> None:
 
 
 def test_what_was_measured_is_not_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[str, str]] = []
+    calls: list[tuple[str, str]] = []
 
     def measured(contestant: str, name: str, size: int, small: int, times: int) -> dict[str, Any]:
-        asked.append((contestant, name))
-        if len(asked) == 3:
+        calls.append((contestant, name))
+        if len(calls) == 3:
             raise KeyboardInterrupt
         return {"seconds": 1.0, "ready": 1.0, "peak": 1, "right": 1.0}
 
@@ -109,9 +109,9 @@ def test_what_was_measured_is_not_measured_again(tmp_path: Path, monkeypatch: py
     with pytest.raises(KeyboardInterrupt):
         ensembles.main(options)
     ensembles.main(options)
-    assert len(asked) == 7  # six, and the one that was interrupted
+    assert len(calls) == 7  # six, and the one that was interrupted
     ensembles.main(options)
-    assert len(asked) == 7
+    assert len(calls) == 7
     ensembles.main([*options, "--again", "numba"])
-    assert asked[7:] == [("numba", "basins"), ("numba", "figure_eight")]
+    assert calls[7:] == [("numba", "basins"), ("numba", "figure_eight")]
     assert set(json.loads((tmp_path / "a.json").read_text())) == {"machine", "basins", "figure_eight"}

@@ -15,13 +15,13 @@ from stepwell.errors import ArgumentError, DTypeError, NotFiniteError, ShapeErro
 from support import own_systems as own
 
 
-def run(system: Any, method: str = "rk4", **given: Any) -> sw.Run:
+def run(system: Any, method: str = "rk4", **options: Any) -> sw.Run:
     """Ten steps, by the core and by the reference, which agree to the bit."""
-    given = {"dt": 0.05, "steps": 10, "every": 3, **given}
-    made, reference = (sw.integrate(system, method, **given, backend=backend) for backend in ("rust", "numpy"))
-    np.testing.assert_array_equal(made.v, reference.v)
-    np.testing.assert_array_equal(made.y, reference.y)
-    return made
+    options = {"dt": 0.05, "steps": 10, "every": 3, **options}
+    core, reference = (sw.integrate(system, method, **options, backend=backend) for backend in ("rust", "numpy"))
+    np.testing.assert_array_equal(core.v, reference.v)
+    np.testing.assert_array_equal(core.y, reference.y)
+    return core
 
 
 # ---- what it is
@@ -43,9 +43,9 @@ def test_quick_sines_are_those_of_the_built_in_systems() -> None:
         return -(omega * omega) * np.sin(y)
 
     y = np.linspace(-3.0, 3.0, 9)
-    made = run(quick(omega=1.0), v=0.0, y=y)
+    ours = run(quick(omega=1.0), v=0.0, y=y)
     theirs = sw.integrate(sw.Pendulum(1.0), "rk4", v=0.0, y=y, dt=0.05, steps=10)
-    np.testing.assert_array_equal(made.y[-1], theirs.y[-1])  # 1·1 is 1, whatever it is multiplied with next
+    np.testing.assert_array_equal(ours.y[-1], theirs.y[-1])  # 1·1 is 1, whatever it is multiplied with next
     counted = [sw.explain(system, "rk4").computed for system in (quick(), sw.Pendulum())]
     assert sum(counted[0].values()) - sum(counted[1].values()) <= 4
 
@@ -58,9 +58,9 @@ def test_lorenz_against_many_digits() -> None:
             lambda t, y: [10 * (y[1] - y[0]), y[0] * (28 - y[2]) - y[1], y[0] * y[1] - mpmath.mpf(8) / 3 * y[2]], 0, [1, 1, 1]
         )
         true = np.array([float(each) for each in solution(1.0)])
-    made = sw.integrate(own.lorenz(), "dop853", y=np.ones(3), tolerance=1e-13, at=[1.0])
+    motion = sw.integrate(own.lorenz(), "dop853", y=np.ones(3), tolerance=1e-13, at=[1.0])
     # The flow stretches errors by less than exp(∫ λ) < 1e3 over this stretch, and 1e-13 is the error of a step.
-    np.testing.assert_allclose(made.y[-1], true, rtol=1e-9)
+    np.testing.assert_allclose(motion.y[-1], true, rtol=1e-9)
 
 
 @pytest.mark.parametrize("method", [each.name for each in sw.methods()])
@@ -74,10 +74,10 @@ def test_every_method_takes_them(method: str) -> None:
 
 
 def test_a_first_order_system_has_no_velocities() -> None:
-    made = run(own.lorenz(rho=np.linspace(1.0, 30.0, 7)), y=np.ones(3))
-    assert made.y.shape == (5, 3, 7)
-    assert made.v.shape == (5, 0, 7)
-    again = sw.integrate(own.lorenz(rho=np.linspace(1.0, 30.0, 7)), "rk4", resume=made, dt=0.05, steps=1)
+    motion = run(own.lorenz(rho=np.linspace(1.0, 30.0, 7)), y=np.ones(3))
+    assert motion.y.shape == (5, 3, 7)
+    assert motion.v.shape == (5, 0, 7)
+    again = sw.integrate(own.lorenz(rho=np.linspace(1.0, 30.0, 7)), "rk4", resume=motion, dt=0.05, steps=1)
     assert again.start_step == 10
     with pytest.raises(ArgumentError, match=r"v: expected the velocities"):
         sw.integrate(own.duffing(), "rk4", y=1.0, dt=0.1, steps=1)
@@ -87,8 +87,8 @@ def test_the_state_has_as_few_axes_as_the_function_can_do_with() -> None:
     assert run(own.duffing(), v=0.0, y=np.ones(3)).system.y_shape == ()
     assert run(own.lorenz(), y=np.ones((3, 4))).system.y_shape == (3,)
     assert run(own.springs(), v=0.0, y=np.random.default_rng(0).normal(size=(5, 3, 2))).system.y_shape == (5, 3)
-    made = run(own.top(), v=np.ones((3, 2)), y=np.array([1.0, 0.0, 0.0, 0.0]))
-    assert (made.system.v_shape, made.system.y_shape, made.y.shape) == ((3,), (4,), (5, 4, 2))
+    motion = run(own.top(), v=np.ones((3, 2)), y=np.array([1.0, 0.0, 0.0, 0.0]))
+    assert (motion.system.v_shape, motion.system.y_shape, motion.y.shape) == ((3,), (4,), (5, 4, 2))
 
     @sw.system(shape=(None, 2))
     def declared(t: Any, v: Any, y: Any) -> Any:
@@ -145,10 +145,10 @@ def test_a_world() -> None:
 
 @pytest.mark.parametrize("fused", [False, True])
 def test_adaptive_steps(fused: bool) -> None:
-    given = {"y": np.ones(3), "tolerance": 1e-6, "at": [0.5, 1.0], "fused": fused}
+    arguments = {"y": np.ones(3), "tolerance": 1e-6, "at": [0.5, 1.0], "fused": fused}
     system = own.lorenz(rho=np.linspace(1.0, 30.0, 7))
-    made, reference = (sw.integrate(system, "dop853", **given, backend=backend) for backend in ("rust", "numpy"))
-    np.testing.assert_array_equal(made.y, reference.y)
+    core, reference = (sw.integrate(system, "dop853", **arguments, backend=backend) for backend in ("rust", "numpy"))
+    np.testing.assert_array_equal(core.y, reference.y)
 
 
 def test_a_long_one_is_stepped_by_its_rates() -> None:
@@ -161,7 +161,7 @@ def test_a_long_one_is_stepped_by_its_rates() -> None:
 
 def test_functions_of_a_module_and_math_are_traced() -> None:
     """``network`` calls a function of its module, which calls ``math.sqrt``."""
-    made = run(
+    motion = run(
         own.network(weights=np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])),
         y=[0.1, 0.2, 0.3],
         method="standard_euler",
@@ -170,12 +170,12 @@ def test_functions_of_a_module_and_math_are_traced() -> None:
     )
     y = np.array([0.1, 0.2, 0.3])
     x = np.roll(y, -1)
-    np.testing.assert_allclose(made.y[-1], y + 0.05 * (x / np.sqrt(1 + x * x) - y), rtol=1e-14)
+    np.testing.assert_allclose(motion.y[-1], y + 0.05 * (x / np.sqrt(1 + x * x) - y), rtol=1e-14)
 
 
 def test_scipys_functions_are_taken_as_they_are() -> None:
-    made = sw.integrate(own.scipys(), "dop853", y=[0.0, 1.0], tolerance=1e-12, at=[1.0])
-    np.testing.assert_allclose(made.y[-1], [math.sin(1.0), math.cos(1.0)], rtol=1e-10)
+    motion = sw.integrate(own.scipys(), "dop853", y=[0.0, 1.0], tolerance=1e-12, at=[1.0])
+    np.testing.assert_allclose(motion.y[-1], [math.sin(1.0), math.cos(1.0)], rtol=1e-10)
 
 
 # ---- NumPy's functions
@@ -225,16 +225,16 @@ def test_a_function_means_what_it_means_in_numpy(name: str) -> None:
         return function(y)
 
     y = np.array([0.5, -0.25, 0.125])
-    made = run(rates(), "standard_euler", y=y, dt=1.0, steps=1, every=None).y[-1]
-    np.testing.assert_allclose(made, y + function(y), rtol=4e-16, atol=4e-16)
+    last = run(rates(), "standard_euler", y=y, dt=1.0, steps=1, every=None).y[-1]
+    np.testing.assert_allclose(last, y + function(y), rtol=4e-16, atol=4e-16)
 
 
 # ---- what cannot be
 
 
-def refused(function: Any, **given: Any) -> str:
+def refused(function: Any, **options: Any) -> str:
     with pytest.raises(ArgumentError) as raised:
-        sw.integrate(sw.system(function)(), "rk4", **{"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1, **given})
+        sw.integrate(sw.system(function)(), "rk4", **{"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1, **options})
     text = str(raised.value)
     assert function.__name__ in text
     return text
@@ -363,9 +363,9 @@ def test_what_is_wrong_with_parameters() -> None:
 
 def lambda_of(name: str, arguments: str) -> Any:
     """A function with these arguments."""
-    made: dict[str, Any] = {}
-    exec(f"def {name}({arguments}):\n    return -y", made)
-    return made[name]
+    namespace: dict[str, Any] = {}
+    exec(f"def {name}({arguments}):\n    return -y", namespace)
+    return namespace[name]
 
 
 def test_a_bare_function_is_to_be_wrapped() -> None:

@@ -14,17 +14,17 @@ EPS = np.finfo(float).eps
 
 
 def test_the_pendulum_hangs_or_stands() -> None:
-    found = sw.equilibria(sw.Pendulum(2.0), near=(0.0, [0.3, 3.0, -0.2, 9.0]), method="rk4", dt=0.1)
-    assert [each.starts for each in found] == [(0, 2), (1,), (3,)]
-    below, above, beyond = found
+    equilibria = sw.equilibria(sw.Pendulum(2.0), near=(0.0, [0.3, 3.0, -0.2, 9.0]), method="rk4", dt=0.1)
+    assert [each.starts for each in equilibria] == [(0, 2), (1,), (3,)]
+    below, above, beyond = equilibria
     # The sine near kπ is right to 10⁻²⁰ but its argument to half an eps of kπ, which is what Newton's method can find.
-    for each, true in zip(found, (0.0, np.pi, 3 * np.pi), strict=True):
+    for each, true in zip(equilibria, (0.0, np.pi, 3 * np.pi), strict=True):
         assert abs(each.y - true) <= EPS * true
         assert each.v == 0.0
         assert each.isolated
         assert each.residual <= 4.0 * 4 * EPS * max(true, 1.0)
-    assert [each.kind for each in found] == ["centre", "saddle", "saddle"]
-    assert [each.stable for each in found] == [None, False, False]
+    assert [each.kind for each in equilibria] == ["centre", "saddle", "saddle"]
+    assert [each.stable for each in equilibria] == [None, False, False]
     np.testing.assert_allclose(below.eigenvalues, [2j, -2j], rtol=4 * EPS)
     np.testing.assert_allclose(above.eigenvalues, [2.0, -2.0], rtol=4 * EPS)
     # A step of RK4 turns a mode λ by 1 + λh + … + (λh)⁴/24.
@@ -39,10 +39,10 @@ def test_the_pendulum_hangs_or_stands() -> None:
     ("damping", "kinds"), [(0.1, ["sink", "saddle"]), (3.0, ["sink", "saddle"]), (-0.1, ["source", "saddle"])]
 )
 def test_damping_decides(damping: float, kinds: list[str]) -> None:
-    found = sw.equilibria(sw.Pendulum(1.0, damping), near=(0.1, [0.3, 3.0]))
-    assert [each.kind for each in found] == kinds
+    equilibria = sw.equilibria(sw.Pendulum(1.0, damping), near=(0.1, [0.3, 3.0]))
+    assert [each.kind for each in equilibria] == kinds
     # λ² + 2Dλ ± 1 = 0
-    for each, sign in zip(found, (1.0, -1.0), strict=True):
+    for each, sign in zip(equilibria, (1.0, -1.0), strict=True):
         root = np.sqrt(complex(damping**2 - sign))
         true = np.sort_complex([-damping + root, -damping - root])
         np.testing.assert_allclose(np.sort_complex(each.eigenvalues), true, rtol=0, atol=16 * EPS * (1 + damping) ** 2)
@@ -59,14 +59,14 @@ def quintics(mu: float) -> list[float]:
         [1, 3 - mu, 3 - 2 * mu, -mu, -2 * mu, -mu],
         [1, 2 + mu, 1 + 2 * mu, -(1 - mu), -2 * (1 - mu), -(1 - mu)],
     ]
-    found = []
+    roots = []
     for coefficients in polynomials:
         low, high = 0.0, 1.0 if coefficients is polynomials[0] else 2.0
         for _ in range(100):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if np.polyval(coefficients, middle) < 0 else (low, middle)
-        found.append(low)
-    return [1 - mu - found[0], 1 - mu + found[1], -mu - found[2]]
+        roots.append(low)
+    return [1 - mu - roots[0], 1 - mu + roots[1], -mu - roots[2]]
 
 
 @pytest.mark.parametrize("mu", [0.012277471, 0.2, 3e-6])
@@ -74,77 +74,81 @@ def test_the_five_points_of_lagrange(mu: float) -> None:
     hill = (mu / 3) ** (1 / 3)
     x = [1 - mu - hill, 1 - mu + hill, -1.0, 0.5, 0.5]
     y = [0.0, 0.0, 0.0, 0.8, -0.8]
-    found = sw.equilibria(sw.RestrictedThreeBody(mu), near=(np.zeros((2, 5)), np.array([x, y])))
-    assert found.lost == ()
+    equilibria = sw.equilibria(sw.RestrictedThreeBody(mu), near=(np.zeros((2, 5)), np.array([x, y])))
+    assert equilibria.lost == ()
     true = [*((each, 0.0) for each in quintics(mu)), (0.5 - mu, np.sqrt(0.75)), (0.5 - mu, -np.sqrt(0.75))]
     # Forces of size 1/γ² are right to some ten eps of themselves, γ the distance to the light body, and grow at least as fast as
     # the distance: the point is right to 10·eps/γ² over a slope of 1 at least. Of L4 and L5 the slope along the circle is as
     # small as 27μ/4. The quintic's own root is as uncertain, its values being sums of numbers up to 3. As ẏ = v, rounding leaves
     # some eps of the last step in v, which was below 10⁻⁷.
-    for each, place in zip(found, true, strict=True):
+    for each, place in zip(equilibria, true, strict=True):
         gamma = min(1.0, np.hypot(place[0] - 1 + mu, place[1]))
         slope = min(1.0, 27 * mu / 4) if place[1] or place[0] < 0 else 1.0
         np.testing.assert_allclose(each.y, place, rtol=0, atol=100 * EPS / gamma**2 / slope)
         np.testing.assert_allclose(each.v, 0.0, rtol=0, atol=EPS * 1e-7)
     # Gascheau and Routh: L4 and L5 are centres if 27μ(1 − μ) < 1.
     of_triangle = "centre" if 27 * mu * (1 - mu) < 1 else "saddle"
-    assert [each.kind for each in found] == ["saddle"] * 3 + [of_triangle] * 2
+    assert [each.kind for each in equilibria] == ["saddle"] * 3 + [of_triangle] * 2
     # Their eigenvalues: λ⁴ + λ² + 27μ(1 − μ)/4 = 0.
-    for each in found[3], found[4]:
+    for each in equilibria[3], equilibria[4]:
         left = each.eigenvalues**4 + each.eigenvalues**2 + 27 * mu * (1 - mu) / 4
         np.testing.assert_allclose(np.abs(left), 0.0, atol=200 * EPS)
 
 
 def test_a_wrong_quintic_would_be_seen() -> None:
     mu = 0.012277471
-    found = sw.equilibria(sw.RestrictedThreeBody(mu), near=(np.zeros(2), np.array([0.8, 0.0])))[0]
-    assert abs(found.y[0] - quintics(mu * (1 + 1e-9))[0]) > 100 * EPS / 0.15**2
+    equilibrium = sw.equilibria(sw.RestrictedThreeBody(mu), near=(np.zeros(2), np.array([0.8, 0.0])))[0]
+    assert abs(equilibrium.y[0] - quintics(mu * (1 + 1e-9))[0]) > 100 * EPS / 0.15**2
 
 
 def test_a_linear_system_is_solved_at_once() -> None:
     A = np.array([[-1.0, 2.0, 0.0], [0.0, -3.0, 1.0], [1.0, 0.0, -2.0]])
     system = sw.LinearSystem(A, [[1.0], [2.0], [3.0]], x=[2.0], velocities=1)
-    (found,) = sw.equilibria(system, near=(np.full(1, 7.0), np.full(2, -5.0)), method="rk4", dt=0.1)
+    (equilibrium,) = sw.equilibria(system, near=(np.full(1, 7.0), np.full(2, -5.0)), method="rk4", dt=0.1)
     true = np.linalg.solve(A, [-2.0, -4.0, -6.0])
-    np.testing.assert_allclose([*found.v, *found.y], true, rtol=0, atol=40 * EPS * np.abs(true).max() * np.linalg.cond(A))
-    np.testing.assert_allclose(np.sort_complex(found.eigenvalues), np.sort_complex(np.linalg.eigvals(A)), rtol=0, atol=1e-14)
-    assert found.kind == "sink"
-    assert found.stable
-    assert found.analysis.stable
+    np.testing.assert_allclose(
+        [*equilibrium.v, *equilibrium.y], true, rtol=0, atol=40 * EPS * np.abs(true).max() * np.linalg.cond(A)
+    )
+    np.testing.assert_allclose(
+        np.sort_complex(equilibrium.eigenvalues), np.sort_complex(np.linalg.eigvals(A)), rtol=0, atol=1e-14
+    )
+    assert equilibrium.kind == "sink"
+    assert equilibrium.stable
+    assert equilibrium.analysis.stable
 
 
 def test_bodies_that_part_have_no_equilibrium() -> None:
     """Their forces fade, so a residual alone would call far enough an equilibrium."""
     for force in ("logarithmic", "newton"):
-        found = sw.equilibria(sw.NBody([1.0, 2.0], force=force), near=(np.zeros((2, 2)), np.array([[1.0, 0.0], [0.0, 1.0]])))
-        assert len(found) == 0
-        assert found.lost == (0,)
+        equilibria = sw.equilibria(sw.NBody([1.0, 2.0], force=force), near=(np.zeros((2, 2)), np.array([[1.0, 0.0], [0.0, 1.0]])))
+        assert len(equilibria) == 0
+        assert equilibria.lost == (0,)
 
 
 def test_a_line_of_equilibria_is_not_isolated() -> None:
     """A mass that nothing holds stays anywhere."""
-    (found,) = sw.equilibria(sw.LinearSystem([[0.0, 0.0], [1.0, 0.0]]), near=(np.array([1.0]), np.array([5.0])))
-    assert found.y == 5.0
-    assert found.v == 0.0
-    assert not found.isolated
-    assert found.kind == "undecided to first order"
-    assert found.stable is None
+    (equilibrium,) = sw.equilibria(sw.LinearSystem([[0.0, 0.0], [1.0, 0.0]]), near=(np.array([1.0]), np.array([5.0])))
+    assert equilibrium.y == 5.0
+    assert equilibrium.v == 0.0
+    assert not equilibrium.isolated
+    assert equilibrium.kind == "undecided to first order"
+    assert equilibrium.stable is None
 
 
 def test_units_do_not_matter() -> None:
     """A pendulum in years: rates of 10⁸ beside velocities, and the same two places."""
-    found = sw.equilibria(sw.Pendulum(3e8), near=(1e8, [0.3, 3.0]))
-    assert [each.kind for each in found] == ["centre", "saddle"]
-    assert found[0].v == found[1].v == 0.0
+    equilibria = sw.equilibria(sw.Pendulum(3e8), near=(1e8, [0.3, 3.0]))
+    assert [each.kind for each in equilibria] == ["centre", "saddle"]
+    assert equilibria[0].v == equilibria[1].v == 0.0
 
 
 def test_many_starts_are_found_once() -> None:
     starts = np.linspace(-4.0, 4.0, 60).reshape(3, 20)
-    found = sw.equilibria(sw.Pendulum(), near=(np.zeros(20), starts))
-    places = np.array([each.y for each in found])
-    assert len(np.unique(np.round(places / np.pi))) == len(found)
+    equilibria = sw.equilibria(sw.Pendulum(), near=(np.zeros(20), starts))
+    places = np.array([each.y for each in equilibria])
+    assert len(np.unique(np.round(places / np.pi))) == len(equilibria)
     np.testing.assert_allclose(np.sin(places), 0.0, atol=EPS * (1 + np.abs(places).max()))
-    assert sum(len(each.starts) for each in found) + len(found.lost) == 60
+    assert sum(len(each.starts) for each in equilibria) + len(equilibria.lost) == 60
 
 
 @pytest.mark.parametrize(
@@ -194,10 +198,10 @@ def test_a_multiple_root_is_undecided_from_every_side(p: int, at: float) -> None
     """
     size = abs(at) or 1.0
     for start in (at + 0.5 * size, at - 0.5 * size, at + 1e-3 * size):
-        found = sw.equilibria(definition(p, at)(), near=(None, np.array(start)))
-        assert [each.kind for each in found] == ["undecided to first order"]
-        assert not found[0].isolated
-        assert found[0].stable is None
+        equilibria = sw.equilibria(definition(p, at)(), near=(None, np.array(start)))
+        assert [each.kind for each in equilibria] == ["undecided to first order"]
+        assert not equilibria[0].isolated
+        assert equilibria[0].stable is None
 
 
 def definition(p: int, at: float) -> Any:
@@ -218,9 +222,9 @@ def test_a_double_root_that_rounding_hides_is_undecided(start: float) -> None:
 
 def test_roots_that_are_apart_are_decided() -> None:
     """A ten-thousandth apart, with eigenvalues of ∓1e-4; and a slow rate of 1e-7 beside one of 1."""
-    found = sw.equilibria(apart(), near=(None, np.array([0.9, 1.2])))
-    assert [each.kind for each in found] == ["sink", "source"]
-    assert all(each.isolated for each in found)
+    equilibria = sw.equilibria(apart(), near=(None, np.array([0.9, 1.2])))
+    assert [each.kind for each in equilibria] == ["sink", "source"]
+    assert all(each.isolated for each in equilibria)
     (slow,) = sw.equilibria(sw.LinearSystem([[-1e-7, 0.0], [1.0, -1.0]], velocities=0), near=(None, np.ones(2)))
     assert slow.kind == "sink"
 
@@ -228,9 +232,9 @@ def test_roots_that_are_apart_are_decided() -> None:
 @pytest.mark.parametrize("n", [2, 3, 6])
 def test_what_nothing_holds_is_undecided(n: int) -> None:
     """Its double eigenvalue zero comes out of rounding as ±1e-8."""
-    (found,) = sw.equilibria(floating(k=3.7), near=(np.zeros(n), np.arange(n) + 0.1))
-    assert found.kind == "undecided to first order"
-    assert not found.isolated
+    (equilibrium,) = sw.equilibria(floating(k=3.7), near=(np.zeros(n), np.arange(n) + 0.1))
+    assert equilibrium.kind == "undecided to first order"
+    assert not equilibrium.isolated
 
 
 #: Roots of several multiplicities, written as a product and as a sum whose roundings hide the place: the p-th root of ε from it.
@@ -248,10 +252,10 @@ MULTIPLE: list[Any] = [
 @pytest.mark.parametrize(("rate", "root", "starts"), MULTIPLE)
 def test_a_multiple_root_is_one_equilibrium(rate: Any, root: float, starts: list[float]) -> None:
     """From every start, and first order does not decide it; the place is known to ε^(1/4), 1.2·10⁻⁴, at worst."""
-    found = sw.equilibria(sw.system(order=1)(rate)(), near=(None, np.array(starts)))
-    assert [each.starts for each in found] == [tuple(range(len(starts)))]
-    assert found[0].kind == "undecided to first order"
-    assert abs(float(found[0].y) - root) <= 2.0 * (2.0**-52) ** 0.25 * max(root, 1e-6)
+    equilibria = sw.equilibria(sw.system(order=1)(rate)(), near=(None, np.array(starts)))
+    assert [each.starts for each in equilibria] == [tuple(range(len(starts)))]
+    assert equilibria[0].kind == "undecided to first order"
+    assert abs(float(equilibria[0].y) - root) <= 2.0 * (2.0**-52) ** 0.25 * max(root, 1e-6)
 
 
 def test_a_multiple_root_across_the_axes() -> None:
@@ -275,14 +279,14 @@ def test_a_multiple_root_across_the_axes() -> None:
     ],
 )
 def test_near_roots_stay_apart(rate: Any, roots: list[float], starts: list[float]) -> None:
-    found = sw.equilibria(sw.system(order=1)(rate)(), near=(None, np.array(starts)))
+    equilibria = sw.equilibria(sw.system(order=1)(rate)(), near=(None, np.array(starts)))
     # Rates are right to some roundings of their terms, and change by 1e-6 of these, so places to some 1e-9.
-    np.testing.assert_allclose([float(each.y) for each in found], roots, rtol=1e-9, atol=1e-22)
-    assert "undecided to first order" not in {each.kind for each in found}
+    np.testing.assert_allclose([float(each.y) for each in equilibria], roots, rtol=1e-9, atol=1e-22)
+    assert "undecided to first order" not in {each.kind for each in equilibria}
 
 
 @pytest.mark.parametrize("least", [1.0, 1e-12])
 def test_an_extreme_of_a_rate_is_no_equilibrium(least: float) -> None:
     """There Newton's step is zero, but the rate is not."""
-    found = sw.equilibria(sw.system(order=1)(lambda t, y: (y - 1.0) ** 2 + least)(), near=(None, np.array([1.0])))
-    assert (len(found), found.lost) == (0, (0,))
+    equilibria = sw.equilibria(sw.system(order=1)(lambda t, y: (y - 1.0) ** 2 + least)(), near=(None, np.array([1.0])))
+    assert (len(equilibria), equilibria.lost) == (0, (0,))

@@ -461,7 +461,7 @@ def test_numbers_in_other_clothes() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PendingDeprecationWarning)
         matrix = np.asmatrix(plain)
-    for given in (
+    for numbers in (
         shifted,
         plain.astype(">f8"),
         plain[::-1].copy()[::-1],
@@ -475,7 +475,7 @@ def test_numbers_in_other_clothes() -> None:
         np.ma.masked_array(plain, False),
         range(1, 4),
     ):
-        np.testing.assert_array_equal(run(sw.Oscillator(given), y=given).y, want)
+        np.testing.assert_array_equal(run(sw.Oscillator(numbers), y=numbers).y, want)
     assert run(y=matrix).y.shape == (1, 1, 3)
     np.testing.assert_array_equal(run(y=2**70).y, run(y=2.0**70).y)
 
@@ -520,8 +520,8 @@ def test_the_core_refuses_too() -> None:
     one, system = np.ones((1, 1)), sw.Oscillator()
     free: dict[str, Any] = {"form": "canonical", "omega": one}
 
-    def core(kernel: str = "oscillator", method: str = "rk4", given: dict[str, Any] = free, **arrays: Any) -> None:
-        model = _core.ModelSpec(kernel, method, list(given.items()))
+    def core(kernel: str = "oscillator", method: str = "rk4", parameters: dict[str, Any] = free, **arrays: Any) -> None:
+        model = _core.ModelSpec(kernel, method, list(parameters.items()))
         plan = engine.Plan(system, sw.method("rk4"), (4,), 0.1, threads=1)
         blocks: dict[str, Any] = {"v": np.zeros((1, 4)), "y": np.zeros((1, 1))}
         blocks |= {"saved_v": np.zeros((1, 1, 4)), "saved_y": np.zeros((1, 1, 4)), "first_bad": np.full(4, -1)}
@@ -529,22 +529,22 @@ def test_the_core_refuses_too() -> None:
         _core.run(model, plan, engine.Arrays(carried=False, **(blocks | none | arrays)))
 
     core()
-    linear: dict[str, Any] = {"kernel": "linear", "given": {"kind": "", "n_v": 1, "rows": np.ones((4, 1)), "inputs": 0}}
+    linear: dict[str, Any] = {"kernel": "linear", "parameters": {"kind": "", "n_v": 1, "rows": np.ones((4, 1)), "inputs": 0}}
     for options, text in (
         ({"kernel": "oscilator"}, 'there is no system "oscilator"'),
         ({"method": "rk5"}, 'there is no method "rk5"'),
-        ({"given": free | {"form": "round"}}, "has no kernel for the options"),
+        ({"parameters": free | {"form": "round"}}, "has no kernel for the options"),
         (
-            {"given": free | {"damping": one}, "method": "verlet"},
+            {"parameters": free | {"damping": one}, "method": "verlet"},
             "verlet needs forces that do not depend on the velocity, but oscillator has damping",
         ),
-        ({"given": {"form": "canonical"}}, "omega: expected 1, got 0"),
-        ({"given": free | {"omega": np.ones((2, 1))}}, "omega: expected 1, got 2"),
-        ({"given": free | {"control": "energy"}}, "has no kernel for the options"),
-        ({"kernel": "chain", "given": {"stiffness": one, "mass": one}}, "stiffness: expected 2, got 1"),
-        (linear | {"given": linear["given"] | {"kind": "noise"}}, "has no kernel for the options"),
-        (linear | {"given": linear["given"] | {"rows": one}}, "y: expected 0, got 1"),
-        (linear | {"given": linear["given"] | {"inputs": 1}}, "inputs: expected 1, got 0"),
+        ({"parameters": {"form": "canonical"}}, "omega: expected 1, got 0"),
+        ({"parameters": free | {"omega": np.ones((2, 1))}}, "omega: expected 1, got 2"),
+        ({"parameters": free | {"control": "energy"}}, "has no kernel for the options"),
+        ({"kernel": "chain", "parameters": {"stiffness": one, "mass": one}}, "stiffness: expected 2, got 1"),
+        (linear | {"parameters": linear["parameters"] | {"kind": "noise"}}, "has no kernel for the options"),
+        (linear | {"parameters": linear["parameters"] | {"rows": one}}, "y: expected 0, got 1"),
+        (linear | {"parameters": linear["parameters"] | {"inputs": 1}}, "inputs: expected 1, got 0"),
         (
             linear | {"method": "verlet"},
             "verlet needs forces that do not depend on the velocity, but linear has rates of another kind",
@@ -555,7 +555,7 @@ def test_the_core_refuses_too() -> None:
         ({"saved_y": np.zeros((3, 1, 4))}, "saved_y: expected 4, got 12"),
         ({"recorded": np.zeros((1, 1, 4))}, "recorded: expected 0, got 4"),
         ({"tally": np.zeros(3)}, "tally: expected 0, got 3"),
-        ({"given": free | {"omega": np.ones((1, 3))}}, "a parameter: expected 4, got 3"),
+        ({"parameters": free | {"omega": np.ones((1, 3))}}, "a parameter: expected 4, got 3"),
     ):
         with pytest.raises(ValueError, match=re.escape(text)):
             core(**options)

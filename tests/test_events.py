@@ -70,9 +70,9 @@ def test_a_trial_of_float32_of_the_whole_length_is_the_step(case: Case) -> None:
     )
     index = np.array([3, 0, 0, 4])
     v, y = (arguments[name].astype(np.float32).astype(np.float64) for name in ("v", "y"))
-    made = Trials(plan, Members(plan)).step(index, np.zeros(4), np.full(4, dt), v[..., index], y[..., index])
+    trials = Trials(plan, Members(plan)).step(index, np.zeros(4), np.full(4, dt), v[..., index], y[..., index])
     out = engine.advance(plan, v, y)
-    for trial, step in zip(made, (out.v[-1], out.y[-1]), strict=True):
+    for trial, step in zip(trials, (out.v[-1], out.y[-1]), strict=True):
         np.testing.assert_array_equal(trial, step[..., index])
 
 
@@ -113,8 +113,8 @@ THREE = [
 
 
 def sweep(members: Any = slice(None), method: str = "rk4", **options: Any) -> sw.Run:
-    given = SWEEP | {"v": SWEEP["v"][members], "every": 7} | options
-    return sw.integrate(sw.Pendulum(np.linspace(0.5, 2.0, 40)[members]), method, events=THREE, **given)
+    arguments = SWEEP | {"v": SWEEP["v"][members], "every": 7} | options
+    return sw.integrate(sw.Pendulum(np.linspace(0.5, 2.0, 40)[members]), method, events=THREE, **arguments)
 
 
 def test_the_sweep_has_something_of_everything() -> None:
@@ -173,7 +173,7 @@ def test_mistake_the_core_notices_another_quantity_is_noticed(monkeypatch: pytes
     """So the core's part is not idle: of a quantity that never changes its sign it notices nothing within some steps. At their
     end the quantity itself is looked at, which finds more; here it does not.
     """
-    found = sweep(every=None)
+    run = sweep(every=None)
     monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
     right = driver.watched
     never = sw.Event(lambda t, v, y: y * y + 1.0)
@@ -183,7 +183,7 @@ def test_mistake_the_core_notices_another_quantity_is_noticed(monkeypatch: pytes
         return right([Quantity(never, plan.system, {}) for _ in quantities], plan)
 
     monkeypatch.setattr(driver, "watched", wrong)
-    assert sweep(every=None).events["crossing"].count.sum() < found.events["crossing"].count.sum()
+    assert sweep(every=None).events["crossing"].count.sum() < run.events["crossing"].count.sum()
 
 
 def test_a_system_whose_step_is_too_long_for_one_tape(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,12 +209,12 @@ def test_threads_do_not_matter(dtype: str) -> None:
 
 def test_neither_threads_nor_the_batch_matter_where_the_core_notices() -> None:
     """A hundred members are enough for that; one alone is not, and all of its states are looked at."""
-    omega, given = np.linspace(0.5, 2.0, 100), {"v": 0.1, "y": 1.0, "dt": 0.1, "steps": 300}
-    one, two = (sw.integrate(sw.Pendulum(omega), "rk4", **given, events=THREE, threads=threads) for threads in (1, 2))
+    omega, arguments = np.linspace(0.5, 2.0, 100), {"v": 0.1, "y": 1.0, "dt": 0.1, "steps": 300}
+    one, two = (sw.integrate(sw.Pendulum(omega), "rk4", **arguments, events=THREE, threads=threads) for threads in (1, 2))
     assert_same(one, two)
     assert_same_events(one, two)
     for i in (0, 63, 99):
-        alone = sw.integrate(sw.Pendulum(omega[i]), "rk4", **given, events=THREE)
+        alone = sw.integrate(sw.Pendulum(omega[i]), "rk4", **arguments, events=THREE)
         for name, mine in alone.events.items():
             np.testing.assert_array_equal(mine.t, one.events[name].of(i).t)
             np.testing.assert_array_equal(mine.y, one.events[name].of(i).y)
@@ -224,17 +224,17 @@ def test_batch_axes_and_parameters_of_all_shapes() -> None:
     omega, damping = np.linspace(0.5, 2.0, 6).reshape(3, 2), np.array([0.0, 0.2])
     event = sw.Event(lambda t, v, y, omega, damping: y - 0.1 * omega - damping, name="zero")
     run = sw.integrate(sw.Pendulum(omega, damping), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, events=event)
-    found = run.events["zero"]
-    assert found.count.shape == (3, 2)
+    zeros = run.events["zero"]
+    assert zeros.count.shape == (3, 2)
     for i, j in np.ndindex(3, 2):
         alone = sw.integrate(sw.Pendulum(omega[i, j], damping[j]), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, events=event)
-        np.testing.assert_array_equal(alone.events["zero"].t, found.of((i, j)).t)
-        np.testing.assert_array_equal(alone.events["zero"].y, found.of((i, j)).y)
-    assert len(found.of((-1, -1)).t) == found.count[-1, -1]
+        np.testing.assert_array_equal(alone.events["zero"].t, zeros.of((i, j)).t)
+        np.testing.assert_array_equal(alone.events["zero"].y, zeros.of((i, j)).y)
+    assert len(zeros.of((-1, -1)).t) == zeros.count[-1, -1]
     with pytest.raises(sw.errors.ArgumentError, match="index: expected 2 whole"):
-        found.of(1)
+        zeros.of(1)
     with pytest.raises(sw.errors.ArgumentError, match="index: expected -2"):
-        found.of((0, 2))
+        zeros.of((0, 2))
 
 
 @DTYPES
@@ -252,10 +252,10 @@ def test_pieces_find_what_the_whole_finds(method: str, dtype: str) -> None:
 
 def test_a_member_that_stopped_stays_where_it_was_and_cannot_go_on() -> None:
     run = sweep(every=1)
-    found = run.events["end"]
+    ends = run.events["end"]
     assert run.stopped_at is not None
     for i in np.flatnonzero(run.status == sw.Status.EVENT).tolist():
-        end = found.of(i)
+        end = ends.of(i)
         assert end.count == len(end.t) == 1
         assert run.stopped_at[i] == end.t[0]
         k = int(end.step[0])
@@ -291,14 +291,14 @@ def test_what_comes_after_a_terminal_event_in_its_step_is_not_there() -> None:
 
 
 def test_directions() -> None:
-    def found(direction: int) -> Any:
+    def zeros(direction: int) -> Any:
         event = sw.Event(lambda t, v, y: y, direction=direction, name="zero")
         return sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=200, events=event).events["zero"]
 
-    assert (found(-1).v < 0).all()
-    assert (found(1).v > 0).all()
-    np.testing.assert_array_equal(np.sort(np.concatenate([found(-1).t, found(1).t])), found(0).t)
-    assert len(found(0).t) == 6  # zeros of the cosine up to t = 20
+    assert (zeros(-1).v < 0).all()
+    assert (zeros(1).v > 0).all()
+    np.testing.assert_array_equal(np.sort(np.concatenate([zeros(-1).t, zeros(1).t])), zeros(0).t)
+    assert len(zeros(0).t) == 6  # zeros of the cosine up to t = 20
 
 
 def test_a_state_at_zero_counts_once_and_not_at_the_start() -> None:
@@ -347,12 +347,12 @@ def test_with_other_options(options: dict[str, Any]) -> None:
 
 
 def test_progress_is_told_up_to_the_end() -> None:
-    told: list[float] = []
-    plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=1000, progress=told.append)
+    shares: list[float] = []
+    plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=1000, progress=shares.append)
     run = driver.Run([sw.Event(crossing)], np.array(0.0), np.array(1.0), None, False)
     run.advance(plan)
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
 
 
 def test_results_are_values() -> None:

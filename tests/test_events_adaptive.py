@@ -52,19 +52,25 @@ def goes(system: sw.System, method: sw.Method) -> bool:
 )
 @pytest.mark.filterwarnings("ignore::stepwell.ToleranceWarning")
 def test_steps_are_those_of_a_run_without_and_both_backends_agree(name: str, method: str) -> None:
-    rng, how = np.random.default_rng(5), sw.method(method)
+    rng, record = np.random.default_rng(5), sw.method(method)
     system = SYSTEMS[name](rng, 3).uncontrolled
-    if not goes(system, how):
+    if not goes(system, record):
         return
     v, y = 0.3 * rng.normal(size=(*system.v_shape, 3)), rng.normal(size=(*system.y_shape, 3))
-    if how.has_series and system.constraint == "length":
+    if record.has_series and system.constraint == "length":
         v = 0.0 * v
     start = float((y if y.size else v).ravel()[0])
     if system.v_shape == (0,):
         event = sw.Event(lambda t, y: first(y) - start - 0.01 * t + 1e-4, name="passage")
     else:
         event = sw.Event(lambda t, v, y: first(v, y) - start - 0.01 * t + 1e-4, name="passage")
-    ask: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-4, "at": [0.0, 0.05, 0.2], "max_steps": 10 if how.has_series else 20}
+    ask: dict[str, Any] = {
+        "v": v,
+        "y": y,
+        "tolerance": 1e-4,
+        "at": [0.0, 0.05, 0.2],
+        "max_steps": 10 if record.has_series else 20,
+    }
     plain = sw.integrate(system, method, **ask)
     run = sw.integrate(system, method, **ask, events=event)
     same(plain, run)
@@ -128,12 +134,12 @@ def test_a_member_alone_is_the_same_as_in_a_batch_and_by_the_reference(method: s
 
 
 def test_neither_threads_nor_other_members_matter_in_a_large_batch() -> None:
-    omega, given = np.linspace(0.5, 2.0, 600), {"v": 0.1, "y": 1.0, "tolerance": 1e-5, "at": [12.0]}
-    one, two = (sw.integrate(sw.Pendulum(omega), "merson", **given, events=THREE, threads=threads) for threads in (1, 2))
+    omega, arguments = np.linspace(0.5, 2.0, 600), {"v": 0.1, "y": 1.0, "tolerance": 1e-5, "at": [12.0]}
+    one, two = (sw.integrate(sw.Pendulum(omega), "merson", **arguments, events=THREE, threads=threads) for threads in (1, 2))
     same(one, two)
     assert_same_events(one, two)
     for i in (0, 63, 299, 300, 599):
-        alone = sw.integrate(sw.Pendulum(omega[i]), "merson", **given, events=THREE)
+        alone = sw.integrate(sw.Pendulum(omega[i]), "merson", **arguments, events=THREE)
         for name, mine in alone.events.items():
             np.testing.assert_array_equal(mine.t, one.events[name].of(i).t)
             np.testing.assert_array_equal(mine.y, one.events[name].of(i).y)
@@ -183,16 +189,16 @@ def test_runs_that_end_early_have_the_events_up_to_there(method: str) -> None:
 
 
 def test_directions_and_how_many_are_kept() -> None:
-    def found(**options: Any) -> Any:
+    def zeros(**options: Any) -> Any:
         event = sw.Event(lambda t, v, y: y, name="zero", **options)
         return sw.integrate(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-9, at=[20.0], events=event).events["zero"]
 
-    assert (found(direction=-1).v < 0).all()
-    assert (found(direction=1).v > 0).all()
-    np.testing.assert_array_equal(np.sort(np.concatenate([found(direction=-1).t, found(direction=1).t])), found().t)
-    assert len(found().t) == 6  # zeros of the cosine up to t = 20
-    assert found(most=2).count == 6
-    np.testing.assert_array_equal(found(most=2).t, found().t[:2])
+    assert (zeros(direction=-1).v < 0).all()
+    assert (zeros(direction=1).v > 0).all()
+    np.testing.assert_array_equal(np.sort(np.concatenate([zeros(direction=-1).t, zeros(direction=1).t])), zeros().t)
+    assert len(zeros().t) == 6  # zeros of the cosine up to t = 20
+    assert zeros(most=2).count == 6
+    np.testing.assert_array_equal(zeros(most=2).t, zeros().t[:2])
 
 
 def test_the_ends_of_a_run() -> None:
@@ -210,20 +216,20 @@ def test_batch_axes_and_a_tolerance_for_each() -> None:
 
 
 def test_progress_and_values(tmp_path: Path) -> None:
-    told: list[float] = []
-    plan = engine.Plan(sw.Pendulum(), sw.method("merson"), (), 1.0, progress=told.append)
+    shares: list[float] = []
+    plan = engine.Plan(sw.Pendulum(), sw.method("merson"), (), 1.0, progress=shares.append)
     run = adaptive.AdaptiveRun([sw.Event(crossing)])
     paces = engine.paces(plan, None, engine.Tolerances(np.array(1e-9), None))
     run.adapt(plan, engine.Pacing(np.array([100.0]), 10**6, True), paces, np.array(0.0), np.array(1.0))
-    assert told == sorted(told)
-    assert len(told) > 3
-    assert told[-1] == 1.0
-    made = sweep()
-    assert pickle.loads(pickle.dumps(made.events)) == made.events == copy.deepcopy(made.events)
-    made.save(tmp_path / "run.npz")
+    assert shares == sorted(shares)
+    assert len(shares) > 3
+    assert shares[-1] == 1.0
+    swept = sweep()
+    assert pickle.loads(pickle.dumps(swept.events)) == swept.events == copy.deepcopy(swept.events)
+    swept.save(tmp_path / "run.npz")
     back = sw.load(tmp_path / "run.npz")
-    assert back == made
-    assert_same_events(back, made)
+    assert back == swept
+    assert_same_events(back, swept)
 
 
 def test_what_does_not_go() -> None:

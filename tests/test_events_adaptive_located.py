@@ -121,14 +121,14 @@ def test_mistake_the_length_of_another_step_is_noticed(method: str, monkeypatch:
 @pytest.mark.mutant
 def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     class Wrong(adaptive._Driver):
-        def __init__(self, *given: Any) -> None:
-            super().__init__(*given)
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments)
             self.far = self.end
 
-        def _look(self, *given: Any) -> Any:
+        def _look(self, *arguments: Any) -> Any:
             self.end = np.full_like(self.far, np.inf)
             try:
-                return super()._look(*given)
+                return super()._look(*arguments)
             finally:
                 self.end = self.far
 
@@ -140,7 +140,7 @@ def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyP
 @pytest.mark.mutant
 def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     look = adaptive._Driver._look
-    monkeypatch.setattr(adaptive._Driver, "_look", lambda self, *given: look(self, *given[:-1], False))
+    monkeypatch.setattr(adaptive._Driver, "_look", lambda self, *arguments: look(self, *arguments[:-1], False))
     with pytest.raises(AssertionError):
         bits.check_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter("merson", False)
 
@@ -149,9 +149,9 @@ def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.Monke
 def test_mistake_attempts_after_the_end_of_a_member_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right = adaptive._Driver.stepped
 
-    def wrong(self: Any, *given: Any) -> Any:
+    def wrong(self: Any, *arguments: Any) -> Any:
         self.attempts += 1e6
-        return right(self, *given)
+        return right(self, *arguments)
 
     monkeypatch.setattr(adaptive._Driver, "stepped", wrong)
     with pytest.raises(AssertionError):
@@ -162,9 +162,9 @@ def test_mistake_attempts_after_the_end_of_a_member_are_noticed(monkeypatch: pyt
 def test_mistake_one_attempt_too_few_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right = adaptive._Driver.stepped
 
-    def wrong(self: Any, *given: Any) -> Any:
+    def wrong(self: Any, *arguments: Any) -> Any:
         self.attempts -= 1.0
-        return right(self, *given)
+        return right(self, *arguments)
 
     monkeypatch.setattr(adaptive._Driver, "stepped", wrong)
     with pytest.raises(AssertionError):

@@ -21,7 +21,7 @@ U = 2.0**-53
 # ---- the search within a step
 
 
-def found(g: Callable[[Any], Any], n: int = 1) -> tuple[Any, int]:
+def shares_of(g: Callable[[Any], Any], n: int = 1) -> tuple[Any, int]:
     """The shares found for a function of the share that rises through zero, and how many trials that took."""
     trials = 0
 
@@ -57,7 +57,7 @@ def test_no_function_takes_more_trials_than_bisection_and_one(g: Callable[[Any],
     a later one two, since it reckons in powers of two. Ends of brackets are floating-point numbers: half of three spacings is two
     of them, which takes one more. What is returned is at or past the zero, by no more than the roundings of 0.3.
     """
-    (share,), trials = found(g)
+    (share,), trials = shares_of(g)
     assert trials <= (48 + 1) + (6 + 2) + 1
     # (s − 0.3)⁹ is 0 in floating point where it underflows, |s − 0.3| < 10⁻³⁶: not beside 0.3, whose neighbours are 5·10⁻¹⁷ away.
     assert 0.3 - U <= share <= 0.3 * (1.0 + events.SPACING) + U
@@ -68,9 +68,9 @@ def test_a_change_near_the_start_of_a_step_is_located_to_its_own_roundings(root:
     """However short a part of the step it is: a bracket that is a share of the whole step would have no digit of it. Bisection
     takes log₂(1/root) + 52 trials, and two more in each round of 48 halvings.
     """
-    (share,), trials = found(lambda s: s - root)
+    (share,), trials = shares_of(lambda s: s - root)
     assert root <= share <= root * (1.0 + 2.0 * events.SPACING)
-    (share,), all_trials = found(lambda s: np.where(s < root, -1.0, 1.0))
+    (share,), all_trials = shares_of(lambda s: np.where(s < root, -1.0, 1.0))
     assert root <= share <= root * (1.0 + 2.0 * events.SPACING)
     halvings = np.log2(1.0 / root) + 53
     assert trials <= all_trials <= halvings + 2 * np.ceil(halvings / 48)
@@ -95,7 +95,7 @@ def test_smooth_functions_take_few_trials_and_members_do_not_matter() -> None:
     assert trials <= 10 * len(roots)
     assert (np.abs(share - roots) <= 2.0 * events.SPACING * roots).all()
     for i in (0, 50, 96):
-        (alone,), _ = found(lambda s, i=i: g(s, roots[i]))
+        (alone,), _ = shares_of(lambda s, i=i: g(s, roots[i]))
         assert alone == share[i]
 
 
@@ -230,16 +230,16 @@ def test_two_changes_of_sign_in_an_adaptive_step_are_found(method: str, toleranc
     random = np.random.default_rng(5)
     for _ in range(12):
         roots = np.cumsum(0.02 + 0.1 * random.random(3))
-        found = roots_by(method, roots, -8.0, tolerance=tolerance, at=[8.0])
-        np.testing.assert_allclose(found, roots, rtol=0, atol=100 * 600 * U / 0.02**2)
+        zeros = roots_by(method, roots, -8.0, tolerance=tolerance, at=[8.0])
+        np.testing.assert_allclose(zeros, roots, rtol=0, atol=100 * 600 * U / 0.02**2)
 
 
 @pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.order >= 3 and not m.needs_acceleration])
 @pytest.mark.parametrize("dt", [0.7, 3.0, 6.0, 12.0])
 def test_two_changes_of_sign_in_a_step_of_fixed_length_are_found(method: str, dt: float) -> None:
     """ẏ = 3t² + 12t − 4 from y(−8) = −120 on; with steps of 6 and 12 a zero is at an end of a step, or all are in one."""
-    found = roots_by(method, [-6.0, -2.0, 2.0], -8.0, dt=dt, steps=int(np.ceil(12.0 / dt)))
-    np.testing.assert_allclose(found, [-6.0, -2.0, 2.0], rtol=0, atol=1e-12)
+    zeros = roots_by(method, [-6.0, -2.0, 2.0], -8.0, dt=dt, steps=int(np.ceil(12.0 / dt)))
+    np.testing.assert_allclose(zeros, [-6.0, -2.0, 2.0], rtol=0, atol=1e-12)
 
 
 def test_the_core_notices_a_step_there_and_back() -> None:
@@ -356,9 +356,9 @@ def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.
     from support.events import check_a_state_at_zero_counts_once_and_not_at_the_start as check
 
     def twice(look: Any, parts: Any) -> Any:
-        found, stuck = events.parted(look, parts)
+        changes, stuck = events.parted(look, parts)
         begins = parts.some(parts.g_low == 0.0)
-        return events.joined([begins._replace(high=begins.low, g_low=-np.sign(begins.slope_low)), found]), stuck
+        return events.joined([begins._replace(high=begins.low, g_low=-np.sign(begins.slope_low)), changes]), stuck
 
     monkeypatch.setattr(collected, "parted", twice)
     with pytest.raises(AssertionError):

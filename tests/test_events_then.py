@@ -27,8 +27,8 @@ def test_bounces_are_where_a_closed_form_says(height: float, restitution: float,
     run = sw.integrate(ball(), "rk4", v=0.0, y=height, dt=dt, steps=steps, every=1, events=ground(restitution), backend=backend)
     speed = np.sqrt(2.0 * GRAVITY * height)
     bound = 2 * n * 1000 * U * height / (speed * restitution**n)
-    found = run.events["ground"]
-    np.testing.assert_allclose(found.t[:n], expected, rtol=0, atol=bound)
+    bounces = run.events["ground"]
+    np.testing.assert_allclose(bounces.t[:n], expected, rtol=0, atol=bound)
     last = np.searchsorted(expected, run.t, "right") - 1  # the bounce before each saved state
     begins, speeds = np.append(expected, 0.0)[last], np.append(speed * restitution ** np.arange(1, n + 1), 0.0)[last]
     heights = np.append(np.zeros(n), height)[last]

@@ -29,11 +29,11 @@ def together(pieces: list[dict[str, Occurrences]], name: str) -> list[Any]:
 
 def frames(world: sw.World, *steps: int) -> list[dict[str, Occurrences]]:
     """What each of these calls of ``step`` found."""
-    made = []
+    occurrences = []
     for n in steps:
         world.step(n)
-        made.append(world.events)
-    return made
+        occurrences.append(world.events)
+    return occurrences
 
 
 def start(batch: tuple[int, ...] = (6,), dtype: str = "float64") -> dict[str, Any]:
@@ -59,10 +59,10 @@ def test_equals_a_run(method: str, batch: tuple[int, ...], dtype: str) -> None:
     np.testing.assert_array_equal(world.y, plain.y)
     np.testing.assert_array_equal(world.v, plain.v)
     assert pieces[2]["crossing"].count.sum() == 0
-    for name, found in run.events.items():
-        np.testing.assert_array_equal(sum(each[name].count for each in pieces), found.count)
+    for name, occurrences in run.events.items():
+        np.testing.assert_array_equal(sum(each[name].count for each in pieces), occurrences.count)
         for mine, field in zip(together(pieces, name), FIELDS, strict=True):
-            np.testing.assert_array_equal(mine, getattr(found, field))
+            np.testing.assert_array_equal(mine, getattr(occurrences, field))
     assert len(run.events["crossing"].t) > 0
 
 
@@ -160,10 +160,10 @@ def test_what_does_not_go() -> None:
 
 @pytest.mark.mutant
 def test_mistake_the_quantity_of_the_last_call_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    right, kept = Frames._quantities, {}
+    right, quantities = Frames._quantities, {}
 
     def wrong(self: Frames, step: int) -> Any:
-        return kept.setdefault((id(self), step), right(self, step))
+        return quantities.setdefault((id(self), step), right(self, step))
 
     monkeypatch.setattr(Frames, "_quantities", wrong)
     with pytest.raises(AssertionError):

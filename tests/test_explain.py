@@ -101,10 +101,10 @@ def test_counts_of_a_fused_step() -> None:
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_the_criteria_are_those_of_the_tape(method: sw.Method) -> None:
-    found = sw.stability.operations(method)
+    counts = sw.stability.operations(method)
     written = sw.explain(sw.Oscillator(), method).written
-    assert found[:4] == tuple(written[kind] for kind in found._fields[:4])
-    assert found.rate_evaluations == method.evaluations
+    assert counts[:4] == tuple(written[kind] for kind in counts._fields[:4])
+    assert counts.rate_evaluations == method.evaluations
 
 
 # ---- what is listed is what is computed
@@ -154,11 +154,13 @@ def test_every_listing_is_a_step(name: str, fused: bool, some: int | None) -> No
 def test_every_listing_under_control_is_a_step(control: str, fused: bool, some: int | None) -> None:
     for name in ("three bodies", "two bodies", "three bodies in space, newton"):
         system, v, y = made(name)
-        held = system.controlled(CONTROLS[control], v, y, H)
+        controlled = system.controlled(CONTROLS[control], v, y, H)
         for method in drawn(METHODS, some, name, control, fused):
-            if fits(held, method):
-                assert sw.explain(system, method, control=CONTROLS[control], fused=fused) == sw.explain(held, method, fused=fused)
-                assert_listing_is_a_step(held, method, v, y, fused=fused)
+            if fits(controlled, method):
+                assert sw.explain(system, method, control=CONTROLS[control], fused=fused) == sw.explain(
+                    controlled, method, fused=fused
+                )
+                assert_listing_is_a_step(controlled, method, v, y, fused=fused)
 
 
 @SOME
@@ -218,19 +220,19 @@ def test_what_a_method_does_to_blocks(method: sw.Method) -> None:
     v, y = rng.normal(size=(2, n))
     s = system.scaled(H, ())
     carry = method.carry or "v"
-    found = evaluate(explained, {carry: v, "y": y, "h": H, "t": T, "dv": s.dv, "dy": s.dy}, {})
+    values = evaluate(explained, {carry: v, "y": y, "h": H, "t": T, "dv": s.dv, "dy": s.dy}, {})
     v1, y1 = method.steps.step(s, T, H, v, y)
-    np.testing.assert_array_equal(found[f"{carry}'"], v1)
-    np.testing.assert_array_equal(found["y'"], y1)
-    asked = [line.formula[:2] for section in explained.sections for line in section.lines]
-    assert asked.count("dv") == method.evaluations
+    np.testing.assert_array_equal(values[f"{carry}'"], v1)
+    np.testing.assert_array_equal(values["y'"], y1)
+    calls = [line.formula[:2] for section in explained.sections for line in section.lines]
+    assert calls.count("dv") == method.evaluations
 
 
 def assert_computes_lines(section: listing.Section, known: dict[str, Any], names: list[str], wanted: Any) -> None:
     """The lines of these names are what is wanted, number by number."""
     alone = replace(sw.explain(sw.Oscillator(), "rk4"), sections=(section,))
-    found = evaluate(alone, known, {})
-    assert_computes([np.broadcast_to(found[name], MEMBERS) for name in names], wanted)
+    values = evaluate(alone, known, {})
+    assert_computes([np.broadcast_to(values[name], MEMBERS) for name in names], wanted)
 
 
 @pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
@@ -286,11 +288,11 @@ def test_every_listing_of_a_transition_matrix_is_a_step(name: str, method: sw.Me
         assert "its products of matrices are made by a loop" in str(explained)
         return
     plan = engine.Plan(system, method, (MEMBERS,), H, t0=T, form="matrix")
-    given = system.given_inputs()
-    p, q = linear.transition(plan), linear.pulses(plan, given)
+    inputs = system.given_inputs()
+    p, q = linear.transition(plan), linear.pulses(plan, inputs)
     names, tables = naming.parameters(plan)
     tracer = Tracer(system, _core.Tape())
-    tracer.symbols([each.signal() for each in given.values()], (MEMBERS,))
+    tracer.symbols([each.signal() for each in inputs.values()], (MEMBERS,))
     numbers = [*p.reshape(-1, MEMBERS), *q.reshape(-1, MEMBERS), *tracer.numbers]
     known = dict(zip(names, numbers, strict=True)) | {"h": H, "t": T}
     samples = {}
@@ -320,12 +322,12 @@ def level() -> str:
 
 @pytest.mark.skipif(len(sw.isa_levels()) < 2, reason="no machine code here")
 def test_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked, width, registers = ("neon", 2, 32) if "neon" in sw.isa_levels() else ("avx2", 4, 16)
-    monkeypatch.setenv("STEPWELL_KERNELS", asked)
+    level, width, registers = ("neon", 2, 32) if "neon" in sw.isa_levels() else ("avx2", 4, 16)
+    monkeypatch.setenv("STEPWELL_KERNELS", level)
     explained = sw.explain(sw.Oscillator(), "false_euler", members=1000)
     code = explained.code
     assert code is not None
-    assert (explained.level, explained.interpreted_because, code.width, code.registers) == (asked, None, width, registers)
+    assert (explained.level, explained.interpreted_because, code.width, code.registers) == (level, None, width, registers)
     assert explained.lanes == code.width * code.vectors * code.turns
     assert code.resident
     assert code.size > 50
@@ -400,9 +402,9 @@ def test_text_and_html() -> None:
 def test_json(tmp_path: Path) -> None:
     explained = sw.explain(sw.Oscillator(), "false_euler")
     explained.to_json(tmp_path / "step.json")
-    told = json.loads((tmp_path / "step.json").read_text(encoding="utf-8"))
-    assert told == explained.as_dict() | {"sections": told["sections"], "beside": []}
-    assert told["sections"][3]["lines"][0] == {
+    data = json.loads((tmp_path / "step.json").read_text(encoding="utf-8"))
+    assert data == explained.as_dict() | {"sections": data["sections"], "beside": []}
+    assert data["sections"][3]["lines"][0] == {
         "name": "v'",
         "formula": "v − Φ·y",
         "operations": {"additions": 1, "multiplications": 1},
@@ -412,13 +414,13 @@ def test_json(tmp_path: Path) -> None:
 
 def test_an_attempt_under_control_is_explained() -> None:
     """The push is in the listing, with the step of the attempt, and the energy that it adds."""
-    free, held = (
+    free, controlled = (
         sw.explain(sw.NBody([1.0, 1.0], force="newton"), "merson", attempt=True, control=control)
         for control in (None, sw.EnergyControl(0.1))
     )
-    assert "control.gain" in str(held.listing)
-    assert re.search(r"work' += work \+|work' += a\d+", str(held.listing))
-    assert sum(held.computed.values()) > sum(free.computed.values())
+    assert "control.gain" in str(controlled.listing)
+    assert re.search(r"work' += work \+|work' += a\d+", str(controlled.listing))
+    assert sum(controlled.computed.values()) > sum(free.computed.values())
 
 
 def test_what_cannot_be_explained_says_so() -> None:
@@ -448,8 +450,8 @@ def test_what_cannot_be_explained_says_so() -> None:
         sw.explain(sw.Oscillator(), "rk4", fused=WRONG)
 
 
-def packing(system: sw.System, method: str, **how: Any) -> sw.explanation.Packing | None:
-    code = sw.explain(system, method, **how).code
+def packing(system: sw.System, method: str, **options: Any) -> sw.explanation.Packing | None:
+    code = sw.explain(system, method, **options).code
     return None if code is None else code.packing
 
 
@@ -466,8 +468,8 @@ def test_why_operations_of_one_member_are_packed_or_not() -> None:
     assert packed.vectors < 69
     assert packed.cycles is not None
     assert packed.chain_cycles <= packed.cycles <= 0.96 * packed.single_cycles
-    said = sw.explain(three, "leapfrog").machine
-    assert f"Equal operations are lanes of one vector: {packed.vectors} vectors for 69 operations, {packed.moves} of them" in said
+    text = sw.explain(three, "leapfrog").machine
+    assert f"Equal operations are lanes of one vector: {packed.vectors} vectors for 69 operations, {packed.moves} of them" in text
     chain = packing(sw.Oscillator(1.0), "rk4")
     assert chain is not None
     assert not chain.used
@@ -485,8 +487,8 @@ def test_packed_steps_have_the_bits_of_the_reference() -> None:
     random = np.random.default_rng(3)
     for bodies, dim, method in [(3, 2, "leapfrog"), (3, 3, "rk4"), (4, 3, "false_euler"), (6, 3, "pefrl")]:
         system = sw.NBody(random.uniform(0.5, 1.5, bodies), force="newton", softening=0.1)
-        assert (how := packing(system.__class__(np.ones(bodies), force="newton"), method)) is not None
-        assert how.used
+        assert (packed := packing(system.__class__(np.ones(bodies), force="newton"), method)) is not None
+        assert packed.used
         v, y = random.normal(size=(2, bodies, dim))
         world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=0.01)
         world.step(50)

@@ -46,10 +46,10 @@ def _in_float32(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(explain, "FUNCTIONS", FUNCTIONS)
 
 
-def explained(system: sw.System, method: Any, **how: Any) -> sw.Explanation | None:
+def explained(system: sw.System, method: Any, **options: Any) -> sw.Explanation | None:
     """The explanation, if float32 goes with both."""
     try:
-        return sw.explain(system, method, dtype="float32", **how)
+        return sw.explain(system, method, dtype="float32", **options)
     except (ArgumentError, UnsupportedError) as error:
         if re.search("dtype: |in float32 ", str(error)):
             return None
@@ -78,8 +78,8 @@ def test_every_listing_is_a_step(name: str, fused: bool) -> None:
         plan = engine.Plan(system, method, (MEMBERS,), float(F(H)), t0=T, fused=fused, single=True)
         out = engine.advance(plan, v, y, carried=True)
         wanted = [*out.slot.reshape(-1, MEMBERS), *out.y[-1].reshape(-1, MEMBERS)]
-        found = after(step, plan, v, y)
-        for mine, theirs in zip(found, wanted, strict=False):
+        computed = after(step, plan, v, y)
+        for mine, theirs in zip(computed, wanted, strict=False):
             assert mine.dtype == theirs.dtype == F
             np.testing.assert_array_equal(mine, theirs)
         total = sum((Counter(line.operations) for line in step.sections[-1].lines), Counter[str]())
@@ -115,21 +115,21 @@ def test_the_kernel_is_that_of_float32() -> None:
 
 
 def test_both_ends_of_what_is_carried() -> None:
-    told = sw.explain(sw.Pendulum(), "verlet", dtype="float32")
-    assert [each.when for each in told.beside] == ["start", "finish"]
-    assert all("12582912" in " ".join(line.formula for line in each.lines) for each in told.beside)
+    explanation = sw.explain(sw.Pendulum(), "verlet", dtype="float32")
+    assert [each.when for each in explanation.beside] == ["start", "finish"]
+    assert all("12582912" in " ".join(line.formula for line in each.lines) for each in explanation.beside)
 
 
 def test_what_cannot_be_explained_says_so() -> None:
     bodies = sw.NBody([1.0, 1.0])
-    for system, method, how, said in (
+    for system, method, options, message in (
         (sw.Oscillator(), "merson", {"attempt": True}, "attempt: in float32 an attempt is two lists"),
         (sw.Oscillator(), "taylor", {}, "dtype: float32 does not go with taylor"),
         (bodies, "rk4", {"record": "energy"}, "record: float32 runs compute it of the saved states, in float64"),
         (sw.Oscillator(a=sw.Sampled([1.0, 2.0], 1.0)), "rk4", {}, "dtype: a listing has numbers of one width"),
     ):
-        with pytest.raises(UnsupportedError, match=said):
-            sw.explain(system, method, dtype="float32", **how)  # type: ignore[arg-type]
+        with pytest.raises(UnsupportedError, match=message):
+            sw.explain(system, method, dtype="float32", **options)  # type: ignore[arg-type]
     with pytest.raises(ArgumentError, match="is too long; float32 goes with steps of up to 4000"):
         sw.explain(sw.NBody(np.ones(200)), "rk4", dtype="float32")
     assert _core.isa()

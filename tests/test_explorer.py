@@ -35,10 +35,10 @@ def test_every_step_has_the_bits_of_integrate(tmp_path: Path) -> None:
     every = races()
     assert {name for name, *_ in every} == set(sliders.OFFERS)
     assert {key for _, key, *_ in every} == {m.name for m in sw.methods()}
-    told = in_node(RUN, tmp_path, [[name, key, values, STEPS] for name, key, values, _ in every])
+    results = in_node(RUN, tmp_path, [[name, key, values, STEPS] for name, key, values, _ in every])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        wrong = [each[:3] for each, got in zip(every, told, strict=True) if got != expected(each[3], each[1])]
+        wrong = [each[:3] for each, got in zip(every, results, strict=True) if got != expected(each[3], each[1])]
     assert not wrong
 
 
@@ -47,8 +47,8 @@ def test_every_step_has_the_bits_of_integrate(tmp_path: Path) -> None:
 def test_a_slider_that_is_not_heard_is_noticed(tmp_path: Path) -> None:
     mistake = ("trajectory", "value * factor", "slider.value * factor")
     every = [each for each in races() if each[2]]
-    told = in_node(RUN, tmp_path, [[name, key, values, STEPS] for name, key, values, _ in every], mistake)
-    assert not any(got == expected(each[3], each[1]) for each, got in zip(every, told, strict=True))
+    results = in_node(RUN, tmp_path, [[name, key, values, STEPS] for name, key, values, _ in every], mistake)
+    assert not any(got == expected(each[3], each[1]) for each, got in zip(every, results, strict=True))
 
 
 def test_sliders_begin_where_the_scene_is() -> None:
@@ -68,7 +68,7 @@ def test_sliders_begin_where_the_scene_is() -> None:
 def test_a_run_blows_up_where_integrate_says(tmp_path: Path) -> None:
     """Far past the limits of all of them: the first step after which the state is not finite, with v that is computed, too."""
     keys = ["false_euler", "leapfrog", "verlet", "rk4", "merson", "standard_euler"]
-    told = in_node(
+    results = in_node(
         """
 told = given.map((key) => {
   const run = new Trajectory(scene("oscillator"), key, 5, {}).steps(2000);
@@ -78,7 +78,7 @@ told = given.map((key) => {
         tmp_path,
         keys,
     )
-    for key, (lost, large) in zip(keys, told, strict=True):
+    for key, (lost, large) in zip(keys, results, strict=True):
         with pytest.warns(sw.DivergenceWarning):
             run = sw.integrate(sw.Oscillator(), key, v=0.0, y=1.0, dt=5.0, steps=2000, every=1)
         assert lost == run.first_bad_step
@@ -93,7 +93,7 @@ told = given.map((key) => {
 def test_links_hold_numbers_to_the_bit(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     numbers = [0.1 + 0.2, 1 / 3, 5e-324, 1.7e308, *rng.normal(size=50)]
-    told = in_node(
+    results = in_node(
         """
 told = given.map((x) => bits(number(parse(format({ dt: x, name: "a b&c=d" })).dt, -1e309, 1e309, 0)));
 told.push(parse(format({ name: "a b&c=d#é" })).name);
@@ -103,8 +103,8 @@ told.push(format({ a: undefined, b: 1 }));
         tmp_path,
         numbers,
     )
-    assert told[: len(numbers)] == [np.float64(x).view(np.uint64).item().to_bytes(8, "big").hex().lstrip("0") for x in numbers]
-    assert told[len(numbers) :] == ["a b&c=d#é", 0.5, 1, 0.25, "#b=1"]
+    assert results[: len(numbers)] == [np.float64(x).view(np.uint64).item().to_bytes(8, "big").hex().lstrip("0") for x in numbers]
+    assert results[len(numbers) :] == ["a b&c=d#é", 0.5, 1, 0.25, "#b=1"]
 
 
 # ---- how the page is made
@@ -126,20 +126,20 @@ def test_sources_are_what_export_prints() -> None:
     import base64
     import zlib
 
-    found = data_of("energy_control")
-    sources = json.loads(zlib.decompress(base64.b64decode(found["packed"])))
+    data = data_of("energy_control")
+    sources = json.loads(zlib.decompress(base64.b64decode(data["packed"])))
     scene = scene_of("energy_control")
     step = sw.export(scene.system, "merson", "javascript", dt=scene.dt, v=scene.v, y=scene.y, control=scene.control, name="step")
-    assert sources[found["steps"]["merson"]] == step.source
-    assert "control" not in sources[found["steps"]["truth"]]
+    assert sources[data["steps"]["merson"]] == step.source
+    assert "control" not in sources[data["steps"]["truth"]]
 
 
 def test_methods_have_the_colours_of_the_charts() -> None:
     from stepwell.views.charts.style import look
 
-    for told in page().data["methods"]:
-        assert told["colour"] == look(sw.method(told["name"]))["color"]
-        assert re.fullmatch(r"#[0-9a-f]{6}", told["colour"])  # what the page can lighten
+    for method in page().data["methods"]:
+        assert method["colour"] == look(sw.method(method["name"]))["color"]
+        assert re.fullmatch(r"#[0-9a-f]{6}", method["colour"])  # what the page can lighten
 
 
 @sw.system
@@ -150,13 +150,13 @@ def own(t, v, y, *, stiffness=2.0, drag=0.25):  # type: ignore[no-untyped-def]
 def test_a_scene_of_ones_own() -> None:
     scene = sw.Scene(own(), v=0.0, y=1.0, horizon=20.0, name="mine", title="</script><b>")
     page = sw.explore(scene, methods=["rk4", "verlet", "false_euler"])
-    (told,) = page.data["scenes"]
-    assert [(s["name"], s["value"], s["low"], s["high"]) for s in told["sliders"]] == [
+    (data,) = page.data["scenes"]
+    assert [(s["name"], s["value"], s["low"], s["high"]) for s in data["sliders"]] == [
         ("stiffness", 2.0, 0.0, 4.0),
         ("drag", 0.25, 0.0, 0.5),
     ]
-    assert set(told["steps"]) == {"rk4", "false_euler", "truth"}
-    assert "verlet needs forces" in told["refused"]["verlet"]
+    assert set(data["steps"]) == {"rk4", "false_euler", "truth"}
+    assert "verlet needs forces" in data["refused"]["verlet"]
     assert "</script><b>" not in page.html
 
 
@@ -200,9 +200,9 @@ def test_wrong_calls_say_what_is_wrong(tmp_path: Path) -> None:
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "page.html"
     assert cli.main(["explore", "--scene", "pendulum", "--only", "-o", str(path), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["written"], told["bytes"]) == ([str(path)], path.stat().st_size)
-    (scene,) = told["scenes"]
+    report = json.loads(capsys.readouterr().out)
+    assert (report["written"], report["bytes"]) == ([str(path)], path.stat().st_size)
+    (scene,) = report["scenes"]
     assert (scene["name"], scene["sliders"]) == ("pendulum", ["omega", "start", "push"])
     assert set(scene["methods"]) == {m.name for m in sw.methods()}
     assert "Pendulum, 90" in path.read_text(encoding="utf-8")
@@ -222,7 +222,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeyp
 
 def test_a_scene_with_other_parameters_has_sliders_of_its_step() -> None:
     """What is offered for a built-in scene is meant for it as it is made without arguments."""
-    found = of_scene(sw.scenes.kepler(e=0.5), [sw.method("rk4")])
-    assert [each["name"] for each in found["sliders"]] == ["Gm_0", "Gm_1", "softening"]
-    assert found["sliders"][1]["targets"] == {"m.Gm[1]": 1.0, "e.Gm[1]": 1.0, "e.masses[1]": 1.0}
-    assert found["truth"] is None
+    data = of_scene(sw.scenes.kepler(e=0.5), [sw.method("rk4")])
+    assert [each["name"] for each in data["sliders"]] == ["Gm_0", "Gm_1", "softening"]
+    assert data["sliders"][1]["targets"] == {"m.Gm[1]": 1.0, "e.Gm[1]": 1.0, "e.masses[1]": 1.0}
+    assert data["truth"] is None

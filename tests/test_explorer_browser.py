@@ -60,22 +60,22 @@ class Shown:
 
     def states(self) -> list[list[str]]:
         """The bits of v and y of both runs."""
-        told = self.page.evaluate("explorer.page.race.runs.map((run) => [...run.v, ...run.y])")
-        return [[f"{bits(float(x)):x}" for x in numbers] for numbers in told]
+        runs = self.page.evaluate("explorer.page.race.runs.map((run) => [...run.v, ...run.y])")
+        return [[f"{bits(float(x)):x}" for x in numbers] for numbers in runs]
 
 
 def test_states_are_those_of_integrate_to_the_bit(browser: Any, file: str) -> None:
     """Every scene, by link, two methods each: so the page's own way to its steps, and Chromium's arithmetic."""
     with Shown(browser, file, "#play=0") as shown:
-        for i, told in enumerate(page().data["scenes"]):
-            keys = [key for key in told["steps"] if key != "truth"]
+        for i, data in enumerate(page().data["scenes"]):
+            keys = [key for key in data["steps"] if key != "truth"]
             a, b = keys[i % len(keys)], keys[(3 * i + 1) % len(keys)]
             shown.page.evaluate(
-                "([name, words]) => explorer.load(name, words)", [told["name"], {"a": a, "b": b, "at": str(STEPS), "play": "0"}]
+                "([name, words]) => explorer.load(name, words)", [data["name"], {"a": a, "b": b, "at": str(STEPS), "play": "0"}]
             )
-            scene = scene_of(told["name"])
+            scene = scene_of(data["name"])
             assert shown.at("race.k") == STEPS
-            assert shown.states() == [expected(scene, a), expected(scene, b)], (told["name"], a, b)
+            assert shown.states() == [expected(scene, a), expected(scene, b)], (data["name"], a, b)
         assert not shown.complaints
 
 
@@ -189,16 +189,16 @@ def test_every_control_has_a_name_and_a_visible_focus(browser: Any, file: str) -
         seen = set()
         for _ in range(40):
             shown.page.keyboard.press("Tab")
-            found = shown.page.evaluate(
+            focused = shown.page.evaluate(
                 """(() => {
                   const e = document.activeElement;
                   return [e.dataset.name || e.id || e.tagName, getComputedStyle(e).outlineStyle];
                 })()"""
             )
-            if found[0] == "BODY":
+            if focused[0] == "BODY":
                 break
-            seen.add(found[0])
-            assert found[1] == "solid", found
+            seen.add(focused[0])
+            assert focused[1] == "solid", focused
         wanted = {
             "scene",
             "play",
@@ -286,12 +286,12 @@ def test_two_methods_of_one_family_are_told_apart(browser: Any, file: str, schem
     def shown_colours(a: str, b: str) -> list[str]:
         with Shown(browser, file, f"#scene=oscillator&a={a}&b={b}&play=0", color_scheme=scheme) as shown:
             names = "--a", "--b", "--text"
-            found = [
+            colours = [
                 shown.page.evaluate("(name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim()", name)
                 for name in names
             ]
             assert not shown.complaints
-            return found
+            return colours
 
     a, b, text = shown_colours("standard_euler", "false_euler")
     assert a != b == text

@@ -21,13 +21,13 @@ def test_eigenvalues_are_those_of_numpy(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     matrices = [rng.normal(size=(n, n)) for n in (1, 2, 3, 5, 8, 12, 16) for _ in range(4)]
     matrices += [np.triu(matrices[-1]), np.roll(np.eye(6), 1, axis=0), np.diag([1.0, 2.0, 3.0]), np.zeros((4, 4))]
-    told = in_node("told = given.map((each) => roots.eigenvalues(each));", tmp_path, [each.tolist() for each in matrices])
-    for matrix, got in zip(matrices, told, strict=True):
+    results = in_node("told = given.map((each) => roots.eigenvalues(each));", tmp_path, [each.tolist() for each in matrices])
+    for matrix, got in zip(matrices, results, strict=True):
         values, vectors = np.linalg.eig(matrix)
-        found = np.array([z["re"] + 1j * z["im"] for z in got])
-        assert len(found) == len(matrix)
+        computed = np.array([z["re"] + 1j * z["im"] for z in got])
+        assert len(computed) == len(matrix)
         error = 64 * len(matrix) * np.finfo(float).eps * np.linalg.norm(matrix) * np.linalg.cond(vectors)
-        for z in found:  # each is nearest to another
+        for z in computed:  # each is nearest to another
             nearest = np.abs(values - z).argmin()
             assert np.abs(values[nearest] - z) <= error
             values = np.delete(values, nearest)
@@ -38,11 +38,11 @@ told = given.map(([name, key, dt, values, steps]) => new Trajectory(scene(name),
 """
 
 
-def nearest(found: list[dict[str, float]], wanted: Any) -> float:
+def nearest(roots: list[dict[str, float]], wanted: Any) -> float:
     """The largest distance of two sets of roots, each taken with its nearest."""
     left, most = list(wanted), 0.0
-    assert len(found) == len(left)
-    for z in found:
+    assert len(roots) == len(left)
+    for z in roots:
         i = int(np.abs(np.array(left) - (z["re"] + 1j * z["im"])).argmin())
         most = max(most, abs(left.pop(i) - (z["re"] + 1j * z["im"])))
     return most
@@ -57,9 +57,9 @@ def test_roots_of_linear_scenes_are_those_of_analyse(tmp_path: Path) -> None:
     ]
     chains = [("chain", key, 0.3, {}, 2) for key in ("false_euler", "rk4", "verlet", "standard_heun", "pefrl")]
     every = oscillators + damped + chains
-    told = in_node(ROOTS, tmp_path, every)
+    results = in_node(ROOTS, tmp_path, every)
     systems = {"oscillator": sw.Oscillator(), "forced_oscillator": sw.Oscillator(1.0, 0.4, form="physical"), "chain": sw.Chain(8)}
-    for (name, key, dt, _, _), got in zip(every, told, strict=True):
+    for (name, key, dt, _, _), got in zip(every, results, strict=True):
         wanted = sw.analyse(systems[name], key, dt=dt).eigenvalues
         size = max(1.0, float(np.abs(wanted).max()))
         assert nearest(got, wanted) < 2e-7 * size, (name, key, dt)
@@ -75,8 +75,8 @@ def test_roots_at_a_state_are_those_of_analyse(tmp_path: Path) -> None:
     """
     every = [("pendulum", key, 0.3, {"start": 1.0}, 0) for key in ("false_euler", "rk4", "standard_heun")]
     every += [("clover", key, 0.1, {}, 0) for key in ("false_euler", "rk4")]
-    told = in_node(ROOTS, tmp_path, every)
-    for (name, key, dt, _, _), got in zip(every, told, strict=True):
+    results = in_node(ROOTS, tmp_path, every)
+    for (name, key, dt, _, _), got in zip(every, results, strict=True):
         scene = scene_of(name)
         wanted = sw.analyse(scene.system, key, dt=dt, at=(scene.v, 1.0 if name == "pendulum" else scene.y)).eigenvalues
         assert nearest(got, wanted) < (1e-9 if name == "pendulum" else 1e-4), (name, key)
@@ -104,7 +104,7 @@ def test_limits_are_those_of_stability_limit(tmp_path: Path) -> None:
     }
     keys = ["standard_euler", "false_euler", "rk4", "merson"]
     every = [(name, key, values, system) for name, (values, system) in cases.items() for key in keys]
-    told = in_node(
+    results = in_node(
         """
 told = given.map(([name, key, values, limit]) => {
   const run = new Trajectory(scene(name), key, scene(name).dt, values);
@@ -114,7 +114,7 @@ told = given.map(([name, key, values, limit]) => {
         tmp_path,
         [[name, key, values, sw.method(key).limit] for name, key, values, _ in every],
     )
-    for (name, key, _, system), got in zip(every, told, strict=True):
+    for (name, key, _, system), got in zip(every, results, strict=True):
         assert got == pytest.approx(float(sw.stability_limit(system, key)), rel=1e-9), (name, key)
 
 
@@ -188,25 +188,25 @@ def test_sliders_of_any_step_move_its_energy_too(forgotten: bool, tmp_path: Path
     if forgotten:
         monkeypatch.setattr(sliders, "_links", lambda system: {})
     rng = np.random.default_rng(4)
-    asked, wanted = [], []
+    cases, wanted = [], []
     for scene, values, system in SLID:
-        found = of_scene(scene, [sw.method("rk4"), sw.method("standard_euler")])
-        assert set(values) <= {slider["name"] for slider in found["sliders"]}
+        data = of_scene(scene, [sw.method("rk4"), sw.method("standard_euler")])
+        assert set(values) <= {slider["name"] for slider in data["sliders"]}
         if system is None:
-            inertia = np.array(found["energy"]["inertia"])
+            inertia = np.array(data["energy"]["inertia"])
             inertia[0] = values["inertia_0"]
             system = sw.RigidBody(inertia)
         v, y = rng.normal(size=scene.v.shape), rng.normal(size=scene.y.shape)
-        asked.append([found, values, np.ravel(v).tolist(), np.ravel(y).tolist()])
+        cases.append([data, values, np.ravel(v).tolist(), np.ravel(y).tolist()])
         wanted.append(float(system.for_state_shapes(v, y).energy(v, y)))
-    told = in_node(
+    results = in_node(
         """
 told = given.map(([scene, values, v, y]) => ENERGIES[scene.energy.kind](settings(scene, values, {}).e, v, y));
 """,
         tmp_path,
-        asked,
+        cases,
     )
-    right = [got == pytest.approx(want, rel=1e-12) for got, want in zip(told, wanted, strict=True)]
+    right = [got == pytest.approx(want, rel=1e-12) for got, want in zip(results, wanted, strict=True)]
     canonical = [isinstance(system, sw.Oscillator) and system.form == "canonical" for _, _, system in SLID]
     assert right == (canonical if forgotten else [True] * len(SLID))
 
@@ -223,8 +223,8 @@ told = given.map(([scene, values, v, y]) => ENERGIES[scene.energy.kind](settings
     ],
 )
 def test_wrong_energies_are_noticed(right: str, mistake: str, scenes: set[str], tmp_path: Path) -> None:
-    told = energies(tmp_path, ("energies", right, mistake))
-    assert {name for name, got, wanted in told if got != pytest.approx(wanted, rel=1e-9)} == scenes
+    results = energies(tmp_path, ("energies", right, mistake))
+    assert {name for name, got, wanted in results if got != pytest.approx(wanted, rel=1e-9)} == scenes
 
 
 TRUTH = """
@@ -252,11 +252,11 @@ FORMULAS: list[tuple[str, dict[str, float], Any]] = [
 def truths(folder: Path, change: Any = None) -> dict[str, float]:
     """The largest difference between the page's exact solution and the scene's, by scene."""
     times = [np.linspace(0.0, make().horizon, 200) for _, _, make in FORMULAS]
-    told = in_node(
+    results = in_node(
         TRUTH, folder, [[name, values, t.tolist()] for (name, values, _), t in zip(FORMULAS, times, strict=True)], change
     )
     most: dict[str, float] = {}
-    for (name, _, make), t, got in zip(FORMULAS, times, told, strict=True):
+    for (name, _, make), t, got in zip(FORMULAS, times, results, strict=True):
         v, y = make().exact(t)
         wanted = np.concatenate([v.reshape(len(t), -1), y.reshape(len(t), -1)], axis=1)
         most[name] = max(most.get(name, 0.0), float(np.abs(np.array(got) - wanted).max()))
@@ -294,7 +294,7 @@ def test_a_run_with_small_steps_is_the_truth(tmp_path: Path) -> None:
     The two runs agree to 1e-6 in the scene's scales, so the finer one, of order 8, is nearer than that.
     """
     names = ["clover", "kepler", "chain", "pendulum", "conical_pendulum", "dzhanibekov", "figure_eight", "arenstorf"]
-    told = in_node(
+    results = in_node(
         """
 told = given.map((name) => {
   const it = scene(name);
@@ -307,7 +307,7 @@ told = given.map((name) => {
         tmp_path,
         names,
     )
-    for name, (steps, v, y, until) in zip(names, told, strict=True):
+    for name, (steps, v, y, until) in zip(names, results, strict=True):
         scene = scene_of(name)
         assert until is None, name  # JSON has no infinity
         assert scene.exact is not None

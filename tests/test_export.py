@@ -31,20 +31,20 @@ def controlled(language: str) -> list[Journey]:
     """Every control, with some methods."""
     pairs = [(control, name) for control in CONTROLS for name in ("three bodies", "two bodies", "three bodies in space, newton")]
     able = [method for method in METHODS if not method.needs_acceleration and method.name != "dop853"]
-    made = []
+    journeys = []
     for i, (control, name) in enumerate(pairs):
         method = able[(i + number(language)) % len(able)]
-        made.append(journey(name, method, control=CONTROLS[control]))
-    return made
+        journeys.append(journey(name, method, control=CONTROLS[control]))
+    return journeys
 
 
 def diverging() -> list[Journey]:
     """To infinities and NaN: what explodes, and two bodies at one place."""
-    made = [Journey(sw.Oscillator(50.0), "rk4", 0.0, 1.0, steps=300)]
-    made += [Journey(sw.NBody([1.0, 1.0]), name, np.zeros((2, 2)), np.zeros((2, 2)), steps=3) for name in ("rk4", "verlet")]
-    made.append(Journey(sw.Pendulum(), "standard_euler", 1e300, 1.0, steps=1, dt=1e9))
-    made.append(Journey(sw.Oscillator(1e160), "false_euler", 0.0, 1.0, steps=9, dt=1.0))
-    return made
+    journeys = [Journey(sw.Oscillator(50.0), "rk4", 0.0, 1.0, steps=300)]
+    journeys += [Journey(sw.NBody([1.0, 1.0]), name, np.zeros((2, 2)), np.zeros((2, 2)), steps=3) for name in ("rk4", "verlet")]
+    journeys.append(Journey(sw.Pendulum(), "standard_euler", 1e300, 1.0, steps=1, dt=1e9))
+    journeys.append(Journey(sw.Oscillator(1e160), "false_euler", 0.0, 1.0, steps=9, dt=1.0))
+    return journeys
 
 
 def changed() -> list[Journey]:
@@ -211,15 +211,15 @@ def test_every_bit_of_steps_with_a_force(language: str, tmp_path: Path) -> None:
         rng = np.random.default_rng(i)
         v, y, force = (0.5 * rng.normal(size=(*shape, 1)) for shape in (system.v_shape, system.y_shape, system.v_shape))
         for start in method.starts or (None,):
-            given = {"force": force} | ({"start": start} if start else {})
+            options = {"force": force} | ({"start": start} if start else {})
             with_it, without = (
-                Journey(system, method.name, v, y, 9, member=0, options=given | {"force": f * force}) for f in (1, 0)
+                Journey(system, method.name, v, y, 9, member=0, options=options | {"force": f * force}) for f in (1, 0)
             )
             assert with_it.expected != without.expected
             every.append(with_it)
     for name in ("leapfrog", "rk4"):
-        given = {"force": np.array([[0.25, -0.5]]), "dtype": "float32"}
-        every.append(Journey(sw.Particles(floor=sw.Floor()), name, np.zeros((1, 2)), np.ones((1, 2)), 9, options=given))
+        options = {"force": np.array([[0.25, -0.5]]), "dtype": "float32"}
+        every.append(Journey(sw.Particles(floor=sw.Floor()), name, np.zeros((1, 2)), np.ones((1, 2)), 9, options=options))
     assert_same(every, run(language, every, tmp_path))
 
 
@@ -241,10 +241,10 @@ def test_a_force_may_be_another_in_every_step() -> None:
 
 @languages
 def test_the_example_with_a_force_runs(language: str, tmp_path: Path) -> None:
-    given: dict[str, Any] = {"v": [[0.25, 0.5]], "y": [[1.0, 2.0]], "dt": 1 / 60, "force": [[0.5, 9.0]]}
+    arguments: dict[str, Any] = {"v": [[0.25, 0.5]], "y": [[1.0, 2.0]], "dt": 1 / 60, "force": [[0.5, 9.0]]}
     for method in ("leapfrog", "rk4"):
-        run = sw.integrate(sw.Particles(), method, steps=STEPS, **given)
-        step = sw.export(sw.Particles(), method, language, name=f"push_{method}", **given)
+        run = sw.integrate(sw.Particles(), method, steps=STEPS, **arguments)
+        step = sw.export(sw.Particles(), method, language, name=f"push_{method}", **arguments)
         assert shown(step, tmp_path) == run.y[-1, 0, 0]
 
 
@@ -309,7 +309,7 @@ class Masks(sw.Pendulum):
 
 def masks() -> list[Journey]:
     """A step each, of which the tape's own evaluation says what comes of it."""
-    made = []
+    journeys = []
     for seed in range(20):
         v, y = np.random.default_rng(seed).normal(size=2).tolist()
         each = Journey(Masks(1.1), "rk4", v, y, steps=1, twin=sw.Pendulum(1.1))
@@ -318,8 +318,8 @@ def masks() -> list[Journey]:
         symbols = tracer.step(sw.method("rk4"))
         values = Evaluation(tape, symbols, dict(enumerate(tracer.numbers)))([v, y], each.t0, each.dt)
         each.expected = [float(x) for x in values]
-        made.append(each)
-    return made
+        journeys.append(each)
+    return journeys
 
 
 def test_functions_are_called_by_name() -> None:
@@ -346,15 +346,15 @@ def test_what_only_looks_like_a_function_is_none() -> None:
         patch.setattr(trig, "CONSTANTS", trig.CONSTANTS._replace(double=of_double))
         rough = trig.sin(x)  # a sine whose argument is reduced by the first part of π alone
     other = trig._half_turn(x, n, x * trig.PER_HALF_TURN)  # one whose sign is turned by another
-    for made, function in (
+    for symbol, function in (
         (trig.sin(x), "sine"),
         (trig.cos(x), "cosine"),
         (log.log(x), "logarithm"),
         (rough, None),
         (other, None),
     ):
-        told, (root,) = tape.operations([made])
-        operations = [(name, tuple(of), given) for name, of, given in told]
+        listed, (root,) = tape.operations([symbol])
+        operations = [(name, tuple(of), constant) for name, of, constant in listed]
         for each in FUNCTIONS:
             of = argument(each, operations, root)
             if each == function:
@@ -403,14 +403,14 @@ def mutants(source: str, begin: str, end: str) -> list[str]:
     """The same file with one operation of the step changed, for each operation."""
     start = source.index(begin)
     stop = source.index(end, start)
-    made = []
-    for found in SIGN.finditer(source, start, stop):
-        line = source[source.rindex("\n", 0, found.start()) : found.start()]
+    changed = []
+    for sign in SIGN.finditer(source, start, stop):
+        line = source[source.rindex("\n", 0, sign.start()) : sign.start()]
         if "//" in line or "#" in line:
             continue  # in a comment
-        other = {"+": "-", "-": "+", "*": "+", "/": "*"}[found[1]]
-        made.append(source[: found.start(1)] + other + source[found.end(1) :])
-    return made
+        other = {"+": "-", "-": "+", "*": "+", "/": "*"}[sign[1]]
+        changed.append(source[: sign.start(1)] + other + source[sign.end(1) :])
+    return changed
 
 
 #: Without a softening, or of two bodies, some sums add a zero.
@@ -428,13 +428,13 @@ def test_each_operation_counts(tmp_path: Path) -> None:
         BODIES,
     ):
         source = each.export("python", "step_0").source
-        made = mutants(source, "def sine(x)" if "def sine(x)" in source else "def step(self, s)", "# The state after the step")
-        assert len(made) > 15
+        changed = mutants(source, "def sine(x)" if "def sine(x)" in source else "def step(self, s)", "# The state after the step")
+        assert len(changed) > 15
         assert_same([each], run("python", [each], tmp_path))
         unnoticed = []
-        for mutant in made:
-            (found,) = run("python", [each], tmp_path, [mutant])
-            if all(map(same, found, each.expected)):
+        for mutant in changed:
+            (numbers,) = run("python", [each], tmp_path, [mutant])
+            if all(map(same, numbers, each.expected)):
                 unnoticed.append(mutant)
         assert not unnoticed
 
@@ -445,11 +445,11 @@ def test_a_wrong_operation_is_noticed_in_every_language(language: str, tmp_path:
     each = Journey(sw.Pendulum(1.3), "merson", 4.0, 5.5, steps=90)
     source = each.export(language, "step_0").source
     begin = {"c": "double step_0_sine(", "javascript": "function sine(", "python": "def sine(", "rust": "fn sine("}[language]
-    made = mutants(source, begin, "The state after the step")[:: 20 if language in ("c", "rust") else 7]
-    assert len(made) > 3
-    for mutant in made:
-        (found,) = run(language, [each], tmp_path, [mutant])
-        assert not all(map(same, found, each.expected))
+    changed = mutants(source, begin, "The state after the step")[:: 20 if language in ("c", "rust") else 7]
+    assert len(changed) > 3
+    for mutant in changed:
+        (numbers,) = run(language, [each], tmp_path, [mutant])
+        assert not all(map(same, numbers, each.expected))
 
 
 # ---- loops

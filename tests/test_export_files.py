@@ -47,9 +47,9 @@ def test_files_are_what_they_were(name: str, language: Any, snapshot: Snapshots)
 
 @languages
 def test_the_example_at_the_head_runs(language: str, tmp_path: Path) -> None:
-    given = {"v": 0.25, "y": -0.5, "dt": 1 / 60}
-    run = sw.integrate(sw.Pendulum(2.0, a=sw.Sinusoid(1.0, 3.0)), "rk4", steps=STEPS, **given)
-    step = sw.export(sw.Pendulum(2.0, a=sw.Sinusoid(1.0, 3.0)), "rk4", language, **given)
+    arguments = {"v": 0.25, "y": -0.5, "dt": 1 / 60}
+    run = sw.integrate(sw.Pendulum(2.0, a=sw.Sinusoid(1.0, 3.0)), "rk4", steps=STEPS, **arguments)
+    step = sw.export(sw.Pendulum(2.0, a=sw.Sinusoid(1.0, 3.0)), "rk4", language, **arguments)
     assert shown(step, tmp_path) == run.y[-1]
     chain = sw.Chain(20)
     run = sw.integrate(chain, "verlet", v=0.0, y=np.arange(1.0, 21.0), dt=0.01, steps=STEPS)
@@ -62,7 +62,7 @@ def test_the_example_at_the_head_runs(language: str, tmp_path: Path) -> None:
 def test_the_head_says_what_it_is() -> None:
     source = sw.export(sw.NBody([1.0, 2.0], dim=3), "rk4", "c").source
     head = source.partition("\n\n#include")[0]
-    for said in (
+    for text in (
         "n_body_rk4: one step by Runge-Kutta 4.",
         "System:  NBody(masses=",
         "Runge-Kutta 4 (rk4), order 4, 4 rate evaluations per step",
@@ -71,7 +71,7 @@ def test_the_head_says_what_it_is() -> None:
         "cc -O2 -ffp-contract=off",
         "number i, j of the block of shape (2, 3) at y[3*i + j]",
     ):
-        assert said in head
+        assert text in head
     assert "no undamped oscillator" in sw.export(sw.Oscillator(), "standard_euler", "c").source
     assert "(..., fused=True)" in sw.export(sw.Oscillator(), "rk4", "rust", fused=True).source
 
@@ -116,8 +116,8 @@ OTHER_NUMBERS = {
 def compiled(folder: Path, *flags: str) -> str:
     """What the compiler complains of in ``step.c``; "unknown" if it has no such option."""
     command = ["cc", *flags, "-S", "step.c", "-o", "step.s"]
-    told = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=PATIENCE).stderr
-    return "unknown" if re.search(r"(unrecognized|unknown|unsupported) .*|bad value|not valid for", told) else told
+    complaint = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=PATIENCE).stderr
+    return "unknown" if re.search(r"(unrecognized|unknown|unsupported) .*|bad value|not valid for", complaint) else complaint
 
 
 @pytest.mark.skipif(missing("c"), reason="there is no C compiler here")
@@ -125,8 +125,8 @@ def compiled(folder: Path, *flags: str) -> str:
 def test_flags_that_make_other_numbers_are_refused_by_name(dtype: str, tmp_path: Path) -> None:
     sw.export(sw.Oscillator(), "rk4", "c", name="step", dtype=dtype).save(tmp_path / "step.c")  # type: ignore[arg-type]
     assert not compiled(tmp_path)
-    for flags, said in OTHER_NUMBERS.items():
-        assert (told := compiled(tmp_path, *flags.split())) == "unknown" or said in told, flags
+    for flags, message in OTHER_NUMBERS.items():
+        assert (complaint := compiled(tmp_path, *flags.split())) == "unknown" or message in complaint, flags
 
 
 @pytest.mark.skipif(missing("c"), reason="there is no C compiler here")
@@ -187,8 +187,8 @@ def test_what_is_no_parameter_is_refused_in_javascript(tmp_path: Path) -> None:
     code += "tell(() => new OscillatorRk4({ gain: 1 }));\ntell(() => new OscillatorRk4({ step: 1 }));\n"
     code += "tell(() => new OscillatorRk4().start([0, 0], [1]));\n"
     (tmp_path / "wrong.mjs").write_text(code, encoding="utf-8")
-    said = ["there is no parameter gain", "there is no parameter step", "velocities: expected 1 number, got 2"]
-    assert executed(["node", "wrong.mjs"], tmp_path).splitlines() == said
+    messages = ["there is no parameter gain", "there is no parameter step", "velocities: expected 1 number, got 2"]
+    assert executed(["node", "wrong.mjs"], tmp_path).splitlines() == messages
 
 
 # ---- names

@@ -35,7 +35,7 @@ def journeys() -> list[Journey]:
     rng = np.random.default_rng(5)
     drive = {"a": sw.Sinusoid(1.0, 2.0, 0.3)}
     masses = sw.LinearSystem([[-0.1, 0.0, -1.0, 0.0], [0.0, -0.2, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
-    made = [
+    every = [
         journey(sw.Oscillator(1.3, 0.1, **drive, form="physical"), "rk4"),
         journey(sw.Pendulum(1.1, 0.2, **drive), "merson"),
         journey(sw.Pendulum(1.1), "verlet", start="second_order"),
@@ -51,7 +51,7 @@ def journeys() -> list[Journey]:
         # The smallest numbers, which have fewer digits.
         journey(sw.Pendulum(1.0), "false_euler", 1e-42, 3e-41),
     ]
-    made.append(
+    every.append(
         Journey(
             sw.Pendulum(1.0, 0.1, **drive),
             "standard_euler",
@@ -62,7 +62,7 @@ def journeys() -> list[Journey]:
             twin=sw.Pendulum(1.3, 0.4, a=sw.Sinusoid(0.3, 2.0, 0.3)),
         )
     )
-    return made
+    return every
 
 
 @languages
@@ -131,7 +131,7 @@ def test_what_a_file_says() -> None:
 
 def test_what_does_not_go_is_refused() -> None:
     sampled = sw.Oscillator(a=sw.Sampled([1.0, 2.0], 1.0))
-    for system, method, how, error, said in (
+    for system, method, options, error, message in (
         (sampled, "rk4", {}, UnsupportedError, "dtype: an exported step has numbers of one width"),
         (sw.Oscillator(), "taylor", {}, UnsupportedError, "dtype: float32 does not go with taylor"),
         (sw.Oscillator(), "rk4", {"y": 1e39}, ArgumentError, "y: expected numbers up to 3.4e38"),
@@ -143,8 +143,8 @@ def test_what_does_not_go_is_refused() -> None:
             "dt: expected a number of size 1.4e-45 to 3.4e38 units of time in float32",
         ),
     ):
-        with pytest.raises(error, match=said):
-            sw.export(system, method, "c", dtype="float32", **how)  # type: ignore[arg-type]
+        with pytest.raises(error, match=message):
+            sw.export(system, method, "c", dtype="float32", **options)  # type: ignore[arg-type]
 
 
 def test_the_command(capsys: Any) -> None:

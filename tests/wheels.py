@@ -44,9 +44,9 @@ def check_library(wheel: Path) -> None:
     """Fails unless its library is for the machine of its name and can be imported as ``_core``."""
     with zipfile.ZipFile(wheel) as files:
         library = files.read("stepwell/_core.abi3.so")
-    found = int.from_bytes(library[18:20], "little")
+    number = int.from_bytes(library[18:20], "little")
     assert library[:4] == b"\x7fELF", wheel
-    assert found == ELF[machine(wheel)], (wheel, found)
+    assert number == ELF[machine(wheel)], (wheel, number)
     assert b"PyInit__core" in library, wheel
     assert "manylinux2014" in wheel.name, f"{wheel.name} asks for a newer system than it should"
     print(f"{wheel.name}: a library for {machine(wheel)}, {len(library) / 1e6:.1f} MB")

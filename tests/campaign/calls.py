@@ -44,20 +44,20 @@ def whole(value: Any) -> int:
         return len(str(type(value)))
 
 
-def world_stepped(steps: Any = 3, again: Any = 2, force: Any = None, **given: Any) -> sw.World:
+def world_stepped(steps: Any = 3, again: Any = 2, force: Any = None, **arguments: Any) -> sw.World:
     """A world that makes some steps, which are those of a run."""
     for name in ("v", "y"):
-        if isinstance(given.get(name), float):
-            given[name] = np.full(3, given[name])
-    begun = {name: np.array(given[name]) for name in ("v", "y") if isinstance(given.get(name), np.ndarray)}
-    world = sw.World(**given, force=force)
+        if isinstance(arguments.get(name), float):
+            arguments[name] = np.full(3, arguments[name])
+    begun = {name: np.array(arguments[name]) for name in ("v", "y") if isinstance(arguments.get(name), np.ndarray)}
+    world = sw.World(**arguments, force=force)
     world.step(steps)
     if again is not None:
         world.step(again)
-    made = (1 if steps is None else whole(steps)) + (0 if again is None else whole(again))
-    if 0 < made < 100 and set(begun) == {"v", "y"} and np.isfinite(world.v).all() and np.isfinite(world.y).all():
-        options = {name: each for name, each in given.items() if name not in ("v", "y")}
-        run = sw.integrate(**options, **begun, force=force, steps=made)
+    total = (1 if steps is None else whole(steps)) + (0 if again is None else whole(again))
+    if 0 < total < 100 and set(begun) == {"v", "y"} and np.isfinite(world.v).all() and np.isfinite(world.y).all():
+        options = {name: each for name, each in arguments.items() if name not in ("v", "y")}
+        run = sw.integrate(**options, **begun, force=force, steps=total)
         same("v of world and run", world.v, run.v[-1])
         same("y of world and run", world.y, run.y[-1])
     return world
@@ -89,13 +89,13 @@ def right_run(
     name = list(SYSTEMS)[whole(system) % len(SYSTEMS)]
     rng = np.random.default_rng(whole(seed) % 2**32)
     members = whole(members) % 20 + 1
-    made, record = SYSTEMS[name](rng, members), sw.method(METHODS[whole(method) % len(METHODS)])
-    if not fits(made, record):
+    instance, record = SYSTEMS[name](rng, members), sw.method(METHODS[whole(method) % len(METHODS)])
+    if not fits(instance, record):
         record = sw.method("rk4")
-    state = {block: rng.normal(size=(*shape, members)) for block, shape in (("v", made.v_shape), ("y", made.y_shape))}
+    state = {block: rng.normal(size=(*shape, members)) for block, shape in (("v", instance.v_shape), ("y", instance.y_shape))}
     options = {"dt": dt, "steps": steps, "every": every} | more
-    run = sw.integrate(made, record, **state, **options)
-    reference = sw.integrate(made, record, **state, **options, backend="numpy")
+    run = sw.integrate(instance, record, **state, **options)
+    reference = sw.integrate(instance, record, **state, **options, backend="numpy")
     for block in ("t", "v", "y", "first_bad_step"):
         same(f"{block} of the core and the reference, {name} by {record.name}", getattr(run, block), getattr(reference, block))
     return run
@@ -105,11 +105,11 @@ def right_adaptive_run(system: Any = 0, method: Any = 0, seed: Any = 0, toleranc
     """The same with adaptive steps."""
     name = ADAPTIVE[whole(system) % len(ADAPTIVE)]
     rng = np.random.default_rng(whole(seed) % 2**32)
-    made, record = SYSTEMS[name](rng, 2), sw.method(("merson", "fehlberg", "fehlberg_5", "dop853")[whole(method) % 4])
-    state = {block: rng.normal(size=(*shape, 2)) for block, shape in (("v", made.v_shape), ("y", made.y_shape))}
+    instance, record = SYSTEMS[name](rng, 2), sw.method(("merson", "fehlberg", "fehlberg_5", "dop853")[whole(method) % 4])
+    state = {block: rng.normal(size=(*shape, 2)) for block, shape in (("v", instance.v_shape), ("y", instance.y_shape))}
     options = {"tolerance": tolerance, "at": [0.1, until], "max_steps": 60}
-    run = sw.integrate(made, record, **state, **options)
-    reference = sw.integrate(made, record, **state, **options, backend="numpy")
+    run = sw.integrate(instance, record, **state, **options)
+    reference = sw.integrate(instance, record, **state, **options, backend="numpy")
     for block in ("t", "v", "y", "first_bad_step"):
         same(f"{block} of the core and the reference, {name} by {record.name}", getattr(run, block), getattr(reference, block))
     return run
@@ -135,24 +135,24 @@ def load_damaged(at: Any = 0, by: Any = 1, length: Any = -1) -> Any:
 
 def command(*_: Any, **words: Any) -> str:
     """The command line: 0, or 2 and a line that begins with the name of the command."""
-    told, wrong = io.StringIO(), io.StringIO()
-    given = [str(word) for word in words.values() if word is not None]
-    with contextlib.redirect_stdout(told), contextlib.redirect_stderr(wrong), contextlib.chdir(FOLDER):
+    printed, wrong = io.StringIO(), io.StringIO()
+    arguments = [str(word) for word in words.values() if word is not None]
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(wrong), contextlib.chdir(FOLDER):
         try:
-            code = main(given)
+            code = main(arguments)
         except SystemExit as left:  # argparse leaves so
             code = int(left.code or 0)
     if code not in (0, 2) or "Traceback" in wrong.getvalue() or (code == 2 and not wrong.getvalue().strip()):
-        raise WrongBitsError(f"stepwell {given} ended with {code}: {wrong.getvalue()[-300:]}")
-    return told.getvalue()
+        raise WrongBitsError(f"stepwell {arguments} ended with {code}: {wrong.getvalue()[-300:]}")
+    return printed.getvalue()
 
 
 def own_step(kind: Any = 0, steps: Any = 3, y: Any = 1.0, dt: Any = 0.1, **parameters: Any) -> sw.Run:
     """Own equations with strange parameters."""
     several = (own.duffing, own.pendulum, own.bouncing, own.pushed)
-    made = several[whole(kind) % len(several)](**parameters)
-    run = sw.integrate(made, "rk4", v=0.0, y=y, dt=dt, steps=steps)
-    reference = sw.integrate(made, "rk4", v=0.0, y=y, dt=dt, steps=steps, backend="numpy")
+    equations = several[whole(kind) % len(several)](**parameters)
+    run = sw.integrate(equations, "rk4", v=0.0, y=y, dt=dt, steps=steps)
+    reference = sw.integrate(equations, "rk4", v=0.0, y=y, dt=dt, steps=steps, backend="numpy")
     same("v of the core and the reference", run.v, reference.v)
     same("y of the core and the reference", run.y, reference.y)
     return run

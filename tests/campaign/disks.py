@@ -27,8 +27,8 @@ def a_run(y: float) -> sw.Run:
 def a_sweep(path: Path, y: float) -> None:
     """A sweep of four chunks into a store."""
     axes = {"omega": ("omega", [1.0, 2.0, 3.0, 4.0])}
-    told = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=y, dt=0.1, steps=40, every=1, store=path, chunk=1)
-    told.close()
+    dataset = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=y, dt=0.1, steps=40, every=1, store=path, chunk=1)
+    dataset.close()
 
 
 #: Ways to write: the name of the file or folder, and what writes it with a number in it.

@@ -65,7 +65,7 @@ def variations(example: Example) -> list[Call]:
     return every
 
 
-def made(timer: oracle.Timer, call: Call, patient: bool = False) -> oracle.Outcome:
+def make(timer: oracle.Timer, call: Call, patient: bool = False) -> oracle.Outcome:
     """Make one call."""
     name, changed = call
     function, right = calls.EVERY[name]
@@ -95,7 +95,7 @@ class Tally:
             else:
                 self.found[key] = {"call": call, "text": outcome.text, "times": 1}
 
-    def told(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """For a file."""
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return {
@@ -122,7 +122,7 @@ def work(seconds: float, number: int, folder: Path) -> None:
     if hasattr(resource, "RLIMIT_AS"):
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     os.chdir(calls.FOLDER)
-    tally, until, told = Tally(), time.monotonic() + seconds, time.monotonic()
+    tally, until, written = Tally(), time.monotonic() + seconds, time.monotonic()
     draw = random.Random(number)
     with oracle.Timer() as timer:
 
@@ -132,17 +132,17 @@ def work(seconds: float, number: int, folder: Path) -> None:
         )
         @given(examples())
         def go_on(example: Example) -> None:
-            nonlocal told
+            nonlocal written
             if time.monotonic() > until:
                 raise _EnoughError
             (folder / "now.json").write_text(json.dumps(example))
             begin = time.process_time()
             for call in variations(example)[:CALLS_OF_EXAMPLE]:
-                tally.add(call, made(timer, call, draw.randrange(PATIENCE) == 0))
+                tally.add(call, make(timer, call, draw.randrange(PATIENCE) == 0))
                 if time.process_time() - begin > SECONDS_OF_EXAMPLE:
                     break
-            if time.monotonic() > told + 5.0:
-                told = time.monotonic()
+            if time.monotonic() > written + 5.0:
+                written = time.monotonic()
                 _write(folder / "tally.json", tally)
 
         try:
@@ -159,7 +159,7 @@ class _EnoughError(BaseException):
 
 def _write(path: Path, tally: Tally) -> None:
     beside = path.with_suffix(".new")
-    beside.write_text(json.dumps(tally.told()))
+    beside.write_text(json.dumps(tally.as_dict()))
     beside.replace(path)
 
 
@@ -254,17 +254,17 @@ def replay(folder: Path) -> None:
     with oracle.Timer() as timer:
         for call in variations(json.loads((folder / "now.json").read_text())):
             (folder / "call.json").write_text(json.dumps(call))
-            made(timer, call)
+            make(timer, call)
 
 
 def once(call: Call) -> oracle.Outcome:
     """One call, as in a campaign."""
     oracle.quiet()
     with oracle.Timer() as timer:
-        return made(timer, call, patient=True)
+        return make(timer, call, patient=True)
 
 
-def told(call: Call) -> str:
+def in_words(call: Call) -> str:
     """A call in words."""
     name, changed = call
     right = calls.EVERY[name][1]
@@ -282,7 +282,7 @@ def main() -> None:
     parser.add_argument("--call", type=json.loads, help="make one call, which is given as a report has it")
     args = parser.parse_args()
     if args.call is not None:
-        print(told(args.call), once(args.call))
+        print(in_words(args.call), once(args.call))
     elif args.replay is not None:
         replay(args.replay)
     elif args.shift is not None:

@@ -79,13 +79,13 @@ class Timer:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
-def judged(timer: Timer, call: Callable[..., Any], given: dict[str, Any], names: Iterable[str], seconds: float) -> Outcome:
+def judged(timer: Timer, call: Callable[..., Any], arguments: dict[str, Any], names: Iterable[str], seconds: float) -> Outcome:
     """Make a call whose strange arguments have these names."""
     begin = time.process_time()
     try:
         try:
             timer.start(seconds)
-            result = call(**given)
+            result = call(**arguments)
         finally:
             timer.armed = False
         timer.stop()
@@ -95,7 +95,7 @@ def judged(timer: Timer, call: Callable[..., Any], given: dict[str, Any], names:
         return Outcome("failed", f"stopped {late:.1f} s late", "late") if late > UNTIL_STOPPED else Outcome("stopped")
     except sw.StepwellError as error:
         timer.stop()
-        return _refusal(str(error), [*names, *given])
+        return _refusal(str(error), [*names, *arguments])
     except MemoryError as error:
         timer.stop()
         return Outcome("memory", str(error))

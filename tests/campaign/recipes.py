@@ -192,7 +192,7 @@ def changes() -> st.SearchStrategy[Recipe]:
 
 def others() -> st.SearchStrategy[Recipe]:
     """What is right for another argument, of this call or of another."""
-    pairs = [(name, argument) for name, (_, given) in CALLS.items() for argument in given]
+    pairs = [(name, argument) for name, (_, arguments) in CALLS.items() for argument in arguments]
     return st.sampled_from(pairs).map(lambda pair: ["right for", *pair])
 
 

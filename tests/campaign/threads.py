@@ -55,22 +55,22 @@ def same(one: Any, other: Any) -> None:
 def one_system(turn: int) -> int:
     """One system, and one array of starts, for all threads."""
     system, y = sw.Oscillator(np.linspace(0.5, 1.5, 300)), np.linspace(0.0, 1.0, 300)
-    how = ("rk4", "verlet", "false_euler", "merson")[turn % 4]
+    method = ("rk4", "verlet", "false_euler", "merson")[turn % 4]
 
     def run(i: int) -> Any:
-        return sw.integrate(system, how, v=0.0, y=y, dt=0.1, steps=50 + 7 * turn, every=5, threads=1 + i % 3)
+        return sw.integrate(system, method, v=0.0, y=y, dt=0.1, steps=50 + 7 * turn, every=5, threads=1 + i % 3)
 
     alone = run(0)
-    for made in together(run):
-        same(made.v, alone.v)
-        same(made.y, alone.y)
+    for result in together(run):
+        same(result.v, alone.v)
+        same(result.y, alone.y)
     return THREADS
 
 
 def new_systems(turn: int) -> int:
     """Every thread brings own equations that were never traced, some of them the same: one cache takes them all."""
 
-    def made(i: int) -> Any:
+    def integrated(i: int) -> Any:
         shift, factor = float(i % 3), 1.0 + turn % 50
 
         @sw.system
@@ -79,9 +79,9 @@ def new_systems(turn: int) -> int:
 
         return sw.integrate(rates(k=1.5), "rk4", v=0.0, y=[0.1, 0.2, 0.3], dt=0.01, steps=2000)
 
-    runs = together(made)
+    runs = together(integrated)
     for i, run in enumerate(runs):
-        same(run.y, made(i).y)
+        same(run.y, integrated(i).y)
     return THREADS
 
 
@@ -189,8 +189,8 @@ def adaptive_and_events(_: int) -> int:
         lambda: sw.integrate(sw.Chain(50), "verlet", v=0.0, y=np.arange(50.0), dt=0.1, steps=30, form="matrix").y,
     ]
     alone = [act() for act in acts]
-    for i, made in enumerate(together(lambda i: acts[i % len(acts)]())):
-        same(made, alone[i % len(acts)])
+    for i, result in enumerate(together(lambda i: acts[i % len(acts)]())):
+        same(result, alone[i % len(acts)])
     return THREADS
 
 

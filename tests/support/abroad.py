@@ -54,9 +54,9 @@ class Journey:
     expected: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        given = {"v": self.v, "y": self.y, "dt": self.dt, "t0": self.t0, **self.options}
+        arguments = {"v": self.v, "y": self.y, "dt": self.dt, "t0": self.t0, **self.options}
         with np.errstate(all="ignore"):
-            run = sw.integrate(self.twin or self.system, self.method, steps=self.steps, **given)
+            run = sw.integrate(self.twin or self.system, self.method, steps=self.steps, **arguments)
         at = (...,) if self.member is None else (..., self.member)
         blocks = [run.v[-1][at], run.y[-1][at]] + ([] if run.work is None else [run.work[at]])
         self.expected = [float(each) for block in blocks for each in np.ravel(block)]
@@ -164,13 +164,13 @@ def _javascript(journeys: Sequence[Journey], sources: Sequence[str], folder: Pat
         (folder / f"step_{i}.mjs").write_text(source, encoding="utf-8")
         begin += f'import {{ Step{i} }} from "./step_{i}.mjs";\n'
         v, y = (f"[{', '.join(map(repr, block))}]" for block in each.blocks)
-        given = ", ".join(block for block, numbers in zip((v, y), each.blocks, strict=True) if numbers)
+        start = ", ".join(block for block, numbers in zip((v, y), each.blocks, strict=True) if numbers)
         force = f", {each.force!r}" * bool(each.force)  # more arguments than a function has are left out
         changed = "".join(f"m.{name} = {value!r}; " for name, value in each.changed.items())
-        text += f"{{ const m = new {camel(f'step_{i}')}(); {changed}m.prepare(); const s = m.start({given}{force});\n"
+        text += f"{{ const m = new {camel(f'step_{i}')}(); {changed}m.prepare(); const s = m.start({start}{force});\n"
         text += f"  for (let k = 0; k < {each.steps}; k++) m.step(s{force});\n"
-        told = [f"m.finish(s{force})" if each.carries else "s.v ?? []", "s.y ?? []"] + ["[m.work(s)]"] * each.works
-        text += f"  console.log([{', '.join(f'...({part})' for part in told)}].map(word).join(' ')); }}\n"
+        parts = [f"m.finish(s{force})" if each.carries else "s.v ?? []", "s.y ?? []"] + ["[m.work(s)]"] * each.works
+        text += f"  console.log([{', '.join(f'...({part})' for part in parts)}].map(word).join(' ')); }}\n"
     (folder / "all.mjs").write_text(begin + text, encoding="utf-8")
     return executed(["node", "all.mjs"], folder).splitlines()
 
@@ -182,13 +182,13 @@ def _rust(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> 
     for i, (each, source) in enumerate(zip(journeys, sources, strict=True)):
         text += f"pub mod step_{i} {{\n{source}\n}}\n"
         arrays = [block for block in each.blocks if block]
-        given = ", ".join(f"[{', '.join(_rust_number(x, each.single) for x in block)}]" for block in arrays)
+        start = ", ".join(f"[{', '.join(_rust_number(x, each.single) for x in block)}]" for block in arrays)
         text += f"fn run_{i}() {{\n    let mut m = step_{i}::Step{i}::new();\n"
         text += "".join(f"    m.{name} = {value!r};\n" for name, value in each.changed.items())
         push = f"[{', '.join(_rust_number(x, each.single) for x in each.force)}]"
         text += f"    let f = {push};\n" * bool(each.force)
         force = {of: ", &f" * each.takes_force(source, f"pub fn {of}(") for of in ("start", "step")}
-        text += f"    m.prepare();\n    let mut s = m.start({given}{force['start']});\n"
+        text += f"    m.prepare();\n    let mut s = m.start({start}{force['start']});\n"
         text += f"    for _ in 0..{each.steps} {{ m.step(&mut s{force['step']}); }}\n"
         if each.carries:
             text += f"    tell(&m.finish(&s{', &f' * each.takes_force(source, 'pub fn finish(')}));\n"
@@ -231,9 +231,9 @@ def _python(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -
 
 def raising_fma(a: float, b: float, c: float) -> float:
     """As ``math.fma``: what is no number and what overflows is an error, unless it was given."""
-    made = float(fma(a, b, c))
-    if made != made and not any(map(math.isnan, (a, b, c))):
+    result = float(fma(a, b, c))
+    if result != result and not any(map(math.isnan, (a, b, c))):
         raise ValueError("invalid operation in fma")
-    if math.isinf(made) and not any(map(math.isinf, (a, b, c))):
+    if math.isinf(result) and not any(map(math.isinf, (a, b, c))):
         raise OverflowError("overflow in fma")
-    return made
+    return result

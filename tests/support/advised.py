@@ -110,12 +110,12 @@ def assert_cheap(brute: Brute, advice: sw.advice.Advice) -> None:
 
     Their error is nearly nothing, and that of one step more or one step fewer a hundred times what is allowed.
     """
-    found = brute.best(advice.tolerance, brute.cost(advice) / WORTH)
-    if found is not None and found.tolerance is None:
-        beside = [brute.error(found.method, brute.end / n, n) for n in (found.steps - 1, found.steps + 1)]
+    cheaper = brute.best(advice.tolerance, brute.cost(advice) / WORTH)
+    if cheaper is not None and cheaper.tolerance is None:
+        beside = [brute.error(cheaper.method, brute.end / n, n) for n in (cheaper.steps - 1, cheaper.steps + 1)]
         assert min(beside) > 100 * advice.tolerance
     else:
-        assert found is None
+        assert cheaper is None
 
 
 def tried(cases: Mapping[str, Sequence[float]], long: Collection[str] = ()) -> list[Any]:

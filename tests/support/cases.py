@@ -57,11 +57,11 @@ def _moments(rng: np.random.Generator, b: int) -> Any:
     return rng.uniform(1.0, 2.0, (3, b))
 
 
-def _hung(rng: np.random.Generator, dim: int, **given: Any) -> sw.Springs:
+def _hung(rng: np.random.Generator, dim: int, **options: Any) -> sw.Springs:
     """A net of three by three particles that hangs from two corners."""
     layout = np.stack(np.meshgrid(range(3), range(3), [0]), axis=-1).reshape(9, 3)[:, :dim] + 0.1 * rng.normal(size=(9, dim))
     pairs = [(i, j) for i in range(9) for j in range(i + 1, 9) if max(abs(i // 3 - j // 3), abs(i % 3 - j % 3)) == 1]
-    return sw.Springs(pairs, stiffness=rng.uniform(0.5, 2.0, len(pairs)), layout=layout, fixed=[0, 2], **given)
+    return sw.Springs(pairs, stiffness=rng.uniform(0.5, 2.0, len(pairs)), layout=layout, fixed=[0, 2], **options)
 
 
 #: One maker for each kernel variant of each system.
@@ -321,12 +321,12 @@ def cases(methods: Iterator[str] | None = None) -> Iterator[Case]:
     one_member = {name: make(rng, 1) for name, make in SYSTEMS.items()}
     names = [m.name for m in sw.methods()] if methods is None else list(methods)
     for method, system in itertools.product(names, SYSTEMS):
-        made, record = one_member[system], sw.method(method)
-        if not fits(made, record) or (record.has_series and system in DIVERGE_IN_SERIES):
+        instance, record = one_member[system], sw.method(method)
+        if not fits(instance, record) or (record.has_series and system in DIVERGE_IN_SERIES):
             continue
-        waves = any(isinstance(x, sw.Sinusoid) for x in made.given_inputs().values())
-        forms = ["direct"] + ["matrix"] * (made.linear and not (record.has_series and waves))
-        if "matrix" in forms and all(isinstance(x, sw.Sinusoid) or x.constant for x in made.given_inputs().values()):
+        waves = any(isinstance(x, sw.Sinusoid) for x in instance.given_inputs().values())
+        forms = ["direct"] + ["matrix"] * (instance.linear and not (record.has_series and waves))
+        if "matrix" in forms and all(isinstance(x, sw.Sinusoid) or x.constant for x in instance.given_inputs().values()):
             forms.append("power")
         for form in forms:
             for start in record.starts or (None,):

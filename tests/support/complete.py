@@ -20,8 +20,8 @@ TOO_LARGE = "torch is large"
 def _complete(report: Any) -> Any:
     """The report, failed if it tells of something that is missing."""
     reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
-    asked = os.environ.get("STEPWELL_TESTS") == "complete" and report.skipped and not hasattr(report, "wasxfail")
-    if asked and MISSING.search(reason) and TOO_LARGE not in reason:
+    counts = os.environ.get("STEPWELL_TESTS") == "complete" and report.skipped and not hasattr(report, "wasxfail")
+    if counts and MISSING.search(reason) and TOO_LARGE not in reason:
         report.outcome, report.longrepr = "failed", f"{reason}; with STEPWELL_TESTS=complete nothing may be missing"
     return report
 

@@ -49,9 +49,9 @@ def no_energy_added(method: str, backend: str = "rust", restitution: float = 1.0
     assert met.any(axis=0).mean() > 0.9
     assert np.where(met, np.diff(energy, axis=0), -1.0).max() <= ROUNDING * energy.max()
     # False Euler loses ½·(h·g)² in each step of flight; what the two others keep has the lag's term.
-    kept = energies(run, kick, max(0.0, LAG.get(method, 0.0)))
+    invariant = energies(run, kick, max(0.0, LAG.get(method, 0.0)))
     rests = (run.y[1:, 0, 0] == 0.0) & (run.v[1:, 0, 0] == 0.0)  # the least of the energy, though not of that with the term
-    assert np.where(rests, -1.0, np.diff(kept, axis=0)).max() <= ROUNDING * energy.max()
+    assert np.where(rests, -1.0, np.diff(invariant, axis=0)).max() <= ROUNDING * energy.max()
     assert run.y.min() >= -ROUNDING * run.y.max()
 
 

@@ -23,10 +23,10 @@ U = 2.0**-53
 
 def check_a_trial_is_the_state_that_is_saved_within_a_step(method: str, name: str) -> None:
     """At any time within a step, and at its end."""
-    rng, how = np.random.default_rng(1), sw.method(method)
+    rng, record = np.random.default_rng(1), sw.method(method)
     system = SYSTEMS[name](rng, 4)
     v, y = 0.3 * rng.normal(size=(*system.v_shape, 4)), rng.normal(size=(*system.y_shape, 4))
-    plan = engine.Plan(system, how, (4,), 1.0, order=10 if how.has_series else 0)
+    plan = engine.Plan(system, record, (4,), 1.0, order=10 if record.has_series else 0)
     paces = engine.paces(plan, None, engine.Tolerances(np.array(1e-6), None))
     out = attempts.attempted(plan, np.inf, 12, 1000, True, paces, v, y)
     trials, who = AdaptiveTrials(plan, Members(plan)), np.arange(4)
@@ -35,11 +35,11 @@ def check_a_trial_is_the_state_that_is_saved_within_a_step(method: str, name: st
         np.testing.assert_array_equal(block, end)
     for share in (0.1, 0.7):
         at = out.t[10] + share * h
-        made = trials.step(who, out.t[10], at - out.t[10], out.v[10], out.y[10])
+        trial = trials.step(who, out.t[10], at - out.t[10], out.v[10], out.y[10])
         for i in who:
             saved = engine.adapt(plan, engine.Pacing(at[i : i + 1], 1000, True), paces, v, y)
-            for block, kept in zip(made, (saved.v, saved.y), strict=True):
-                np.testing.assert_array_equal(block[..., i], kept[0][..., i])
+            for block, states in zip(trial, (saved.v, saved.y), strict=True):
+                np.testing.assert_array_equal(block[..., i], states[0][..., i])
 
 
 #: As of test_events: the first comes often, of the second three are kept, the third stops about half of the members.
@@ -51,8 +51,13 @@ THREE = [
 
 
 def sweep(members: Any = slice(None), method: str = "merson", **options: Any) -> sw.Run:
-    given = {"v": np.linspace(-0.5, 0.5, 40)[members], "y": 1.0, "tolerance": 1e-6, "at": np.linspace(0.0, 30.0, 20)} | options
-    return sw.integrate(sw.Pendulum(np.linspace(0.5, 2.0, 40)[members]), method, **({"events": THREE} | given))
+    arguments = {
+        "v": np.linspace(-0.5, 0.5, 40)[members],
+        "y": 1.0,
+        "tolerance": 1e-6,
+        "at": np.linspace(0.0, 30.0, 20),
+    } | options
+    return sw.integrate(sw.Pendulum(np.linspace(0.5, 2.0, 40)[members]), method, **({"events": THREE} | arguments))
 
 
 def check_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter(method: str, fused: bool) -> None:
@@ -81,11 +86,11 @@ def check_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter(method:
 
 def check_a_member_that_stopped_stays_where_it_was_and_cannot_go_on() -> None:
     run, free = sweep(), sweep(events=THREE[:2])
-    found = run.events["end"]
+    ends = run.events["end"]
     assert run.stopped_at is not None
     assert run.paces is not None
     for i in range(40):
-        end = found.of(i)
+        end = ends.of(i)
         before = run.t < (run.stopped_at[i] if len(end.t) else np.inf)
         np.testing.assert_array_equal(run.y[before, i], free.y[before, i])  # to there it is the motion without an end
         if not len(end.t):
@@ -97,8 +102,8 @@ def check_a_member_that_stopped_stays_where_it_was_and_cannot_go_on() -> None:
         np.testing.assert_array_equal(run.v[~before, i], np.broadcast_to(end.v[0], (~before).sum()))
         for other in ("crossing", "speed"):
             assert (run.events[other].of(i).t <= end.t[0]).all()
-            kept = free.events[other].of(i).t
-            np.testing.assert_array_equal(run.events[other].of(i).t, kept[kept <= end.t[0]])
+            times = free.events[other].of(i).t
+            np.testing.assert_array_equal(run.events[other].of(i).t, times[times <= end.t[0]])
     with pytest.raises(sw.errors.UnsupportedError, match="stopped at an event"):
         sw.integrate(run.system, run.method, resume=run, at=[99.0])
     assert "stopped at an event" in repr(run)
@@ -111,12 +116,12 @@ def growing(t: Any, y: Any, *, rate: float = 1.0) -> Any:
 
 def check_what_comes_after_a_terminal_event_is_not_computed(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """ẏ = y² from 1 is 1/(1 − t): infinite at 1, where steps become too short; without a word if it stops at y = 10, t = 0.9."""
-    made: list[Any] = []
+    results: list[Any] = []
     adapt = engine.adapt
 
-    def noted(*given: Any) -> Any:
-        made.append(adapt(*given))
-        return made[-1]
+    def noted(*arguments: Any) -> Any:
+        results.append(adapt(*arguments))
+        return results[-1]
 
     monkeypatch.setattr(engine, "adapt", noted)
     ten = sw.Event(lambda t, y: y - 10.0, terminal=True, name="ten")
@@ -126,9 +131,9 @@ def check_what_comes_after_a_terminal_event_is_not_computed(method: str, monkeyp
     assert abs(run.stopped_at - 0.9) < 1e-7
     assert abs(run.y[-1] - 10.0) < 1e-9
     assert run.first_bad_step == -1
-    assert len(made) == 1
+    assert len(results) == 1
     assert run.paces is not None
-    assert made[0].paces[engine.COUNTS.start] == run.paces.accepted
+    assert results[0].paces[engine.COUNTS.start] == run.paces.accepted
     # A run to that time alone has one more state to save, and does not take its last step.
     near = sw.integrate(growing(), method, y=1.0, tolerance=1e-8, at=[0.5, float(run.stopped_at)])
     assert near.paces is not None

@@ -100,8 +100,8 @@ def evaluate(explained: sw.Explanation, known: dict[str, Any], tables: dict[str,
     }
     places = {name: f"name_{i}" for i, name in enumerate(values)}
 
-    def plain(found: re.Match[str]) -> str:
-        name, of = found.groups()
+    def plain(match: re.Match[str]) -> str:
+        name, of = match.groups()
         return places.get(name, name) if of is None else f"{places[f'look up {name}']}({places[of]})"
 
     numbered = {places[name]: value for name, value in values.items()}

@@ -67,14 +67,14 @@ def scene_of(name: str) -> sw.Scene:
 
 
 def data_of(name: str) -> dict[str, Any]:
-    (found,) = (each for each in page().data["scenes"] if each["name"] == name)
-    return found
+    (scene,) = (each for each in page().data["scenes"] if each["name"] == name)
+    return scene
 
 
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="there is no Node here")
 
 
-def in_node(script: str, folder: Path, given: Any = None, change: tuple[str, str, str] | None = None) -> Any:
+def in_node(script: str, folder: Path, data: Any = None, change: tuple[str, str, str] | None = None) -> Any:
     """What a script makes of the page's modules, as JSON. ``change`` is a module, and a text in it for another: a mistake."""
     for module in WEB.glob("*.js"):
         text = module.read_text(encoding="utf-8")
@@ -83,7 +83,7 @@ def in_node(script: str, folder: Path, given: Any = None, change: tuple[str, str
             text = text.replace(change[1], change[2])
         (folder / module.name).write_text(text, encoding="utf-8")
     (folder / "package.json").write_text('{"type": "module"}')
-    (folder / "given.json").write_text(json.dumps({"scenes": page().data["scenes"], "given": given}))
+    (folder / "given.json").write_text(json.dumps({"scenes": page().data["scenes"], "given": data}))
     begin = """
 import { readFileSync } from "node:fs";
 import * as roots from "./roots.js";
@@ -112,10 +112,10 @@ def expected(scene: sw.Scene, method: str, steps: int = STEPS) -> list[str]:
 
 def races() -> list[tuple[str, str, dict[str, float], Any]]:
     """Name of a scene, method, sliders, the scene in Python: every scene by every method, and some with other parameters."""
-    found: list[tuple[str, str, dict[str, float], Any]] = []
+    rows: list[tuple[str, str, dict[str, float], Any]] = []
     for each in page().data["scenes"]:
-        found += [(each["name"], key, {}, scene_of(each["name"])) for key in each["steps"] if key != "truth"]
+        rows += [(each["name"], key, {}, scene_of(each["name"])) for key in each["steps"] if key != "truth"]
     for name, values, make in CHANGED.values():
         scene = make(scene_of(name))
-        found += [(name, key, values, scene) for key in ("false_euler", "leapfrog", "rk4") if key in data_of(name)["steps"]]
-    return found
+        rows += [(name, key, values, scene) for key in ("false_euler", "leapfrog", "rk4") if key in data_of(name)["steps"]]
+    return rows

@@ -80,10 +80,10 @@ def journeys(language: str) -> list[Journey]:
     return [journey(*each) for each in chosen]
 
 
-def assert_same(journeys: list[Journey], found: list[list[float]]) -> None:
+def assert_same(journeys: list[Journey], results: list[list[float]]) -> None:
     """To the bit."""
-    assert len(journeys) == len(found)
-    for each, numbers in zip(journeys, found, strict=True):
+    assert len(journeys) == len(results)
+    for each, numbers in zip(journeys, results, strict=True):
         assert len(numbers) == len(each.expected), (each.system, each.method)
         assert all(map(same, numbers, each.expected)), (each.system, each.method, each.options, numbers, each.expected)
 

@@ -71,17 +71,17 @@ class Numbers:
 
 def arrays(run: sw.Run) -> Arrays:
     """Everything that a run computed."""
-    kept: Arrays = {name: getattr(run, name) for name in ("t", "v", "y", "first_bad_step", "status", "carry", "work")}
-    kept |= {f"recorded {name}": run.recorded[name] for name in sorted(run.recorded)}
+    computed: Arrays = {name: getattr(run, name) for name in ("t", "v", "y", "first_bad_step", "status", "carry", "work")}
+    computed |= {f"recorded {name}": run.recorded[name] for name in sorted(run.recorded)}
     if run.paces is not None:
-        kept |= run.paces._asdict()
-    return {name: np.asarray(array) for name, array in kept.items() if array is not None}
+        computed |= run.paces._asdict()
+    return {name: np.asarray(array) for name, array in computed.items() if array is not None}
 
 
-def hashes(kept: Arrays) -> list[str]:
+def hashes(computed: Arrays) -> list[str]:
     """Two: of the bits, and of the values, in which −0 is +0. A NaN is a NaN in both, whatever its bits."""
     bits, values = (hashlib.blake2b(digest_size=8) for _ in range(2))
-    for name, array in kept.items():
+    for name, array in computed.items():
         array = np.where(np.isnan(array), np.nan, array).astype("<f8") if array.dtype.kind == "f" else array.astype("<i8")
         for digest, each in ((bits, array), (values, array + 0)):  # −0 + 0 is +0, and nothing else changes
             digest.update(f"{name} {each.dtype.kind} {each.shape};".encode())
@@ -260,9 +260,9 @@ def paced() -> Iterator[Recorded]:
 
         def ask(system: str = system, members: int | None = members) -> Any:
             rng = Numbers("paced", system, members)
-            made = PACED[system](rng, _axes(members))
-            v, y = (rng.normal(size=(*shape, *_axes(members))) for shape in (made.v_shape, made.y_shape))
-            return made, {"v": 0.3 * v, "y": y}
+            instance = PACED[system](rng, _axes(members))
+            v, y = (rng.normal(size=(*shape, *_axes(members))) for shape in (instance.v_shape, instance.y_shape))
+            return instance, {"v": 0.3 * v, "y": y}
 
         if np.ndim(tolerance) and system.startswith("linear"):  # whose components have tolerances of their own, or could have
             tolerance = tolerance[np.newaxis]
@@ -278,17 +278,17 @@ def paced() -> Iterator[Recorded]:
 
     hard = np.array([0.1, 0.99, 0.5, 0.1, 0.9])[np.arange(40) % 5]
     for method in ABLE:
-        given: dict[str, Any] = {"method": method, "at": [1.0, 3.0, 6.0]}
-        yield _fixed(f"{method}, orbits, tolerance, a pair", lambda: orbit(hard), tolerance=(1e-6, 1e-9), dt=0.2, **given)
-        yield _fixed(f"{method}, orbits, tolerance, out of steps", lambda: orbit(hard), tolerance=1e-8, max_steps=70, **given)
+        options: dict[str, Any] = {"method": method, "at": [1.0, 3.0, 6.0]}
+        yield _fixed(f"{method}, orbits, tolerance, a pair", lambda: orbit(hard), tolerance=(1e-6, 1e-9), dt=0.2, **options)
+        yield _fixed(f"{method}, orbits, tolerance, out of steps", lambda: orbit(hard), tolerance=1e-8, max_steps=70, **options)
         yield _fixed(
-            f"{method}, orbits, tolerance, energy recorded", lambda: orbit(0.6), tolerance=1e-7, record="energy", **given
+            f"{method}, orbits, tolerance, energy recorded", lambda: orbit(0.6), tolerance=1e-7, record="energy", **options
         )
         fall = {"v": np.zeros((2, 2)), "y": np.array([[-0.5, 0.0], [0.5, 0.0]])}
         free = sw.NBody([1.0, 1.0], force="newton")
-        yield _fixed(f"{method}, free fall, tolerance", lambda fall=fall, free=free: (free, fall), tolerance=1e-8, **given)
+        yield _fixed(f"{method}, free fall, tolerance", lambda fall=fall, free=free: (free, fall), tolerance=1e-8, **options)
         still = {"v": np.zeros((2, 2)), "y": np.zeros((2, 2))}
-        yield _fixed(f"{method}, two in one place, tolerance", lambda s=still, free=free: (free, s), tolerance=1e-8, **given)
+        yield _fixed(f"{method}, two in one place, tolerance", lambda s=still, free=free: (free, s), tolerance=1e-8, **options)
 
 
 def diverging() -> Iterator[Recorded]:
@@ -377,13 +377,13 @@ def _in_pieces(
     system: sw.System, arguments: dict[str, Any], first: dict[str, Any], steps: tuple[int, ...] = (7, 1, 16)
 ) -> Arrays:
     """``first`` is what only the first piece is given."""
-    kept: Arrays = {}
+    computed: Arrays = {}
     same = {k: arguments[k] for k in ("method", "dt", "form", "record", "every", "backend") if k in arguments}
     run = None
     for i, n in enumerate(steps):
         run = sw.integrate(system, **(arguments | first if run is None else same | {"resume": run}), steps=n)
-        kept |= {f"{i} {name}": array for name, array in arrays(run).items()}
-    return kept
+        computed |= {f"{i} {name}": array for name, array in arrays(run).items()}
+    return computed
 
 
 def worlds() -> Iterator[Recorded]:
@@ -430,15 +430,15 @@ def _stepped(case: Case, members: int) -> Arrays:
 
 
 def _walk(world: sw.World) -> Arrays:
-    kept: Arrays = {}
+    computed: Arrays = {}
     for i, steps in enumerate((1, 4, 1, 0, 9, 40, 2)):
         world.step(steps)
-        kept |= {f"{i} v": world.v.copy(), f"{i} y": world.y.copy(), f"{i} t": np.asarray(world.t)}
+        computed |= {f"{i} v": world.v.copy(), f"{i} y": world.y.copy(), f"{i} t": np.asarray(world.t)}
         if i == 2:
             world.v[...] += 0.5
         if i == 4:
             world.y[...] -= 0.125
-    return kept | {"step_number": np.asarray(world.step_number)}
+    return computed | {"step_number": np.asarray(world.step_number)}
 
 
 def large() -> Iterator[Recorded]:
@@ -463,12 +463,12 @@ def large() -> Iterator[Recorded]:
         ("nacozy", "false_heun", 64),
     ):
 
-        def held(kind: str = kind, n: int = n) -> Any:
+        def controlled(kind: str = kind, n: int = n) -> Any:
             system, state = _bodies(n, 3, "newton", 2)
             return system, state | {"control": _control(kind, 2)}
 
         yield _fixed(
-            f"{method}, {n} bodies in 3-D, {kind}, large", held, method=method, dt=0.01, steps=3, every=1, record=QUANTITIES
+            f"{method}, {n} bodies in 3-D, {kind}, large", controlled, method=method, dt=0.01, steps=3, every=1, record=QUANTITIES
         )
     yield _fixed(
         "dop853, 64 bodies, tolerance, large", lambda: _bodies(64, 3, "newton", None), method="dop853", tolerance=1e-6, at=[0.2]
@@ -531,16 +531,18 @@ def main() -> int:
     parser.add_argument("--backend", default="rust", choices=("rust", "numpy"), help="who makes the runs")
     parser.add_argument("--dump", metavar="FILE", help="write the arrays as .npz")
     parser.add_argument("word", nargs="?", default="", help="only runs with this in their name")
-    asked = parser.parse_args()
-    chosen = {name: each for name, each in runs().items() if asked.word in name and not (asked.backend == "numpy" and each.world)}
-    found = {name: made(each, asked.backend) for name, each in chosen.items()}
-    if asked.dump:
+    options = parser.parse_args()
+    chosen = {
+        name: each for name, each in runs().items() if options.word in name and not (options.backend == "numpy" and each.world)
+    }
+    computed = {name: made(each, options.backend) for name, each in chosen.items()}
+    if options.dump:
         np.savez_compressed(
-            asked.dump, **{f"{run}: {name}": array for run, kept in found.items() for name, array in kept.items()}
+            options.dump, **{f"{run}: {name}": array for run, blocks in computed.items() for name, array in blocks.items()}
         )
         return 0
-    now = {name: hashes(kept) for name, kept in found.items()}
-    if asked.write:
+    now = {name: hashes(blocks) for name, blocks in computed.items()}
+    if options.write:
         lines = ",\n".join(f"  {json.dumps(name, ensure_ascii=False)}: {json.dumps(pair)}" for name, pair in sorted(now.items()))
         PATH.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
         return 0

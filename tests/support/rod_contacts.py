@@ -25,9 +25,9 @@ METHODS = [m.name for m in sw.methods() if not m.needs_acceleration]
 LAGGING = ("standard_euler", "damped_euler", "false_euler", "false_heun")
 
 
-def dumb_bell(masses: Any = (1.0, 1.0), gravity: float = G, **given: Any) -> sw.Rods:
+def dumb_bell(masses: Any = (1.0, 1.0), gravity: float = G, **options: Any) -> sw.Rods:
     """Two points on a rod of length 1, in a plane."""
-    return sw.Rods(masses, [(0, 1)], 1.0, gravity=gravity, dim=2, **given)
+    return sw.Rods(masses, [(0, 1)], 1.0, gravity=gravity, dim=2, **options)
 
 
 def tilted(angle: Any, height: Any = 0.0) -> Any:
@@ -44,10 +44,10 @@ def drops_as_a_ball(method: str, backend: str = "rust") -> None:
     for angle, masses in ((0.0, (1.0, 2.0)), (0.5 * np.pi, (1.0, 2.0))):
         y = tilted(np.full((4, 12), angle), height)
         bell = dumb_bell(masses, floor=sw.Floor(restitution=e))
-        given: dict[str, Any] = {"dt": 1 / 60, "steps": 40, "every": 1, "backend": backend}
-        run = sw.integrate(bell, method, v=0.0, y=y, **given, control=RESETTING)
+        options: dict[str, Any] = {"dt": 1 / 60, "steps": 40, "every": 1, "backend": backend}
+        run = sw.integrate(bell, method, v=0.0, y=y, **options, control=RESETTING)
         ball = sw.Particles(gravity=G, floor=sw.Floor(restitution=e), dim=2)
-        one = sw.integrate(ball, method, v=0.0, y=y[:1], **given)
+        one = sw.integrate(ball, method, v=0.0, y=y[:1], **options)
         # cos(½π) is not 0 but 6e-17, so the lying one turns by that.
         bound = len(run.t) * ROUNDING * 10.0
         assert np.abs(run.v[:, :, 1] - one.v[:, :1, 1]).max() <= bound
@@ -93,29 +93,29 @@ def strikes(method: str, backend: str = "rust") -> None:
 
 def coulomb(n: Any, t: Any, gain: float, along: float, mu: float) -> tuple[float, float]:
     """Impulses along the normal and the tangent with which the normal velocity gains so much, by Coulomb's law."""
-    found = []
+    answers = []
     stuck = np.linalg.solve(np.array([[n[1], t[1]], [n[0], t[0]]]), [gain, -along])
     if stuck[0] >= 0.0 and abs(stuck[1]) <= mu * stuck[0]:
-        found.append((float(stuck[0]), float(stuck[1])))
+        answers.append((float(stuck[0]), float(stuck[1])))
     for sign in (-1.0, 1.0):
         impulse = gain / (n[1] + sign * mu * t[1])
         slip = along + impulse * (n[0] + sign * mu * t[0])
         if impulse > 0.0 and sign * slip < 0.0:
-            found.append((impulse, sign * mu * impulse))
-    assert len(found) == 1, "Coulomb's law has one answer here"
-    return found[0]
+            answers.append((impulse, sign * mu * impulse))
+    assert len(answers) == 1, "Coulomb's law has one answer here"
+    return answers[0]
 
 
 def impulses_by_enumeration(yields: Any, gains: Any) -> Any:
     """λ ≥ 0 with W·λ ≥ gains, and = where λ > 0: the one solution, by trying all sets of contacts that act."""
-    found = []
+    solutions = []
     for acts in itertools.product([False, True], repeat=len(gains)):
         on, impulses = np.flatnonzero(acts), np.zeros(len(gains))
         impulses[on] = np.linalg.solve(yields[np.ix_(on, on)], gains[on])
         if (impulses >= 0.0).all() and (yields @ impulses >= gains - 1e-12).all():
-            found.append(impulses)
-    assert all(np.allclose(each, found[0]) for each in found), "the matrix is positive definite, so there is one"
-    return found[0]
+            solutions.append(impulses)
+    assert all(np.allclose(each, solutions[0]) for each in solutions), "the matrix is positive definite, so there is one"
+    return solutions[0]
 
 
 def strikes_together(method: str, backend: str = "rust") -> None:
@@ -156,13 +156,13 @@ def strikes_together(method: str, backend: str = "rust") -> None:
             normals[c, point] = normal
         normals = normals.reshape(len(contacts), -1)
         free = np.diag(np.repeat(1.0 / masses, 2))
-        held = free - free @ jacobian.T @ np.linalg.solve(jacobian @ free @ jacobian.T, jacobian @ free)
-        v0 = held @ np.diag(np.repeat(masses, 2)) @ (rng.normal(0.0, 1.0, 2 * n) - 2.0 * normals.sum(axis=0))
+        mobility = free - free @ jacobian.T @ np.linalg.solve(jacobian @ free @ jacobian.T, jacobian @ free)
+        v0 = mobility @ np.diag(np.repeat(masses, 2)) @ (rng.normal(0.0, 1.0, 2 * n) - 2.0 * normals.sum(axis=0))
         speeds = normals @ v0
         # Points that leave are not pushed out, and not let in.
         gains = np.where(speeds < 0.0, -(1.0 + 0.6) * speeds, -speeds)
-        yields = normals @ held @ normals.T
-        expected = v0 + held @ normals.T @ impulses_by_enumeration(yields, gains)
+        yields = normals @ mobility @ normals.T
+        expected = v0 + mobility @ normals.T @ impulses_by_enumeration(yields, gains)
         # Ends that leave one of these would gain from the others by Newton's law; then all velocities are reduced.
         before, after = (np.repeat(masses, 2) @ (v * v) for v in (v0, expected))
         expected *= np.sqrt(min(1.0, before / after))
@@ -214,12 +214,12 @@ def adds_no_energy(method: str, backend: str = "rust", control: Any = RESETTING,
     v = np.stack([np.stack([rng.normal(0.0, 1.0, count), -u]), np.zeros((2, count))])
     v[1] = v[0] + turning * across
     y = tilted(angle, phase * h * (u + 0.5 * h * gravity))
-    given: dict[str, Any] = {"dt": h, "backend": backend, "control": control}
+    options: dict[str, Any] = {"dt": h, "backend": backend, "control": control}
     floor = sw.Floor(restitution=e, friction=friction)
-    run = sw.integrate(dumb_bell(masses, gravity, floor=floor), method, v=v, y=y, steps=3, every=1, **given)
+    run = sw.integrate(dumb_bell(masses, gravity, floor=floor), method, v=v, y=y, steps=3, every=1, **options)
     met = 0
     for k in range(3):
-        bare = sw.integrate(dumb_bell(masses, gravity), method, v=run.v[k], y=run.y[k], steps=1, **given)
+        bare = sw.integrate(dumb_bell(masses, gravity), method, v=run.v[k], y=run.y[k], steps=1, **options)
         touched = (bare.v[-1] != run.v[k + 1]).any(axis=(0, 1))
         most = np.maximum(run.energy[k], bare.energy[-1])
         scale = (
@@ -238,10 +238,10 @@ def topples(method: str, backend: str = "rust") -> None:
     times h·θ̇. Standard Euler and Damped Euler leave a velocity of h·g at a point that a surface and a rod hold.
     """
     h, steps = 1 / 240, 140
-    given: dict[str, Any] = {"v": 0.0, "y": tilted(0.3), "dt": h, "steps": steps, "every": 1, "backend": backend}
-    smooth = sw.integrate(dumb_bell(floor=sw.Floor(restitution=0.0)), method, **given, control=RESETTING)
+    arguments: dict[str, Any] = {"v": 0.0, "y": tilted(0.3), "dt": h, "steps": steps, "every": 1, "backend": backend}
+    smooth = sw.integrate(dumb_bell(floor=sw.Floor(restitution=0.0)), method, **arguments, control=RESETTING)
     rough = sw.integrate(
-        dumb_bell((20.0, 1.0), floor=sw.Floor(restitution=0.0, friction=5.0)), method, **given, control=RESETTING
+        dumb_bell((20.0, 1.0), floor=sw.Floor(restitution=0.0, friction=5.0)), method, **arguments, control=RESETTING
     )
     leaves = method in ("standard_euler", "damped_euler")
     first = h * np.sqrt(2.0 * G)

@@ -65,12 +65,12 @@ ANGLES, RATES = np.array([1.5, -0.4]), np.array([0.3, 0.9])
 def apart_from_angles(backend: str = "rust") -> float:
     """How far rods are from the same motion in angles, at t = 10, both to a tight tolerance."""
     v, y = places(ANGLES, RATES)
-    given: dict[str, Any] = {"tolerance": 1e-13, "at": [10.0]}
-    known = sw.integrate(in_angles(), "dop853", v=RATES, y=ANGLES, **given)
+    options: dict[str, Any] = {"tolerance": 1e-13, "at": [10.0]}
+    known = sw.integrate(in_angles(), "dop853", v=RATES, y=ANGLES, **options)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            run = sw.integrate(DOUBLE, "dop853", v=v, y=y, backend=backend, max_steps=2000, **given)
+            run = sw.integrate(DOUBLE, "dop853", v=v, y=y, backend=backend, max_steps=2000, **options)
     except ArgumentError:
         return math.inf
     apart = [np.abs(a - b).max() for a, b in zip((run.v[-1], run.y[-1]), places(known.y[-1], known.v[-1]), strict=True)]

@@ -19,12 +19,12 @@ def lattice(rows: int, columns: int, dim: int = 3, *, diagonals: bool = False) -
     return np.concatenate([np.stack([i.ravel(), j.ravel()], axis=1) for i, j in pairs]), places
 
 
-def tangled(seed: int, n: int, dim: int, springs: int, **given: Any) -> tuple[sw.Springs, dict[str, Any]]:
+def tangled(seed: int, n: int, dim: int, springs: int, **options: Any) -> tuple[sw.Springs, dict[str, Any]]:
     """A net without any order, of unequal springs and particles, and a state of it."""
     rng = np.random.default_rng(seed)
     every = np.array([(i, j) for i in range(n) for j in range(n) if i < j])
     pairs = rng.permutation(every)[:springs]
     pairs = np.where(rng.random((len(pairs), 1)) < 0.5, pairs, pairs[:, ::-1])
     arguments = {"stiffness": rng.uniform(0.5, 2.0, len(pairs)), "rest": rng.uniform(0.0, 1.0, len(pairs))}
-    arguments |= {"masses": rng.uniform(0.5, 2.0, n)} | given
+    arguments |= {"masses": rng.uniform(0.5, 2.0, n)} | options
     return sw.Springs(pairs, **arguments), {"v": rng.normal(size=(n, dim)), "y": rng.normal(size=(n, dim))}

@@ -52,9 +52,9 @@ OUTCOMES = (
 
 def small(**options: Any) -> Any:
     """A sweep of 45 members with every kind of outcome."""
-    given: dict[str, Any] = {"v": 0.0, "dt": 0.05, "steps": 80, "transient": 10, "outcomes": OUTCOMES} | options
-    axes = given.pop("axes", AXES)
-    return sw.sweep(partial(duffing, delta=0.2), axes, "rk4", **given)
+    arguments: dict[str, Any] = {"v": 0.0, "dt": 0.05, "steps": 80, "transient": 10, "outcomes": OUTCOMES} | options
+    axes = arguments.pop("axes", AXES)
+    return sw.sweep(partial(duffing, delta=0.2), axes, "rk4", **arguments)
 
 
 def unlike(a: Any, b: Any) -> list[str]:

@@ -37,8 +37,8 @@ def rotated(q: Any, vector: Any) -> Any:
     return quaternion.product(turned, (np.asarray(q).T * [1.0, -1.0, -1.0, -1.0]).T)[1:]
 
 
-def close(found: Any, wanted: Any, times: float = 1.0) -> None:
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=times * ROUNDING * max(1.0, float(np.abs(wanted).max())))
+def close(actual: Any, wanted: Any, times: float = 1.0) -> None:
+    np.testing.assert_allclose(actual, wanted, rtol=0, atol=times * ROUNDING * max(1.0, float(np.abs(wanted).max())))
 
 
 def free_asymmetric_top(backend: str) -> None:
@@ -57,36 +57,36 @@ def free_symmetric_top(backend: str) -> None:
     for a, c in ((1.0, 1.6), (2.0, 0.7)):
         v, end = np.array([0.3, -0.8, 1.3]), 7.0
         q = some_attitude(1)
-        made = run(sw.RigidBody([a, a, c]), v, q, end, backend)
-        turn = (c - a) * v[2] / a * made.t
-        close(made.v[:, 2], v[2])
-        close(made.v[:, 0] + 1j * made.v[:, 1], (v[0] + 1j * v[1]) * np.exp(1j * turn))
+        motion = run(sw.RigidBody([a, a, c]), v, q, end, backend)
+        turn = (c - a) * v[2] / a * motion.t
+        close(motion.v[:, 2], v[2])
+        close(motion.v[:, 0] + 1j * motion.v[:, 1], (v[0] + 1j * v[1]) * np.exp(1j * turn))
         momentum = rotated(q, [a * v[0], a * v[1], c * v[2]])
         length = math.sqrt((momentum**2).sum())
-        axis = rotated(made.y.T, np.tile([[0.0], [0.0], [1.0]], len(made.t)))
+        axis = rotated(motion.y.T, np.tile([[0.0], [0.0], [1.0]], len(motion.t)))
         close(momentum @ axis / length, c * v[2] / length)
-        steady = quaternion.from_axis_angle(momentum, length / a * made.t)
-        close(axis, rotated(steady, np.tile(axis[:, :1], len(made.t))), 3)
+        steady = quaternion.from_axis_angle(momentum, length / a * motion.t)
+        close(axis, rotated(steady, np.tile(axis[:, :1], len(motion.t))), 3)
 
 
 def turn_at_a_constant_rate(backend: str) -> None:
     """A sphere: q(t) = q(0) ⊗ (cos ½|ω|t, n·sin ½|ω|t)."""
     v, q = np.array([0.4, -0.9, 0.5]), some_attitude(2)
-    made = run(sw.RigidBody([2.0, 2.0, 2.0]), v, q, 5.0, backend)
-    close(made.v, np.tile(v, (len(made.t), 1)))
-    close(made.y.T, quaternion.product(q, quaternion.from_axis_angle(v, math.sqrt((v * v).sum()) * made.t)), 3)
+    motion = run(sw.RigidBody([2.0, 2.0, 2.0]), v, q, 5.0, backend)
+    close(motion.v, np.tile(v, (len(motion.t), 1)))
+    close(motion.y.T, quaternion.product(q, quaternion.from_axis_angle(v, math.sqrt((v * v).sum()) * motion.t)), 3)
 
 
 def damping_and_torques_of_the_body(backend: str) -> None:
     """A sphere, axis by axis: J·ω̇ = −d·ω, or τ, or a·sin(wt + p)."""
     v, j, damping = np.array([1.0, -0.5, 0.3]), 1.7, np.array([0.2, 0.5, 0.9])
-    made = run(sw.RigidBody([j] * 3, damping=damping), v, UNIT, 3.0, backend)
-    close(made.v, v * np.exp(-np.multiply.outer(made.t, damping / j)))
+    motion = run(sw.RigidBody([j] * 3, damping=damping), v, UNIT, 3.0, backend)
+    close(motion.v, v * np.exp(-np.multiply.outer(motion.t, damping / j)))
     one = run(sw.RigidBody([j] * 3, damping=0.4), v, UNIT, 3.0, backend)
     close(one.v, v * np.exp(-0.4 / j * one.t)[:, np.newaxis])
-    made = run(sw.RigidBody([j] * 3, [0.4, sw.Sinusoid(0.8, 2.1, 0.3), None]), v, UNIT, 3.0, backend)
-    waves = 0.8 / 2.1 * (math.cos(0.3) - np.cos(2.1 * made.t + 0.3))
-    close(made.v, v + np.stack([0.4 * made.t, waves, 0.0 * made.t], axis=-1) / j)
+    motion = run(sw.RigidBody([j] * 3, [0.4, sw.Sinusoid(0.8, 2.1, 0.3), None]), v, UNIT, 3.0, backend)
+    waves = 0.8 / 2.1 * (math.cos(0.3) - np.cos(2.1 * motion.t + 0.3))
+    close(motion.v, v + np.stack([0.4 * motion.t, waves, 0.0 * motion.t], axis=-1) / j)
 
 
 def torques_of_space(backend: str) -> None:
@@ -94,10 +94,10 @@ def torques_of_space(backend: str) -> None:
     inertia, torque, v = np.array([1.0, 1.4, 2.0]), np.array([0.5, -0.3, 0.8]), np.array([0.4, 0.7, -0.2])
     for scale in (1.0, 1.3):
         q = scale * some_attitude(3)
-        made = run(sw.RigidBody(inertia, space_torque=torque), v, q, 4.0, backend, record="angular_momentum")
-        momentum = rotated(made.y.T, (inertia * made.v).T) / (made.y**2).sum(axis=1)
-        close(momentum, momentum[:, :1] + np.multiply.outer(torque, made.t), 10)
-        close(made.recorded["angular_momentum"], momentum.T, 10)
+        motion = run(sw.RigidBody(inertia, space_torque=torque), v, q, 4.0, backend, record="angular_momentum")
+        momentum = rotated(motion.y.T, (inertia * motion.v).T) / (motion.y**2).sum(axis=1)
+        close(momentum, momentum[:, :1] + np.multiply.outer(torque, motion.t), 10)
+        close(motion.recorded["angular_momentum"], momentum.T, 10)
 
 
 def horizontal_top(backend: str) -> None:
@@ -107,9 +107,9 @@ def horizontal_top(backend: str) -> None:
     q = quaternion.from_axis_angle([0.0, 1.0, 0.0], 0.5 * math.pi)  # the body's third axis is the first of space
     back = q * [1.0, -1.0, -1.0, -1.0]
     v = np.array([0.0, 0.0, spin]) + rotated(back, [0.0, 0.0, rate])
-    made = run(sw.RigidBody([a, a, c], weight=weight, centre=[0.0, 0.0, lever]), v, q, 5.0, backend)
-    axis = rotated(made.y.T, np.tile([[0.0], [0.0], [1.0]], len(made.t)))
-    close(axis, np.stack([np.cos(rate * made.t), np.sin(rate * made.t), 0.0 * made.t]), 10)
+    motion = run(sw.RigidBody([a, a, c], weight=weight, centre=[0.0, 0.0, lever]), v, q, 5.0, backend)
+    axis = rotated(motion.y.T, np.tile([[0.0], [0.0], [1.0]], len(motion.t)))
+    close(axis, np.stack([np.cos(rate * motion.t), np.sin(rate * motion.t), 0.0 * motion.t]), 10)
 
 
 def body_that_swings(backend: str) -> None:
@@ -117,7 +117,7 @@ def body_that_swings(backend: str) -> None:
     inertia, weight, lever = [1.0, 1.3, 1.9], 2.0, 0.7
     for axis, towards in ((0, 1), (1, 0)):
         centre = np.array([0.0, 0.0, -lever])
-        made = run(
+        motion = run(
             sw.RigidBody(inertia, weight=weight, centre=centre),
             np.zeros(3),
             quaternion.from_axis_angle(np.eye(3)[axis], 2.0),
@@ -126,9 +126,9 @@ def body_that_swings(backend: str) -> None:
         )
         swing = sw.Pendulum(math.sqrt(weight * lever / inertia[axis]))
         known = sw.integrate(swing, "dop853", v=0.0, y=2.0, dt=6.0 / STEPS, steps=STEPS, every=STEPS // 4)
-        close(2.0 * np.arctan2(made.y[:, 1 + axis], made.y[:, 0]), known.y, 10)
-        close(made.v[:, axis], known.v, 10)
-        close(made.v[:, towards], 0.0 * known.v)
+        close(2.0 * np.arctan2(motion.y[:, 1 + axis], motion.y[:, 0]), known.y, 10)
+        close(motion.v[:, axis], known.v, 10)
+        close(motion.v[:, towards], 0.0 * known.v)
 
 
 def heavy_body_keeps_energy(backend: str) -> None:
@@ -136,13 +136,13 @@ def heavy_body_keeps_energy(backend: str) -> None:
     inertia, centre = np.array([1.0, 1.4, 2.0]), np.array([0.3, -0.2, 0.6])
     for scale in (1.0, 0.8):
         body = sw.RigidBody(inertia, weight=1.4, centre=centre)
-        made = run(body, [0.4, 0.7, -0.2], scale * some_attitude(4), 4.0, backend)
-        square = (made.y**2).sum(axis=1)
-        height = rotated(made.y.T, np.tile(centre[:, np.newaxis], len(made.t)))[2] / square
-        energy = 0.5 * (inertia * made.v**2).sum(axis=1) + 1.4 * height
+        motion = run(body, [0.4, 0.7, -0.2], scale * some_attitude(4), 4.0, backend)
+        square = (motion.y**2).sum(axis=1)
+        height = rotated(motion.y.T, np.tile(centre[:, np.newaxis], len(motion.t)))[2] / square
+        energy = 0.5 * (inertia * motion.v**2).sum(axis=1) + 1.4 * height
         close(energy, energy[0], 10)
-        close(made.energy, energy, 10)
-        upright = rotated(made.y.T, (inertia * made.v).T)[2] / square
+        close(motion.energy, energy, 10)
+        upright = rotated(motion.y.T, (inertia * motion.v).T)[2] / square
         close(upright, upright[0], 10)
 
 
@@ -155,9 +155,9 @@ def settled_norm(backend: str) -> None:
     phi = 0.5 * h * 3.0
     settled = 1.0 + (1.0 - math.sqrt(1.0 - phi * phi)) / (h * k)
     body, arguments = sw.RigidBody([1.0, 1.0, 1.0]), {"method": "standard_euler", "dt": h, "steps": 200, "every": 1}
-    made = run(body, v, some_attitude(5), 1.0, backend, control=sw.NormControl(k), record="norm_error", **arguments)
-    close(made.recorded["norm_error"][-1], settled - 1.0)
-    cosine = (made.y[-1] * made.y[-2]).sum() / settled
+    motion = run(body, v, some_attitude(5), 1.0, backend, control=sw.NormControl(k), record="norm_error", **arguments)
+    close(motion.recorded["norm_error"][-1], settled - 1.0)
+    cosine = (motion.y[-1] * motion.y[-2]).sum() / settled
     close(math.acos(cosine), math.asin(phi), 10)
 
 
@@ -165,9 +165,9 @@ def reset_norm(backend: str) -> None:
     """Reset, q has the length 1 after every step, and a step turns it by atan Φ."""
     v, h = np.array([2.0, -1.0, 2.0]), 0.1
     body, arguments = sw.RigidBody([1.0, 1.0, 1.0]), {"method": "standard_euler", "dt": h, "steps": 50, "every": 1}
-    made = run(body, v, 2.0 * some_attitude(5), 1.0, backend, control=sw.Projection("norm"), **arguments)
-    close((made.y[1:] ** 2).sum(axis=1), 1.0, 0.01)  # the root and the quotients round, by 2⁻⁵² together
-    close(np.arccos((made.y[-1] * made.y[-2]).sum()), math.atan(0.15), 10)
+    motion = run(body, v, 2.0 * some_attitude(5), 1.0, backend, control=sw.Projection("norm"), **arguments)
+    close((motion.y[1:] ** 2).sum(axis=1), 1.0, 0.01)  # the root and the quotients round, by 2⁻⁵² together
+    close(np.arccos((motion.y[-1] * motion.y[-2]).sum()), math.atan(0.15), 10)
 
 
 TRUTHS: list[Callable[[str], None]] = [

@@ -36,10 +36,10 @@ def made(name: str) -> tuple[sw.System, Any, Any]:
     return system, v, y
 
 
-def assert_computes(found: list[Any], *expected: Any) -> None:
+def assert_computes(computed: list[Any], *expected: Any) -> None:
     """To the bit, NaN but for its payload."""
     wanted = [row for each in expected for row in np.broadcast_to(each, np.shape(each) or MEMBERS).reshape(-1, MEMBERS)]
-    assert len(found) == len(wanted)
-    for ours, theirs in zip(found, wanted, strict=True):
+    assert len(computed) == len(wanted)
+    for ours, theirs in zip(computed, wanted, strict=True):
         np.testing.assert_array_equal(ours, theirs)
         np.testing.assert_array_equal(np.signbit(ours), np.signbit(theirs))

@@ -119,16 +119,16 @@ def arguments(name: str, rng: np.random.Generator, n: int) -> Points:
             return (sizes(rng, n) * signs(rng, n),)
 
 
-def errors(found: np.ndarray, name: str, given: Points) -> np.ndarray:
+def errors(results: np.ndarray, name: str, points: Points) -> np.ndarray:
     """How far each result is from the truth, in units in the last place of the truth; infinity counts as 2¹⁰²⁴."""
     out = []
     with mp.workprec(PRECISION):
-        for made, *row in zip(found.tolist(), *(each.tolist() for each in given), strict=True):
+        for result, *row in zip(results.tolist(), *(each.tolist() for each in points), strict=True):
             true = TRUE[name](*map(mp.mpf, row))
             size = int(mp.frexp(true)[1]) - 53 if true else -1074
             if abs(true) >= mp.mpf(2) ** 1024:
-                out.append(0.0 if made == math.copysign(math.inf, true) else math.inf)
+                out.append(0.0 if result == math.copysign(math.inf, true) else math.inf)
                 continue
-            number = math.copysign(1.0, made) * mp.mpf(2) ** 1024 if math.isinf(made) else mp.mpf(made)
+            number = math.copysign(1.0, result) * mp.mpf(2) ** 1024 if math.isinf(result) else mp.mpf(result)
             out.append(float(abs(number - true) / mp.mpf(2) ** max(size, -1074)))
     return np.array(out)

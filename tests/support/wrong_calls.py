@@ -194,9 +194,9 @@ def passage(t: Any, v: Any, y: Any) -> Any:
 PASSAGES = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=[1.0, 2.0], dt=0.1, steps=30, events=passage).events["passage"]
 
 
-def _world(**given: Any) -> sw.World:
-    arrays = {name: np.full(3, given[name]) for name in ("v", "y") if isinstance(given.get(name), float)}
-    return sw.World(**given | arrays)
+def _world(**arguments: Any) -> sw.World:
+    arrays = {name: np.full(3, arguments[name]) for name in ("v", "y") if isinstance(arguments.get(name), float)}
+    return sw.World(**arguments | arrays)
 
 
 def _of_run(name: str) -> Callable[..., Any]:
