@@ -47,10 +47,10 @@ def arrays(what: Any) -> list[Any]:
     return []
 
 
-@pytest.mark.parametrize("how", COPIES)
+@pytest.mark.parametrize("copying", COPIES)
 @pytest.mark.parametrize("name", MADE)
-def test_nothing_of_it_is_assigned(name: str, how: str) -> None:
-    one = COPIES[how](MADE[name]())
+def test_nothing_of_it_is_assigned(name: str, copying: str) -> None:
+    one = COPIES[copying](MADE[name]())
     before = pickle.dumps(one)
     for attribute in (*vars(one), "anything"):
         if attribute.startswith("_"):

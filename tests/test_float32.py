@@ -224,8 +224,8 @@ ABLE = ["merson", "fehlberg", "fehlberg_5", "dop853"]
 
 
 def paced(system: sw.System, method: str, v: Any, y: Any, **options: Any) -> sw.Run:
-    given: dict[str, Any] = {"tolerance": 1e-5, "at": [0.7, 1.1, 5.0], "dtype": "float32"} | options
-    return sw.integrate(system, method, v=v, y=y, **given)
+    arguments: dict[str, Any] = {"tolerance": 1e-5, "at": [0.7, 1.1, 5.0], "dtype": "float32"} | options
+    return sw.integrate(system, method, v=v, y=y, **arguments)
 
 
 def assert_same_paces(a: sw.Run, b: sw.Run) -> None:
@@ -591,8 +591,8 @@ def test_no_result_is_further_than_an_ulp_from_the_truth(name: str) -> None:
 @pytest.mark.parametrize("name", ["sin", "cos", "exp", "log"])
 def test_none_of_all_results_is_further_than_an_ulp_from_the_truth(name: str) -> None:
     truth, within, most = TRUE[name]
-    found = worst(function(getattr(functions, name)), truth, within, long=True)
-    assert most - 0.03 < found <= most
+    largest = worst(function(getattr(functions, name)), truth, within, long=True)
+    assert most - 0.03 < largest <= most
 
 
 @pytest.mark.long
@@ -718,11 +718,11 @@ REFUSED: list[tuple[Any, dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("system", "options", "told"), REFUSED)
-def test_what_does_not_go_with_float32(system: Any, options: dict[str, Any], told: str) -> None:
+@pytest.mark.parametrize(("system", "options", "message"), REFUSED)
+def test_what_does_not_go_with_float32(system: Any, options: dict[str, Any], message: str) -> None:
     arguments: dict[str, Any] = {"method": "rk4", "v": 0.0, "y": 1.0, "dt": 0.1, "steps": 100, "dtype": "float32"} | options
     for backend in ("rust", "numpy"):
-        with pytest.raises((UnsupportedError, ArgumentError, TraceError), match=told.replace("(", r"\(")):
+        with pytest.raises((UnsupportedError, ArgumentError, TraceError), match=message.replace("(", r"\(")):
             sw.integrate(system, **arguments, backend=backend)
 
 

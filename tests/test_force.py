@@ -287,13 +287,13 @@ COPIES = {
 }
 
 
-@pytest.mark.parametrize("how", COPIES)
+@pytest.mark.parametrize("copying", COPIES)
 @pytest.mark.parametrize("method", ["verlet", "rk4"])
-def test_a_copy_has_a_force_of_its_own(method: str, how: str) -> None:
+def test_a_copy_has_a_force_of_its_own(method: str, copying: str) -> None:
     system, v, y, force = forced("pendulum")
     world = sw.World(system, method, v=v, y=y, dt=0.1, force=force)
     world.step(3)
-    other = COPIES[how](world)
+    other = COPIES[copying](world)
     np.testing.assert_array_equal(other.force, force)
     assert not np.shares_memory(other.force, force)
     world.step(4)
@@ -536,9 +536,9 @@ def test_a_force_changes_the_energy_without_a_warning(recwarn: pytest.WarningsRe
 def test_a_sweep_over_forces_with_a_tolerance() -> None:
     pytest.importorskip("xarray")
     force = np.linspace(-1.0, 1.0, 5)
-    found = sw.sweep(sw.Pendulum(), {"force": force}, "merson", v=0.0, y=1.0, tolerance=1e-6, at=[0.5, 1.0])
+    dataset = sw.sweep(sw.Pendulum(), {"force": force}, "merson", v=0.0, y=1.0, tolerance=1e-6, at=[0.5, 1.0])
     run = sw.integrate(sw.Pendulum(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[0.5, 1.0], force=force)
-    np.testing.assert_array_equal(found.y_last, run.y[-1])
+    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
 
 
 @pytest.mark.parametrize("side", [4, 40])
@@ -550,13 +550,13 @@ def test_fixed_particles_feel_no_force(side: int, backend: str) -> None:
     pairs = np.concatenate(
         [np.stack([number[1:], number[:-1]], -1).reshape(-1, 2), np.stack([number[:, 1:], number[:, :-1]], -1).reshape(-1, 2)]
     )
-    held = [0, side - 1]
-    net = sw.Springs(pairs, stiffness=50.0, rest=1.0 / side, fixed=held)
+    corners = [0, side - 1]
+    net = sw.Springs(pairs, stiffness=50.0, rest=1.0 / side, fixed=corners)
     wind = np.ones_like(place)
     run = sw.integrate(net, "leapfrog", v=0.0, y=place, dt=0.01, steps=5, force=wind, backend=backend)
-    assert np.array_equal(run.y[-1][held], place[held])
-    assert np.array_equal(run.v[-1][held], np.zeros((2, 2)))
-    assert (np.delete(run.y[-1], held, axis=0) > np.delete(place, held, axis=0)).all()
+    assert np.array_equal(run.y[-1][corners], place[corners])
+    assert np.array_equal(run.v[-1][corners], np.zeros((2, 2)))
+    assert (np.delete(run.y[-1], corners, axis=0) > np.delete(place, corners, axis=0)).all()
     world = sw.World(net, "leapfrog", v=np.zeros_like(place), y=place.copy(), dt=0.01, force=wind.copy())
     for _ in range(5):
         world.step(1)

@@ -372,8 +372,8 @@ def test_verlet_by_its_secant_never_rests() -> None:
 def test_verlet_without_friction_is_verlet() -> None:
     """So it is friction alone that is wrong in the figure: without it, these steps are stepwell's to rounding."""
     run = sw.integrate(sw.Oscillator(form="physical"), "verlet", v=0.3, y=1.0, dt=0.1, steps=100, every=1)
-    found = secant_verlet(lambda y, difference: -y, 0.3, 1.0, 0.1, 100)
-    assert np.abs(found - run.y[:, ...]).max() < 100 * 100 * 2.0**-53
+    states = secant_verlet(lambda y, difference: -y, 0.3, 1.0, 0.1, 100)
+    assert np.abs(states - run.y[:, ...]).max() < 100 * 100 * 2.0**-53
 
 
 def test_the_limit_of_verlet_with_drag_by_the_secant() -> None:

@@ -50,16 +50,16 @@ def table() -> dict[str, list[str]]:
 
 
 def worst(name: str, n: int, seed: int) -> float:
-    given = arguments(name, np.random.default_rng(seed), n)
-    return float(errors(getattr(fn, name)(*given), name, given).max())
+    points = arguments(name, np.random.default_rng(seed), n)
+    return float(errors(getattr(fn, name)(*points), name, points).max())
 
 
 @pytest.mark.parametrize("name", TRUE)
 def test_no_result_is_further_than_an_ulp_from_the_truth(name: str) -> None:
     """And none is further than the page tells of many more."""
-    found = worst(name, 3000, 1)
-    assert 0.45 < found < 1.0
-    assert found <= float(table()[name][2])
+    largest = worst(name, 3000, 1)
+    assert 0.45 < largest < 1.0
+    assert largest <= float(table()[name][2])
 
 
 @pytest.mark.long
@@ -90,8 +90,8 @@ def test_beyond_the_exact_reduction_the_error_is_that_of_a_rounded_argument(name
     """n times the first part of π/2 is rounded, by 2⁻⁵³ of nearly x; the other parts are 2⁻³⁰ of that; the result is rounded."""
     x = sizes(np.random.default_rng(4), 300, 24.0, 50.0)
     with mp.workprec(PRECISION):
-        for made, v in zip(getattr(fn, name)(x).tolist(), x.tolist(), strict=True):
-            assert abs(mp.mpf(made) - TRUE[name](mp.mpf(v))) <= v * 2.0**-53 * (1 + 2.0**-28) + 2.0**-52
+        for result, v in zip(getattr(fn, name)(x).tolist(), x.tolist(), strict=True):
+            assert abs(mp.mpf(result) - TRUE[name](mp.mpf(v))) <= v * 2.0**-53 * (1 + 2.0**-28) + 2.0**-52
 
 
 @pytest.mark.parametrize("name", ["sin", "cos", "tan"])
@@ -163,12 +163,12 @@ def test_the_coefficients_are_those_that_the_script_finds() -> None:
         spec.loader.exec_module(script)
         records = {constant.upper(): module.CONSTANTS for module, constant, _ in CONSTANTS}
         assert set(script.FITS) <= set(records)
-        for constant, given in script.FITS.items():
-            coefficients, error = script.fit(*given)
+        for constant, inputs in script.FITS.items():
+            coefficients, error = script.fit(*inputs)
             assert tuple(coefficients) == getattr(records[constant].double, constant.lower())
             assert error < 2.0**-57  # a sixteenth of an ulp of 1
-        for constant, given in script.SINGLE_FITS.items():
-            coefficients, error = script.fit(*given, np.float32)
+        for constant, inputs in script.SINGLE_FITS.items():
+            coefficients, error = script.fit(*inputs, np.float32)
             assert tuple(coefficients) == getattr(records[constant].single, constant.lower())
             assert error < 2.0**-26
     finally:
@@ -187,24 +187,24 @@ def _quiet() -> Iterator[None]:
 @pytest.mark.parametrize("name", OF_ONE)
 def test_at_zeros_infinities_and_nan_as_numpy(name: str) -> None:
     """Signs of zero included; other results may differ by two ulp, one for either side."""
-    found, theirs = getattr(fn, name)(SPECIALS), getattr(np, name)(SPECIALS)
+    mine, theirs = getattr(fn, name)(SPECIALS), getattr(np, name)(SPECIALS)
     beyond = (abs(SPECIALS) > 2.0**50) & (name in ("sin", "cos", "tan"))
-    assert np.isnan(found[beyond]).all()
+    assert np.isnan(mine[beyond]).all()
     exact = ~np.isfinite(theirs) | (theirs == 0.0) | (abs(theirs) == 1.0)
-    near = abs(found - theirs) <= 2 * np.spacing(abs(theirs))
-    assert (np.where(exact, same(found, theirs), near & (np.signbit(found) == np.signbit(theirs))) | beyond).all()
+    near = abs(mine - theirs) <= 2 * np.spacing(abs(theirs))
+    assert (np.where(exact, same(mine, theirs), near & (np.signbit(mine) == np.signbit(theirs))) | beyond).all()
 
 
 @pytest.mark.parametrize("name", OF_TWO)
 def test_pairs_of_zeros_infinities_and_nan_as_numpy(name: str) -> None:
     x, y = (each.reshape(-1) for each in np.meshgrid(SPECIALS, SPECIALS))
-    found, theirs = getattr(fn, name)(x, y), getattr(np, name)(x, y)
+    mine, theirs = getattr(fn, name)(x, y), getattr(np, name)(x, y)
     exact = ~np.isfinite(theirs) | (theirs == 0.0) | (abs(theirs) == 1.0)
-    near = abs(found - theirs) <= 2 * np.spacing(abs(theirs))
-    right = np.where(exact, same(found, theirs), near & (np.signbit(found) == np.signbit(theirs)))
+    near = abs(mine - theirs) <= 2 * np.spacing(abs(theirs))
+    right = np.where(exact, same(mine, theirs), near & (np.signbit(mine) == np.signbit(theirs)))
     if name in ("mod", "remainder"):
         beyond = np.isfinite(x) & np.isfinite(y) & (abs(x / y) >= 2.0**52)
-        assert np.isnan(found[beyond]).all()
+        assert np.isnan(mine[beyond]).all()
         right |= beyond
     assert right.all()
 
@@ -229,12 +229,12 @@ def test_what_remains_of_a_division_is_exact() -> None:
         [y[:1000] * rng.integers(-999, 999, 1000), y[1000:] * rng.uniform(-1.0, 1.0, 1000) * 2.0 ** rng.integers(0, 51, 1000)]
     )
     x = np.where(np.isfinite(x), x, 1.0)
-    for made, a, b in zip(fn.mod(x, y).tolist(), x.tolist(), y.tolist(), strict=True):
+    for result, a, b in zip(fn.mod(x, y).tolist(), x.tolist(), y.tolist(), strict=True):
         if abs(Fraction(a) / Fraction(b)) < 2**52:
             true = math.fmod(a, b)  # exact, with the sign of a
             true = true + b if true and (true < 0) != (b < 0) else math.copysign(true, b) if true == 0.0 else true
-            assert made == true
-            assert math.copysign(1.0, made) == math.copysign(1.0, true)
+            assert result == true
+            assert math.copysign(1.0, result) == math.copysign(1.0, true)
 
 
 # ---- powers
@@ -244,22 +244,22 @@ def test_what_remains_of_a_division_is_exact() -> None:
 def test_known_powers_are_products_in_the_order_that_is_told(exponent: float) -> None:
     """A product of n factors is rounded n − 1 times, whichever way it is made; root and quotient are one more each."""
     x = np.random.default_rng(7).uniform(0.2, 3.0, 300)
-    found, n = fn.power(x, exponent), int(abs(exponent))
+    powers, n = fn.power(x, exponent), int(abs(exponent))
     halved, below = n != abs(exponent), exponent < 0
     if exponent == 7:
-        assert same(found, (x * (x * x)) * ((x * x) * (x * x))).all()
+        assert same(powers, (x * (x * x)) * ((x * x) * (x * x))).all()
     if exponent == -2.5:
-        assert same(found, 1.0 / ((x * x) * np.sqrt(x))).all()
+        assert same(powers, 1.0 / ((x * x) * np.sqrt(x))).all()
     bound = max(n - 1, 0) + 2 * halved + below
-    got = errors(found, "power", (x, np.full(300, float(exponent))))
+    got = errors(powers, "power", (x, np.full(300, float(exponent))))
     assert got.max() <= bound + 0.001
 
 
 def test_known_powers_at_the_ends() -> None:
     for exponent in (-3, -2, -1, 0, 1, 2, 3, 16, 1.5, -0.5, 0.5):
-        found, theirs = fn.power(SPECIALS, exponent), np.power(SPECIALS, np.full(SPECIALS.shape, float(exponent)))
+        mine, theirs = fn.power(SPECIALS, exponent), np.power(SPECIALS, np.full(SPECIALS.shape, float(exponent)))
         exact = (~np.isfinite(SPECIALS) | (SPECIALS == 0.0)) & ~(np.isneginf(SPECIALS) & (exponent % 1 != 0))
-        assert same(found[exact], theirs[exact]).all()
+        assert same(mine[exact], theirs[exact]).all()
     assert np.isnan(fn.power(-math.inf, 0.5))  # C has infinity
     # A number and an array of it are not the same exponent: the one is known, the other is not.
     assert fn.power(1.1, 16) != fn.power(1.1, np.array([16.0]))[0]
@@ -309,8 +309,8 @@ def test_what_is_no_number_is_refused_by_name(wrong: Any) -> None:
 @pytest.mark.parametrize("name", [*OF_ONE, *OF_TWO])
 def test_the_page_tells_the_operations_on_the_tape(name: str) -> None:
     tape = _core.Tape()
-    made = getattr(fn, name)(*map(tape.state, range(2 if name in OF_TWO else 1)))
-    kinds = [kind for kind, _, _ in tape.operations([made])[0] if kind not in ("state", "constant")]
+    symbol = getattr(fn, name)(*map(tape.state, range(2 if name in OF_TWO else 1)))
+    kinds = [kind for kind, _, _ in tape.operations([symbol])[0] if kind not in ("state", "constant")]
     slow = sum(kind in ("divide", "square root") for kind in kinds)
     assert table()[name][:2] == [str(len(kinds)), str(slow)]
 
@@ -318,13 +318,13 @@ def test_the_page_tells_the_operations_on_the_tape(name: str) -> None:
 def test_the_page_tells_what_two_functions_take_together() -> None:
     tape = _core.Tape()
     x = tape.state(0)
-    for words, made in {
+    for words, symbols in {
         "sine and cosine of one angle are": [fn.sin(x), fn.cos(x)],
         "hyperbolic sine and cosine": [fn.sinh(x), fn.cosh(x)],
         "`power(x, 2.3)` is": [fn.power(x, 2.3)],
         "`power(2.0, y)`": [fn.power(2.0, x)],
     }.items():
-        operations = sum(kind not in ("state", "constant") for kind, _, _ in tape.operations(made)[0])
+        operations = sum(kind not in ("state", "constant") for kind, _, _ in tape.operations(symbols)[0])
         assert f"{words} {operations}" in PAGE
 
 

@@ -18,9 +18,9 @@ from support.true_functions import COMPARE, OF_ONE, OF_TWO, SPECIALS, TRUE, argu
 NAMES = [*OF_ONE, *OF_TWO]
 
 
-def as_it_stands(tape: Any, made: Any, state: list[np.ndarray]) -> np.ndarray:
+def as_it_stands(tape: Any, symbol: Any, state: list[np.ndarray]) -> np.ndarray:
     """What a tape makes, one operation after the other, none of them fused."""
-    (value,) = Replay(*tape.operations([made]))(state, [])
+    (value,) = Replay(*tape.operations([symbol]))(state, [])
     return np.broadcast_to(value, np.broadcast_shapes(*(each.shape for each in state)))
 
 
@@ -34,19 +34,19 @@ def patterns(seed: int, n: int) -> np.ndarray:
 @pytest.mark.parametrize("name", NAMES)
 def test_the_tape_has_the_bits_of_arrays(name: str) -> None:
     tape, state = _core.Tape(), [patterns(1, 2000), patterns(2, 2000)][: 2 if name in OF_TWO else 1]
-    made = getattr(fn, name)(*map(tape.state, range(len(state))))
+    symbol = getattr(fn, name)(*map(tape.state, range(len(state))))
     with np.errstate(all="ignore"):
-        assert same(as_it_stands(tape, made, state), getattr(fn, name)(*state)).all()
+        assert same(as_it_stands(tape, symbol, state), getattr(fn, name)(*state)).all()
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_tape_that_shortens_nothing_has_the_same_bits(name: str) -> None:
     """The second tape, in Python: so no bit depends on what the core's does beforehand or leaves out."""
     tape, state = symbols.Tape(), [patterns(1, 500), patterns(2, 500)][: 2 if name in OF_TWO else 1]
-    made = getattr(fn, name)(*map(tape.state, range(len(state))))
-    (found,) = symbols.evaluate(tape, [made], {("state", i): each for i, each in enumerate(state)}, lambda _, t: t)
+    symbol = getattr(fn, name)(*map(tape.state, range(len(state))))
+    (values,) = symbols.evaluate(tape, [symbol], {("state", i): each for i, each in enumerate(state)}, lambda _, t: t)
     with np.errstate(all="ignore"):
-        assert same(np.broadcast_to(found, state[0].shape), getattr(fn, name)(*state)).all()
+        assert same(np.broadcast_to(values, state[0].shape), getattr(fn, name)(*state)).all()
 
 
 @pytest.mark.parametrize("name", OF_TWO)
@@ -65,11 +65,11 @@ def test_what_is_known_beforehand_is_computed_beforehand(name: str) -> None:
     folded = 0
     for x in [0.0, -0.0, 0.3, -2.0, 5e-324, 1e6, *np.random.default_rng(4).uniform(0.0, 1.0, 20).tolist()]:
         tape = _core.Tape()
-        given = (x, 0.7)[: 2 if name in OF_TWO else 1]
-        operations, (root,) = tape.operations([getattr(fn, name)(*map(tape.number, given))])
-        expected = getattr(fn, name)(*(np.array(each) for each in given))
+        numbers = (x, 0.7)[: 2 if name in OF_TWO else 1]
+        operations, (root,) = tape.operations([getattr(fn, name)(*map(tape.number, numbers))])
+        expected = getattr(fn, name)(*(np.array(each) for each in numbers))
         with np.errstate(all="ignore"):
-            assert same(as_it_stands(tape, getattr(fn, name)(*map(tape.number, given)), [np.zeros(1)]), expected).all()
+            assert same(as_it_stands(tape, getattr(fn, name)(*map(tape.number, numbers)), [np.zeros(1)]), expected).all()
         folded += [kind for kind, _, _ in operations] == ["constant"]
         assert root == len(operations) - 1  # nothing else
     assert folded >= 20
@@ -88,8 +88,8 @@ def test_comparisons_by_name(name: str) -> None:
     x[::3] = y[::3]
     f, theirs = getattr(fn, name), getattr(np, name)(x, y)
     assert (f(x, y) == theirs).all()
-    for made in (f(tape.state(0), tape.state(1)), f(np.array([tape.state(0)], dtype=object), tape.state(1))[0]):
-        assert same(as_it_stands(tape, fn.where(made, 1.0, 0.0), [x, y]), np.where(theirs, 1.0, 0.0)).all()
+    for condition in (f(tape.state(0), tape.state(1)), f(np.array([tape.state(0)], dtype=object), tape.state(1))[0]):
+        assert same(as_it_stands(tape, fn.where(condition, 1.0, 0.0), [x, y]), np.where(theirs, 1.0, 0.0)).all()
     assert isinstance(f(1.0, 2), np.bool_)
 
 
@@ -98,11 +98,11 @@ def test_choices_and_arrays_of_symbols() -> None:
     tape = _core.Tape()
     a, b = tape.state(0), tape.state(1)
     with np.errstate(all="ignore"):
-        made = fn.where((a < b) & ~(a <= 1.0), fn.clip(a, -2.0, 2.0), 3)
-        assert same(as_it_stands(tape, made, [x, y]), fn.where((x < y) & ~(x <= 1.0), fn.clip(x, -2.0, 2.0), 3)).all()
+        symbol = fn.where((a < b) & ~(a <= 1.0), fn.clip(a, -2.0, 2.0), 3)
+        assert same(as_it_stands(tape, symbol, [x, y]), fn.where((x < y) & ~(x <= 1.0), fn.clip(x, -2.0, 2.0), 3)).all()
         both = np.array([a, b], dtype=object)
-        for made, expected in zip(fn.arctan2(both, [1.0, 2.0]), (fn.arctan2(x, 1.0), fn.arctan2(y, 2.0)), strict=True):
-            assert same(as_it_stands(tape, made, [x, y]), expected).all()
+        for symbol, expected in zip(fn.arctan2(both, [1.0, 2.0]), (fn.arctan2(x, 1.0), fn.arctan2(y, 2.0)), strict=True):
+            assert same(as_it_stands(tape, symbol, [x, y]), expected).all()
         chosen = fn.where(fn.less(both, 1.0) | ~fn.less(both, 3.0), both, 0.0)
         assert same(as_it_stands(tape, chosen[1], [x, y]), fn.where((y < 1.0) | ~(y < 3.0), y, 0.0)).all()
         mixed = fn.exp(np.array([a, 1.0], dtype=object))
@@ -115,17 +115,17 @@ def test_choices_and_arrays_of_symbols() -> None:
 def test_sine_and_cosine_of_one_angle_share_their_work() -> None:
     tape = _core.Tape()
     x = tape.state(0)
-    one, both = (len(tape.operations(made)[0]) for made in ([fn.sin(x)], [fn.sin(x), fn.cos(x)]))
+    one, both = (len(tape.operations(symbols)[0]) for symbols in ([fn.sin(x)], [fn.sin(x), fn.cos(x)]))
     assert both - one < 10
 
 
 @pytest.mark.parametrize("name", TRUE)
 def test_fused_they_are_as_accurate(name: str) -> None:
     """Products that are exact stay so when they are fused, and the others lose a rounding."""
-    given = arguments(name, np.random.default_rng(8), 400)
+    points = arguments(name, np.random.default_rng(8), 400)
     tape = _core.Tape()
-    (found,) = Evaluation(tape, [getattr(fn, name)(*map(tape.state, range(len(given))))], {}, fuse=True)(given)
-    assert errors(found, name, given).max() < 1.0
+    (values,) = Evaluation(tape, [getattr(fn, name)(*map(tape.state, range(len(points))))], {}, fuse=True)(points)
+    assert errors(values, name, points).max() < 1.0
 
 
 def test_interp_is_numpys() -> None:
@@ -140,9 +140,9 @@ def test_interp_is_numpys() -> None:
 
         system = table().for_state_shapes(None, np.empty(()))
         for t in at:
-            found = system.reference_at_step(1.0, ()).rates(t, np.empty(0), np.empty(()))[1]
+            rate = system.reference_at_step(1.0, ()).rates(t, np.empty(0), np.empty(()))[1]
             # A slope, a time since, a product and a sum, of values up to 3 and slopes up to 13.
-            assert abs(found - np.interp(t, places, values, **outside)) < 40 * 2.0**-52
+            assert abs(rate - np.interp(t, places, values, **outside)) < 40 * 2.0**-52
 
 
 def test_interp_means_the_same_as_a_linear_sampled() -> None:

@@ -138,7 +138,7 @@ def test_multiplying_increments_last_changes_roundings_alone(name: str) -> None:
 @pytest.mark.parametrize("by_core", [True, False], ids=["core", "reference"])
 def test_which_of_two_negated_products_was_met_first_decides_nothing(by_core: bool) -> None:
     """−a·b − (c + d)·d: a tape makes (−a·b) − … of it, or (−(c + d)·d) − …, by the order in which it comes upon the two."""
-    plain, found = [], []
+    plain, shortened = [], []
     for deep_first in (False, True):
         tape = _core.Tape()
         a, b, c, d = (tape.state(i) for i in range(4))
@@ -147,9 +147,9 @@ def test_which_of_two_negated_products_was_met_first_decides_nothing(by_core: bo
         total = flat + (-((c + d) * d) if deep is None else deep)
         lines, roots = listed(tape, [total])
         plain.append(graph(lines, roots))
-        found.append(graph(*(listed(*tape.fused([total])) if by_core else fused(lines, roots))))
+        shortened.append(graph(*(listed(*tape.fused([total])) if by_core else fused(lines, roots))))
     assert plain[0] != plain[1]
-    assert found[0] == found[1]
+    assert shortened[0] == shortened[1]
 
 
 def graph(lines: Any, roots: Any) -> list[Any]:
@@ -164,7 +164,7 @@ def graph(lines: Any, roots: Any) -> list[Any]:
 
 def test_the_order_of_writing_decides_nothing() -> None:
     # x·y + z·x, its products written down in either order, and its sum either way round.
-    found = set()
+    factors = set()
     for turned in (False, True):
         for swapped in (False, True):
             tape = _core.Tape()
@@ -175,8 +175,8 @@ def test_the_order_of_writing_decides_nothing() -> None:
             total = q + p if swapped else p + q
             lines, _ = listed(*tape.fused([total]))
             [line] = [operation for operation in lines if operation.name == "multiply add"]
-            found.add(frozenset(lines[each].extra for each in line.of[:2]))
-    assert len(found) == 1
+            factors.add(frozenset(lines[each].extra for each in line.of[:2]))
+    assert len(factors) == 1
 
 
 def runs(system: Any, method: Any, v: Any, y: Any, **more: Any) -> tuple[Any, Any]:
@@ -264,9 +264,9 @@ def test_neither_company_nor_threads_change_a_bit() -> None:
 
 def test_one_free_oscillator_is_two_operations() -> None:
     model = engine.model(engine.Plan(sw.Oscillator(), sw.method("false_euler"), (), 0.1, fused=True))
-    told = _core.compiled(model, 1)
-    assert told is not None
-    counts = told["computed"]
+    kernel = _core.compiled(model, 1)
+    assert kernel is not None
+    counts = kernel["computed"]
     assert (counts["fused"], counts["additions"], counts["multiplications"]) == (2, 0, 0)
 
 

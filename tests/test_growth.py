@@ -28,8 +28,8 @@ def test_an_equation_has_so_many_operations(n):
     The first factor is 1, and y·1 is not computed; a product of constants may be computed before the steps.
     """
     system = growth.of_length(n)()
-    told = _core.compiled(engine.model(engine.Plan(system, sw.method("false_euler"), (), 1e-3)), 1)
-    assert n - 1 <= arithmetic(told["computed"]) <= n + 5
+    kernel = _core.compiled(engine.model(engine.Plan(system, sw.method("false_euler"), (), 1e-3)), 1)
+    assert n - 1 <= arithmetic(kernel["computed"]) <= n + 5
 
 
 def test_a_step_past_the_bound_is_no_longer_one_tape():
@@ -39,6 +39,6 @@ def test_a_step_past_the_bound_is_no_longer_one_tape():
 
 
 def test_the_least_of_several_is_the_least(monkeypatch):
-    told = iter([0.0, 3.0, 10.0, 11.0, 20.0, 25.0])
-    monkeypatch.setattr(growth.time, "process_time", lambda: next(told))
+    times = iter([0.0, 3.0, 10.0, 11.0, 20.0, 25.0])
+    monkeypatch.setattr(growth.time, "process_time", lambda: next(times))
     assert growth.least(lambda: None, 3) == 1.0

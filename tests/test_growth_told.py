@@ -36,11 +36,11 @@ PAST = [
 ]
 
 
-@pytest.mark.parametrize(("system", "method", "given", "said"), PAST)
-def test_growth_past_the_limit_is_told_once(system: sw.System, method: str, given: dict[str, Any], said: str) -> None:
-    with pytest.warns(sw.AccuracyWarning, match=said) as told:
-        run = sw.integrate(system, method, **given)
-    assert len(told) == 1
+@pytest.mark.parametrize(("system", "method", "arguments", "message"), PAST)
+def test_growth_past_the_limit_is_told_once(system: sw.System, method: str, arguments: dict[str, Any], message: str) -> None:
+    with pytest.warns(sw.AccuracyWarning, match=message) as caught:
+        run = sw.integrate(system, method, **arguments)
+    assert len(caught) == 1
     assert np.isfinite(run.y).all()
     assert np.abs(run.y[-1]).max() > 1e5
 
@@ -54,9 +54,9 @@ def frames(world: sw.World, number: int, steps: int) -> None:
 def test_a_world_tells_it_once(n: int) -> None:
     v, y = np.zeros(3), np.ones(3)
     world = sw.World(sw.Oscillator(np.array([1.0, 2.0, 3.0])), "false_euler", v=v, y=y, dt=0.7)
-    with pytest.warns(sw.AccuracyWarning, match=r"1 of 3 members grew .* member 2: .* the motion itself does not grow") as told:
+    with pytest.warns(sw.AccuracyWarning, match=r"1 of 3 members grew .* member 2: .* the motion itself does not grow") as caught:
         frames(world, 280 // n, n)
-    assert len(told) == 1
+    assert len(caught) == 1
     # A growth of 1.877 a step is a million in 22 steps, and looked for after 8, 24, 56 and 120 steps.
     assert np.abs(y[2]) > 1e6
 
@@ -100,22 +100,22 @@ SWEEPS = [
     [{}, {"transient": 150}, {"outcomes": "extremes"}, {"outcomes": lambda run: run.y[-1]}],
     ids=["", "transient", "extremes", "function"],
 )
-@pytest.mark.parametrize(("system", "axes", "method", "given", "number", "first"), SWEEPS)
+@pytest.mark.parametrize(("system", "axes", "method", "arguments", "number", "first"), SWEEPS)
 def test_a_sweep_tells_how_many_members_grew_and_which_first(
-    system: Any, axes: dict[str, Any], method: str, given: dict[str, Any], number: int, first: str, options: dict[str, Any]
+    system: Any, axes: dict[str, Any], method: str, arguments: dict[str, Any], number: int, first: str, options: dict[str, Any]
 ) -> None:
     steps = {"steps": 200 - options.get("transient", 0)}
-    with pytest.warns(sw.AccuracyWarning, match=rf"{number} of \d members grew .*-fold in 200 steps") as told:
-        sw.sweep(system, axes, method, **given, **steps, chunk=2, **options)
-    assert len(told) == 1
-    assert f" at {first} each step of" in str(told[0].message)
+    with pytest.warns(sw.AccuracyWarning, match=rf"{number} of \d members grew .*-fold in 200 steps") as caught:
+        sw.sweep(system, axes, method, **arguments, **steps, chunk=2, **options)
+    assert len(caught) == 1
+    assert f" at {first} each step of" in str(caught[0].message)
 
 
 def test_a_sweep_passes_over_members_that_grow_by_themselves() -> None:
     """The first two grow as e²⁰ and e⁴⁰ do; the last is the spring that its steps make grow."""
-    with pytest.warns(sw.AccuracyWarning, match=r"1 of 3 members grew .* at square = -30000:") as told:
+    with pytest.warns(sw.AccuracyWarning, match=r"1 of 3 members grew .* at square = -30000:") as caught:
         sw.sweep(pushed_off, {"square": [100.0, 400.0, -3e4]}, "rk4", v=0.0, y=1.0, dt=0.02, steps=100)
-    assert len(told) == 1
+    assert len(caught) == 1
 
 
 @sw.system
@@ -168,20 +168,22 @@ TAME = [
 ]
 
 
-@pytest.mark.parametrize(("system", "given"), TAME)
-def test_what_grows_by_itself_or_not_at_all_is_not_told(system: sw.System, given: dict[str, Any]) -> None:
+@pytest.mark.parametrize(("system", "arguments"), TAME)
+def test_what_grows_by_itself_or_not_at_all_is_not_told(system: sw.System, arguments: dict[str, Any]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for method in ("rk4", "dop853", "merson"):
-            sw.integrate(system, method, **given)
-            blocks = {name: np.array(np.broadcast_to(given[name], shape), dtype=float) for name, shape in shapes(system, given)}
-            world = sw.World(system, method, dt=given["dt"], **blocks)
-            frames(world, 300, max(1, given["steps"] // 300))
+            sw.integrate(system, method, **arguments)
+            blocks = {
+                name: np.array(np.broadcast_to(arguments[name], shape), dtype=float) for name, shape in shapes(system, arguments)
+            }
+            world = sw.World(system, method, dt=arguments["dt"], **blocks)
+            frames(world, 300, max(1, arguments["steps"] // 300))
 
 
-def shapes(system: sw.System, given: dict[str, Any]) -> list[tuple[str, Any]]:
-    sized = system.for_state_shapes(given.get("v"), given["y"])
-    return [(name, shape) for name, shape in (("v", sized.v_shape), ("y", sized.y_shape)) if name in given]
+def shapes(system: sw.System, arguments: dict[str, Any]) -> list[tuple[str, Any]]:
+    sized = system.for_state_shapes(arguments.get("v"), arguments["y"])
+    return [(name, shape) for name, shape in (("v", sized.v_shape), ("y", sized.y_shape)) if name in arguments]
 
 
 SQUARES = [

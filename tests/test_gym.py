@@ -51,32 +51,32 @@ def test_a_vector_is_what_it_says(name: str) -> None:
     envs = many(name, 7)
     assert envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
     envs.action_space.seed(3)
-    seen, told = envs.reset(seed=5)
-    assert told == {}
+    seen, info = envs.reset(seed=5)
+    assert info == {}
     earlier = []
     for _ in range(30):
         assert seen in envs.observation_space
         assert seen.dtype == np.float32
         earlier.append((seen, seen.copy()))
-        seen, rewards, terminated, truncated, told = envs.step(envs.action_space.sample())
+        seen, rewards, terminated, truncated, info = envs.step(envs.action_space.sample())
         assert (rewards.shape, rewards.dtype) == ((7,), np.float64)
         assert terminated.shape == truncated.shape == (7,)
         assert terminated.dtype == truncated.dtype == np.bool_
-        assert told == {}
+        assert info == {}
     assert all((a == b).all() for a, b in earlier)
 
 
 @each_type
 @pytest.mark.parametrize("name", NAMES)
 def test_the_same_seed_and_actions_give_the_same_bits(name: str, dtype: str) -> None:
-    def told(seed: int) -> bytes:
+    def observations(seed: int) -> bytes:
         envs = many(name, dtype=dtype)
         envs.action_space.seed(1)
-        made = [envs.reset(seed=seed)[0]] + [envs.step(envs.action_space.sample())[0] for _ in range(50)]
-        return np.stack(made).tobytes()
+        seen = [envs.reset(seed=seed)[0]] + [envs.step(envs.action_space.sample())[0] for _ in range(50)]
+        return np.stack(seen).tobytes()
 
-    assert told(1) == told(1)
-    assert told(1) != told(2)
+    assert observations(1) == observations(1)
+    assert observations(1) != observations(2)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -104,7 +104,7 @@ def test_the_world_is_stepped_in_float32(name: str) -> None:
     first = half.reset(seed=3)[0], whole.reset(seed=3)[0]
     # Both draw the same start, whose numbers are below 8 and are rounded by half a unit in their last place, 2⁻²².
     np.testing.assert_allclose(*first, atol=2.0**-21)
-    kept = first[0].copy()
+    before = first[0].copy()
     for _ in range(20):
         action = half.action_space.sample()
         mine, theirs = half.step(action), whole.step(action)
@@ -115,7 +115,7 @@ def test_the_world_is_stepped_in_float32(name: str) -> None:
         near = 20 * 2.0**-21 * np.exp(5.0)
         np.testing.assert_allclose(mine[0], theirs[0], atol=near)
         np.testing.assert_allclose(mine[1], theirs[1], atol=2.0 * np.pi * near)
-    np.testing.assert_array_equal(first[0], kept)
+    np.testing.assert_array_equal(first[0], before)
     assert half.world.v.dtype == half.world.y.dtype == F
     assert whole.world.y.dtype == np.float64
     assert (half.world.v != whole.world.v.astype(F)).any()
@@ -300,12 +300,12 @@ def test_shorter_steps_come_nearer_to_the_truth() -> None:
 
 @pytest.mark.parametrize("name", [name for name in sw.gym.__all__ if name.endswith("VectorEnv") and name != "WorldVectorEnv"])
 def test_examples_print_what_they_say(name: str) -> None:
-    found = doctest.DocTestParser().get_doctest(inspect.getdoc(getattr(sw.gym, name)) or "", {}, name, None, None)
-    assert found.examples
-    told: list[str] = []
+    example = doctest.DocTestParser().get_doctest(inspect.getdoc(getattr(sw.gym, name)) or "", {}, name, None, None)
+    assert example.examples
+    output: list[str] = []
     runner = doctest.DocTestRunner(verbose=False)
-    runner.run(found, out=told.append)
-    assert runner.failures == 0, "".join(told)
+    runner.run(example, out=output.append)
+    assert runner.failures == 0, "".join(output)
 
 
 # ---- wrong calls
@@ -355,10 +355,10 @@ class Stone(stepwell.interop.gym.WorldVectorEnv):  # type: ignore[misc]
 
 
 def test_a_world_of_another_type_is_refused() -> None:
-    given: dict[str, Any] = {"method": "leapfrog", "dt": 0.1, "substeps": 1, "max_episode_steps": 5}
-    assert Stone(2, **given).world.y.dtype == np.float64
+    arguments: dict[str, Any] = {"method": "leapfrog", "dt": 0.1, "substeps": 1, "max_episode_steps": 5}
+    assert Stone(2, **arguments).world.y.dtype == np.float64
     with pytest.raises(UnsupportedError, match="dtype: Stone makes a world of float64, and float32 was asked for"):
-        Stone(2, **given, dtype="float32")
+        Stone(2, **arguments, dtype="float32")
     with pytest.raises(DTypeError, match="dtype: expected 'float64' or 'float32', got 'float16'"):
         many("Pendulum", dtype="float16")
 

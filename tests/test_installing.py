@@ -86,8 +86,8 @@ def test_a_wheel_installs_in_a_clean_environment() -> None:
     tried(WHEELS[-1])
 
 
-@pytest.mark.parametrize(("asked", "outcome"), [("", "2 skipped"), ("complete", "1 failed, 1 skipped")])
-def test_what_is_missing_in_ci_fails(asked: str, outcome: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("setting", "outcome"), [("", "2 skipped"), ("complete", "1 failed, 1 skipped")])
+def test_what_is_missing_in_ci_fails(setting: str, outcome: str, tmp_path: Path) -> None:
     """A tool that is missing is a skip on a user's machine and a failure in CI; a combination that does not exist is a skip."""
     (tmp_path / "test_skips.py").write_text(
         "import pytest\nfrom support.complete import *\n"
@@ -96,7 +96,7 @@ def test_what_is_missing_in_ci_fails(asked: str, outcome: str, tmp_path: Path) -
         encoding="utf-8",
     )
     (tmp_path / "conftest.py").write_text("from support.complete import *\n", encoding="utf-8")
-    environment = os.environ | {"STEPWELL_TESTS": asked, "PYTHONPATH": str(ROOT / "tests")}
+    environment = os.environ | {"STEPWELL_TESTS": setting, "PYTHONPATH": str(ROOT / "tests")}
     command = [sys.executable, "-m", "pytest", "-q", "-c", os.devnull, "--rootdir", str(tmp_path), str(tmp_path)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, cwd=tmp_path)
     assert outcome in done.stdout

@@ -108,7 +108,7 @@ WITHIN_A_STEP = {
 @pytest.mark.parametrize("what", WITHIN_A_STEP)
 def test_ctrl_c_within_a_step(what: str) -> None:
     """A tenth of a second too; and a world stays where its last whole step left it, as if nobody had asked for more."""
-    made, run = WITHIN_A_STEP[what]
+    setup, run = WITHIN_A_STEP[what]
     code = f"""
         import copy, os, signal, threading, time
         import numpy as np, stepwell as sw
@@ -122,7 +122,7 @@ def test_ctrl_c_within_a_step(what: str) -> None:
             time.sleep(0.3)
             sent.append(time.perf_counter())
             os.kill(os.getpid(), signal.SIGINT)
-        {made}
+        {setup}
         start = None if w is None else copy.copy(w)
         waits = []
         for _ in range(3):

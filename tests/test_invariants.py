@@ -20,24 +20,24 @@ START: dict[str, Any] = {"v": np.array([0.0, 0.5]), "y": np.array([1.0, -2.0]), 
 QUATERNION = {"v": np.array([1.0, 0.1, 0.2]), "y": np.array([1.0, 0.0, 0.0, 0.0]), "dt": 0.05, "steps": 40, "every": 5}
 
 
-def both(system: Any, method: str, **given: Any) -> sw.Run:
+def both(system: Any, method: str, **options: Any) -> sw.Run:
     """By the core and by the reference, which agree to the bit."""
-    made, reference = (sw.integrate(system, method, **given, backend=backend) for backend in ("rust", "numpy"))
+    run, reference = (sw.integrate(system, method, **options, backend=backend) for backend in ("rust", "numpy"))
     for a, b in (
-        (made.v, reference.v),
-        (made.y, reference.y),
-        *((made.recorded[name], reference.recorded[name]) for name in made.recorded),
+        (run.v, reference.v),
+        (run.y, reference.y),
+        *((run.recorded[name], reference.recorded[name]) for name in run.recorded),
     ):
         np.testing.assert_array_equal(a, b)
-    return made
+    return run
 
 
 def test_an_invariant_is_recorded() -> None:
-    made = both(own.pendulum(omega=1.3), "rk4", **START, record="energy")
-    expected = 0.5 * made.v**2 + 1.3**2 * (1.0 - np.cos(made.y))
+    run = both(own.pendulum(omega=1.3), "rk4", **START, record="energy")
+    expected = 0.5 * run.v**2 + 1.3**2 * (1.0 - np.cos(run.y))
     # Four operations and a cosine of numbers up to 4, each right to half a unit or one in the last place.
-    np.testing.assert_allclose(made.recorded["energy"], expected, rtol=0, atol=8 * 4 * 2**-53)
-    np.testing.assert_array_equal(made.energy, made.recorded["energy"])
+    np.testing.assert_allclose(run.recorded["energy"], expected, rtol=0, atol=8 * 4 * 2**-53)
+    np.testing.assert_array_equal(run.energy, run.recorded["energy"])
     norm = both(own.top(), "rk4", **QUATERNION, record="norm").recorded["norm"]
     assert norm.shape == (9,)
     np.testing.assert_allclose(norm, 1.0, rtol=1e-6)
@@ -49,10 +49,10 @@ def test_an_invariant_is_recorded() -> None:
 )
 def test_the_core_and_the_reference_are_one_graph_under_control(method: str, control: Any) -> None:
     system = own.pendulum(omega=np.array([0.8, 1.3]))
-    held = system.for_state_shapes(START["v"], START["y"]).controlled(control, START["v"], START["y"], 0.05)
-    plan = engine.Plan(held, sw.method(method), held.batch, 0.05)
+    controlled = system.for_state_shapes(START["v"], START["y"]).controlled(control, START["v"], START["y"], 0.05)
+    plan = engine.Plan(controlled, sw.method(method), controlled.batch, 0.05)
     tape = _core.Tape()
-    assert_one_graph(tape, tape.trace(engine.model(plan), "step"), Tracer(held, tape).step(sw.method(method)))
+    assert_one_graph(tape, tape.trace(engine.model(plan), "step"), Tracer(controlled, tape).step(sw.method(method)))
     both(system, method, **START, control=control, record="energy")
 
 
@@ -83,33 +83,35 @@ def test_a_series_has_the_functions_of_the_invariant_that_is_kept(form: Any, bat
 
 def test_a_control_keeps_what_the_method_loses() -> None:
     """Standard Euler's energy grows by (1 + h²ω²) a step near the middle; the control takes it away as exp(−gain·t)."""
-    given = START | {"steps": 400}
-    free = sw.integrate(own.pendulum(), "standard_euler", **given, record="energy").recorded["energy"]
-    held = both(own.pendulum(), "standard_euler", **given, record="energy", control=sw.Control("energy", 10.0)).recorded["energy"]
-    onto = both(own.pendulum(), "standard_euler", **given, record="energy", control=sw.Projection("energy")).recorded["energy"]
+    options = START | {"steps": 400}
+    free = sw.integrate(own.pendulum(), "standard_euler", **options, record="energy").recorded["energy"]
+    controlled = both(own.pendulum(), "standard_euler", **options, record="energy", control=sw.Control("energy", 10.0)).recorded[
+        "energy"
+    ]
+    onto = both(own.pendulum(), "standard_euler", **options, record="energy", control=sw.Projection("energy")).recorded["energy"]
     start = free[0]
     assert (np.abs(free[-1] - start) > 0.3 * start).all()
     # In balance a step's growth, below h²·ω²·E·(1 + …) ≤ 2·h²·E, is a step's decay, h·gain/(1 + h·gain) of what is left.
-    assert (np.abs(held[-1] - start) < 2 * 0.05**2 * start * (1 + 0.05 * 10) / (0.05 * 10) * 1.5).all()
+    assert (np.abs(controlled[-1] - start) < 2 * 0.05**2 * start * (1 + 0.05 * 10) / (0.05 * 10) * 1.5).all()
     # A projection is right to the square of what a step does.
     assert (np.abs(onto[-1] - start) < (2 * 0.05**2) * start).all()
-    assert (np.abs(onto[-1] - start) < np.abs(held[-1] - start)).all()
+    assert (np.abs(onto[-1] - start) < np.abs(controlled[-1] - start)).all()
 
 
 def test_the_error_of_an_invariant_decays_as_it_is_said() -> None:
     """A ring of the norm alone, kept: the state goes radially, and the norm's error by exp(−gain·t)."""
     y = np.array([1.2, 0.0, 0.0, 0.0])
     control = sw.Control("norm", 3.0, "printed", target=1.0)
-    made = sw.integrate(own.top(), "rk4", v=np.zeros(3), y=y, dt=0.01, steps=100, every=1, control=control, record="norm")
-    error = made.recorded["norm"] - 1.0
+    run = sw.integrate(own.top(), "rk4", v=np.zeros(3), y=y, dt=0.01, steps=100, every=1, control=control, record="norm")
+    error = run.recorded["norm"] - 1.0
     # |q|² − 1 decays with the rate 3 exactly; RK4's own error is (0.03)⁵/120 a step.
-    np.testing.assert_allclose(error, error[0] * np.exp(-3.0 * made.t), rtol=100 * 0.03**5)
+    np.testing.assert_allclose(error, error[0] * np.exp(-3.0 * run.t), rtol=100 * 0.03**5)
 
 
 def test_a_limited_control_never_overshoots() -> None:
     y = np.array([1.2, 0.0, 0.0, 0.0])
     for gain in (10.0, 1e3, 1e6):
-        made = sw.integrate(
+        run = sw.integrate(
             own.top(),
             "standard_euler",
             v=np.zeros(3),
@@ -120,15 +122,15 @@ def test_a_limited_control_never_overshoots() -> None:
             control=sw.Control("norm", gain, target=1.0),
             record="norm",
         )
-        error = made.recorded["norm"] - 1.0
+        error = run.recorded["norm"] - 1.0
         assert (np.diff(np.abs(error)) <= 2**-52).all()
     with pytest.warns(sw.ControlWarning, match=r"gain: h·gain = 100"):
         sw.integrate(own.top(), "standard_euler", v=np.zeros(3), y=y, dt=0.1, steps=1, control=sw.Control("norm", 1e3, "printed"))
 
 
 def test_where_the_gradient_is_zero_nothing_is_pushed() -> None:
-    made = sw.integrate(own.pendulum(), "rk4", v=0.0, y=0.0, dt=0.1, steps=3, control=sw.Control("energy", 1.0, target=1.0))
-    assert made.v[-1] == made.y[-1] == 0.0
+    run = sw.integrate(own.pendulum(), "rk4", v=0.0, y=0.0, dt=0.1, steps=3, control=sw.Control("energy", 1.0, target=1.0))
+    assert run.v[-1] == run.y[-1] == 0.0
 
 
 def test_runs_worlds_and_pickles_under_control() -> None:
@@ -156,20 +158,20 @@ def test_runs_worlds_and_pickles_under_control() -> None:
 
 def test_batches_of_gains_and_targets() -> None:
     control = sw.Control("energy", np.array([0.0, 5.0]), target=np.array([1.0, 2.0]))
-    made = both(own.pendulum(), "rk4", **START | {"steps": 200}, control=control, record="energy")
+    run = both(own.pendulum(), "rk4", **START | {"steps": 200}, control=control, record="energy")
     free = sw.integrate(own.pendulum(), "rk4", **START | {"steps": 200}, record="energy")
-    np.testing.assert_allclose(made.recorded["energy"][:, 0], free.recorded["energy"][:, 0], rtol=1e-9)
-    np.testing.assert_allclose(made.recorded["energy"][-1, 1], 2.0, rtol=1e-6)
+    np.testing.assert_allclose(run.recorded["energy"][:, 0], free.recorded["energy"][:, 0], rtol=1e-9)
+    np.testing.assert_allclose(run.recorded["energy"][-1, 1], 2.0, rtol=1e-6)
 
 
 def test_what_cannot_be() -> None:
-    given = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1}
+    arguments = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1}
     with pytest.raises(UnknownNameError, match=r"control: there is no 'enrgy'; did you mean 'energy'"):
-        sw.integrate(own.pendulum(), "rk4", **given, control=sw.Control("enrgy", 1.0))
+        sw.integrate(own.pendulum(), "rk4", **arguments, control=sw.Control("enrgy", 1.0))
     with pytest.raises(UnsupportedError, match=r"EnergyControl .* use Control\('energy', gain\)"):
-        sw.integrate(own.pendulum(), "rk4", **given, control=sw.EnergyControl(1.0))
+        sw.integrate(own.pendulum(), "rk4", **arguments, control=sw.EnergyControl(1.0))
     with pytest.raises(UnsupportedError, match=r"Projection\('scaling'\) .* use Projection\('energy'\)"):
-        sw.integrate(own.pendulum(), "rk4", **given, control=sw.Projection())
+        sw.integrate(own.pendulum(), "rk4", **arguments, control=sw.Projection())
     with pytest.raises(UnsupportedError, match=r"is for an invariant of an own system"):
         sw.integrate(
             sw.NBody(),
@@ -181,9 +183,9 @@ def test_what_cannot_be() -> None:
             control=sw.Control("energy", 1.0),
         )
     with pytest.raises(UnsupportedError, match=r"energy: duffing.* declare one: @duffing.invariant"):
-        sw.integrate(own.duffing(), "rk4", **given, record="energy")
+        sw.integrate(own.duffing(), "rk4", **arguments, record="energy")
     with pytest.raises(UnsupportedError, match=r"verlet needs"):
-        sw.integrate(own.pendulum(), "verlet", **given, control=sw.Control("energy", 1.0))
+        sw.integrate(own.pendulum(), "verlet", **arguments, control=sw.Control("energy", 1.0))
 
     @sw.system
     def plain(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
@@ -206,7 +208,7 @@ def test_what_cannot_be() -> None:
         return np.array([v, y])
 
     with pytest.raises(ArgumentError, match=r"plain: vector: expected one number of a state, got an array of shape \(2,\)"):
-        sw.integrate(plain(), "rk4", **given, record="vector")
+        sw.integrate(plain(), "rk4", **arguments, record="vector")
 
 
 def test_an_invariant_may_take_the_time_before_the_state() -> None:
@@ -236,8 +238,8 @@ def test_an_invariant_may_take_the_time_before_the_state() -> None:
         start: dict[str, Any] = {"y": np.ones(2)} if order == 1 else {"v": 0.0, "y": 1.0}
         run = sw.integrate(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, every=1, record=["energy", "plain"])
         np.testing.assert_array_equal(run.recorded["energy"], run.recorded["plain"])
-        kept = sw.integrate(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, control=sw.Projection("energy"))
-        assert kept.energy[-1] == pytest.approx(run.energy[0], rel=1e-9)  # one correction of an error of 1e-6, squared
+        projected = sw.integrate(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, control=sw.Projection("energy"))
+        assert projected.energy[-1] == pytest.approx(run.energy[0], rel=1e-9)  # one correction of an error of 1e-6, squared
         assert both(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, record="energy")
 
     @sw.system
@@ -267,10 +269,10 @@ def test_adaptive_steps_of_a_system_under_control() -> None:
     for control in (sw.Control("energy", 1.0), sw.Projection("energy")):
         mine = sw.integrate(own.pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=control).system
         pairs.append((mine, own.pendulum(), 1.0, mine.keeper))
-    for held, free, start, control in pairs:
+    for controlled, free, start, control in pairs:
         ask: dict[str, Any] = {"v": 0.0, "y": start, "tolerance": 1e-3, "at": [0.5]}
         run, anew, alone = (
-            sw.integrate(held, "dop853", **ask),
+            sw.integrate(controlled, "dop853", **ask),
             sw.integrate(free, "dop853", **ask, control=control),
             sw.integrate(free, "dop853", **ask),
         )

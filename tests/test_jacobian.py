@@ -46,25 +46,25 @@ def test_jacobians_written_by_hand() -> None:
     draw = np.random.default_rng(7)
     for _ in range(20):
         v, y = draw.uniform(-2, 2, 2)
-        found = sw.jacobian(sw.Pendulum(1.5, 0.2), v=v, y=y)
+        jacobian = sw.jacobian(sw.Pendulum(1.5, 0.2), v=v, y=y)
         true = [[-2 * 0.2 * 1.5, -(1.5**2) * np.cos(y)], [1, 0]]
-        np.testing.assert_allclose(found.matrix, true, rtol=0, atol=4 * EPS * 2.25)
+        np.testing.assert_allclose(jacobian.matrix, true, rtol=0, atol=4 * EPS * 2.25)
         v2, y2 = draw.uniform(-2, 2, (2, 2, 2))
-        found = sw.jacobian(sw.NBody([1.0, 2.0], force="newton", dim=2), v=v2, y=y2)
+        jacobian = sw.jacobian(sw.NBody([1.0, 2.0], force="newton", dim=2), v=v2, y=y2)
         true = kepler(v2, y2)
         # Some fifteen roundings of m/r³ and 3m/r³ on either side; a difference of coordinates is rounded too, and r⁻³ turns its
         # eps·4/r into three times that of the result. That again for the directions in d·dᵀ.
         r = np.hypot(*(y2[1] - y2[0]))
-        np.testing.assert_allclose(found.matrix, true, rtol=0, atol=EPS * (40 + 40 / r) * 8 / r**3)
+        np.testing.assert_allclose(jacobian.matrix, true, rtol=0, atol=EPS * (40 + 40 / r) * 8 / r**3)
         mu, y1 = draw.uniform(0.01, 0.5), draw.uniform(-1.5, 1.5, 2)
-        found = sw.jacobian(sw.RestrictedThreeBody(mu), v=draw.uniform(-1, 1, 2), y=y1)
+        jacobian = sw.jacobian(sw.RestrictedThreeBody(mu), v=draw.uniform(-1, 1, 2), y=y1)
         r = min(np.hypot(y1[0] + mu, y1[1]), np.hypot(y1[0] - 1 + mu, y1[1]))
-        np.testing.assert_allclose(found.matrix, restricted(mu, y1), rtol=0, atol=EPS * (40 + 40 / r) * 4 * (1 + 1 / r**3))
-    np.testing.assert_array_equal(found.vv, found.matrix[:2, :2])
-    np.testing.assert_array_equal(found.vy, found.matrix[:2, 2:])
-    np.testing.assert_array_equal(found.yv, np.eye(2))
-    np.testing.assert_array_equal(found.yy, np.zeros((2, 2)))
-    assert found.names == ("v[0]", "v[1]", "y[0]", "y[1]")
+        np.testing.assert_allclose(jacobian.matrix, restricted(mu, y1), rtol=0, atol=EPS * (40 + 40 / r) * 4 * (1 + 1 / r**3))
+    np.testing.assert_array_equal(jacobian.vv, jacobian.matrix[:2, :2])
+    np.testing.assert_array_equal(jacobian.vy, jacobian.matrix[:2, 2:])
+    np.testing.assert_array_equal(jacobian.yv, np.eye(2))
+    np.testing.assert_array_equal(jacobian.yy, np.zeros((2, 2)))
+    assert jacobian.names == ("v[0]", "v[1]", "y[0]", "y[1]")
 
 
 DRAW = np.random.default_rng(3)
@@ -88,8 +88,8 @@ SYSTEMS: dict[str, tuple[sw.System, Any, Any]] = {
 def test_jacobians_against_differences(name: str) -> None:
     system, v, y = SYSTEMS[name]
     system = system.for_state_shapes(v, y)
-    found = sw.jacobian(system, v=v, y=y, t=0.3)
-    members = found.matrix.shape[2:]
+    jacobian = sw.jacobian(system, v=v, y=y, t=0.3)
+    members = jacobian.matrix.shape[2:]
     n_v, n_y = maps.size(system)
 
     def rates(z: Any, i: int) -> Any:
@@ -111,8 +111,8 @@ def test_jacobians_against_differences(name: str) -> None:
         size = np.abs(rates(0.0, i)).max()
         true, bound = central(lambda z, i=i: rates(z, i), 0.0, EPS ** (1 / 3), 0.0)
         bound = bound + 1.5 * 20 * EPS * 10 * (size + 10.0) / EPS ** (1 / 3)
-        assert (np.abs(found.matrix[:, i] - true) <= bound).all()
-        assert bound.max() < 2e-2 * max(1.0, np.abs(found.matrix).max())
+        assert (np.abs(jacobian.matrix[:, i] - true) <= bound).all()
+        assert bound.max() < 2e-2 * max(1.0, np.abs(jacobian.matrix).max())
 
 
 @pytest.mark.parametrize("method", [m.name for m in sw.methods()])
@@ -120,8 +120,8 @@ def test_jacobians_against_differences(name: str) -> None:
 def test_a_step_has_the_derivative_that_the_complex_step_finds(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two ways that share no line: numbers with an infinitesimal imaginary part, and the differentiated tape."""
     system, v, y = SYSTEMS[name]
-    how = sw.method(method)
-    if how.needs_acceleration and (not system.second_order or system.velocity_term is not None):
+    record = sw.method(method)
+    if record.needs_acceleration and (not system.second_order or system.velocity_term is not None):
         with pytest.raises(UnsupportedError):
             sw.analyse(system, method, dt=0.05, v=v, y=y)
         return
@@ -138,11 +138,11 @@ def test_a_step_has_the_derivative_that_the_complex_step_finds(name: str, method
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_a_long_tape_is_differentiated_along_all_changes_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     system, v, y = SYSTEMS[name]
-    given = {"method": "rk4", "dt": 0.1, "v": v, "y": y, "t": 0.2}
+    arguments = {"method": "rk4", "dt": 0.1, "v": v, "y": y, "t": 0.2}
     monkeypatch.setattr(type(system), "complex_step", False)
-    whole, rates = sw.analyse(system, **given), sw.jacobian(system, v=v, y=y)
+    whole, rates = sw.analyse(system, **arguments), sw.jacobian(system, v=v, y=y)
     monkeypatch.setattr(traced, "MAX_WHOLE", 0)
-    along = sw.analyse(copy.copy(system), **given)
+    along = sw.analyse(copy.copy(system), **arguments)
     # The same sums in another order, some hundred roundings of the largest element.
     np.testing.assert_allclose(along.P, whole.P, rtol=0, atol=200 * EPS * max(1.0, float(np.abs(whole.P).max())))
     other = sw.jacobian(copy.copy(system), v=v, y=y)
@@ -174,10 +174,10 @@ def test_a_large_state_has_the_same_jacobian_by_the_complex_step() -> None:
     n = 20  # 80 numbers
     v, y = np.zeros((n, 2)), np.random.default_rng(0).normal(size=(n, 2))
     system = sw.NBody(np.ones(n), softening=0.3).for_state_shapes(v, y)
-    found = sw.jacobian(system, v=v, y=y)
+    jacobian = sw.jacobian(system, v=v, y=y)
     tape = Traced(system, "rates")
     assert tape.length == 80
     values = np.array([np.broadcast_to(each, ()) for each in tape.jacobian()([*tape.rows(v, y), np.zeros(())])])
     # Each element is a sum of twenty of size 1/0.3² at most, with some twenty roundings each.
-    np.testing.assert_allclose(found.matrix.reshape(-1), values[:6400], rtol=0, atol=40 * EPS * 20 / 0.09)
-    np.testing.assert_allclose(found.rates, values[6400:], rtol=0, atol=40 * EPS * 20 / 0.3)
+    np.testing.assert_allclose(jacobian.matrix.reshape(-1), values[:6400], rtol=0, atol=40 * EPS * 20 / 0.09)
+    np.testing.assert_allclose(jacobian.rates, values[6400:], rtol=0, atol=40 * EPS * 20 / 0.3)

@@ -42,9 +42,9 @@ def test_each_state_is_that_of_its_time(method: str, backend: str) -> None:
     """A run that is asked for the states at the times of its steps has the same ones, to the bit, and makes the same steps."""
     ask: dict[str, Any] = {"v": 0.0, "y": 2.0, "tolerance": 1e-6, "backend": backend}
     run = sw.integrate(sw.Pendulum(), method, at=[6.0], every=1, **ask)
-    asked = sw.integrate(sw.Pendulum(), method, at=run.t, **ask)
-    np.testing.assert_array_equal(run.y, asked.y)
-    np.testing.assert_array_equal(run.v, asked.v)
+    at_steps = sw.integrate(sw.Pendulum(), method, at=run.t, **ask)
+    np.testing.assert_array_equal(run.y, at_steps.y)
+    np.testing.assert_array_equal(run.v, at_steps.v)
     assert (np.diff(run.t) > 0.0).all()
     assert run.paces is not None
     assert len(run.t) == run.paces.accepted + 2  # the start, the steps, and the end within the step that is held

@@ -48,9 +48,9 @@ def bits(name: str, steps: int = 300) -> bytes:
 def code_bytes(name: str) -> int:
     """How long the machine code of a run is, if it is written now."""
     system, method = RUNS[name]
-    told = _core.compiled(engine.model(engine.Plan(system, sw.method(method), (MEMBERS,), 0.01)), MEMBERS)
-    assert told is not None
-    return int(told["bytes"])
+    kernel = _core.compiled(engine.model(engine.Plan(system, sw.method(method), (MEMBERS,), 0.01)), MEMBERS)
+    assert kernel is not None
+    return int(kernel["bytes"])
 
 
 def executable() -> list[int]:
@@ -87,13 +87,13 @@ def test_where_no_code_may_be_written_steps_are_interpreted_without_a_word() -> 
         check=False,
     )
     assert (out.returncode, out.stderr) == (0, "")
-    told = json.loads(out.stdout)
-    if "refused" in told:
-        pytest.skip(f"the kernel has no PR_SET_MDWE: {os.strerror(told['refused'])}")
-    assert told["code"] == dict.fromkeys(RUNS, 0)
-    assert told["level"] == sw.isa()
+    report = json.loads(out.stdout)
+    if "refused" in report:
+        pytest.skip(f"the kernel has no PR_SET_MDWE: {os.strerror(report['refused'])}")
+    assert report["code"] == dict.fromkeys(RUNS, 0)
+    assert report["level"] == sw.isa()
     for name in RUNS:
-        assert told["runs"][name] == bits(name).hex(), name
+        assert report["runs"][name] == bits(name).hex(), name
 
 
 # ---- other processes and threads
@@ -212,8 +212,8 @@ def run(steps):
     return len(test_kernels.executable())
 print(run(1), run(200), run(100_000), run(1))
 """
-    made = [sys.executable, "-c", code, json.dumps(sys.path)]
-    out = subprocess.run(made, capture_output=True, text=True, cwd=Path(__file__).parent, check=True)
+    command = [sys.executable, "-c", code, json.dumps(sys.path)]
+    out = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parent, check=True)
     one, short, long, after = (int(word) for word in out.stdout.split())
     assert one == short == long - 1 == after - 1
 

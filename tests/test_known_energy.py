@@ -43,7 +43,7 @@ def turning(v: Any, y: Any) -> Any:
     return y[0] * v[1] - y[1] * v[0]
 
 
-def said(system: Any, method: str, **options: Any) -> tuple[sw.Run, list[str]]:
+def with_warnings(system: Any, method: str, **options: Any) -> tuple[sw.Run, list[str]]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         run = sw.integrate(system, method, **options)
@@ -61,7 +61,7 @@ def test_a_pendulum_that_turns_over_is_told(system: Any, method: str) -> None:
     for tolerance in 10.0 ** np.arange(-8.0, -1.0):
         for degrees in (170.0, 175.0, 179.0):
             start = np.radians(degrees)
-            run, texts = said(system, method, v=0.0, y=start, tolerance=tolerance, at=[4.0, 7.0, 10.0])
+            run, texts = with_warnings(system, method, v=0.0, y=start, tolerance=tolerance, at=[4.0, 7.0, 10.0])
             turned = bool(np.abs(run.y).max() > np.pi)
             tumbled += turned
             passed = [text for text in texts if "where even at rest the energy is" in text]
@@ -74,7 +74,7 @@ def test_a_pendulum_that_turns_over_is_told(system: Any, method: str) -> None:
 
 def test_members_are_told_apart() -> None:
     start = np.radians([10.0, 179.0, 120.0])
-    run, texts = said(sw.Pendulum(np.sqrt(SQUARE)), "dop853", v=0.0, y=start, tolerance=1e-3, at=[10.0])
+    run, texts = with_warnings(sw.Pendulum(np.sqrt(SQUARE)), "dop853", v=0.0, y=start, tolerance=1e-3, at=[10.0])
     assert (np.abs(run.y[0]) > np.pi).tolist() == [False, True, False]
     (text,) = texts
     assert text.startswith("1 of 3 members did not follow the motion, by dop853: member 1 passed y = ")
@@ -86,7 +86,7 @@ def test_steps_of_fixed_length_that_pass_a_barrier_are_told(method: str) -> None
     """In one well of two, 1.4e-7 below the top: long steps go over, short ones do not, and the word goes with the motion."""
     went = []
     for dt in (0.02, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3):
-        run, texts = said(double_well(), method, dt=dt, steps=500, every=1, v=0.0, y=np.sqrt(2.0) - 1e-7)
+        run, texts = with_warnings(double_well(), method, dt=dt, steps=500, every=1, v=0.0, y=np.sqrt(2.0) - 1e-7)
         if run.status:
             continue
         over = run.y.min() < 0.0
@@ -102,7 +102,7 @@ def test_steps_of_fixed_length_that_pass_a_barrier_are_told(method: str) -> None
 def test_an_energy_of_another_size_is_told(method: str) -> None:
     """At a tolerance of a tenth a pendulum loses or gains more than half of its energy within 10 s."""
     for system in (sw.Pendulum(np.sqrt(SQUARE)), swinging()):
-        run, texts = said(system, method, v=0.0, y=np.radians(90.0), tolerance=0.3, at=[0.0, 30.0])
+        run, texts = with_warnings(system, method, v=0.0, y=np.radians(90.0), tolerance=0.3, at=[0.0, 30.0])
         first, last = run.energy
         lowest = 0.0 if isinstance(system, sw.Pendulum) else -SQUARE
         changed = abs(last - first) > 0.5 * max(abs(first), abs(last))
@@ -115,7 +115,7 @@ def test_an_energy_of_another_size_is_told(method: str) -> None:
 def test_an_invariant_that_is_zero_is_only_rounding(method: str) -> None:
     """Of a fall to the centre that turns back before it: an angular momentum of 0, which becomes 1e-20 or stays."""
     v, y = np.array([0.0, 1e-18]), np.array([1.0, 1e-17])
-    _, texts = said(central(), method, v=v, y=y, tolerance=1e-6, at=[0.5, 1.0])
+    _, texts = with_warnings(central(), method, v=v, y=y, tolerance=1e-6, at=[0.5, 1.0])
     assert texts == []
 
 
@@ -149,9 +149,9 @@ def test_tame_runs_are_silent(name: str) -> None:
         if method.error_order is not None:
             for tolerance in (1e-5, 1e-7, 1e-9):
                 for until in (1.0, 20.0):
-                    assert said(system, method.name, tolerance=tolerance, at=[until], **start)[1] == []
+                    assert with_warnings(system, method.name, tolerance=tolerance, at=[until], **start)[1] == []
         if name != "rod":  # whose length is another after many steps of low order, which is told
-            assert said(system, method.name, dt=0.02, steps=500, **start)[1] == []
+            assert with_warnings(system, method.name, dt=0.02, steps=500, **start)[1] == []
 
 
 @pytest.mark.parametrize("method", ["fehlberg", "fehlberg_5", "dop853"])
@@ -163,11 +163,13 @@ def test_whether_a_barrier_was_passed_does_not_depend_on_the_states_that_are_sav
     saved states, but for a step that is rejected as a state within it errs.
     """
     for start in (1.4142, 1.414, -1.41):
-        run, texts = said(double_well(), method, v=0.0, y=start, tolerance=tolerance, at=np.linspace(0.0, 150.0, 3001)[1:])
+        run, texts = with_warnings(
+            double_well(), method, v=0.0, y=start, tolerance=tolerance, at=np.linspace(0.0, 150.0, 3001)[1:]
+        )
         over = bool((run.y * start).min() < 0.0)
         assert [("where even at rest" in text) for text in texts] == ([True] if over else [])
         for times in ([150.0], [75.0, 150.0]):
-            few, same = said(double_well(), method, v=0.0, y=start, tolerance=tolerance, at=times)
+            few, same = with_warnings(double_well(), method, v=0.0, y=start, tolerance=tolerance, at=times)
             assert few.y[-1] != run.y[-1] or same == texts
             assert few.y[-1] == run.y[-1] or method == "dop853"
 
@@ -175,7 +177,7 @@ def test_whether_a_barrier_was_passed_does_not_depend_on_the_states_that_are_sav
 def test_a_barrier_is_seen_in_a_batch_and_backward_in_time() -> None:
     start = np.array([1.2, 1.4142, -1.4142])
     for until in (150.0, -150.0):
-        _, texts = said(double_well(), "fehlberg", v=0.0, y=start, tolerance=1e-5, at=[until])
+        _, texts = with_warnings(double_well(), "fehlberg", v=0.0, y=start, tolerance=1e-5, at=[until])
         (text,) = texts
         assert text.startswith("2 of 3 members did not follow the motion, by fehlberg: member 1 passed y = ")
 
@@ -207,16 +209,16 @@ def test_an_invariant_is_told_whatever_constant_is_added_to_it(constant: float) 
     With the constants it is 10.07, 0 and 60.07 at the start. What moves is the kinetic energy, of up to 9.07.
     """
     system = steep(constant=constant)
-    run, texts = said(system, "fehlberg_5", v=0.0, y=3.0, tolerance=1e-2, at=[0.0, 200.0])
+    run, texts = with_warnings(system, "fehlberg_5", v=0.0, y=3.0, tolerance=1e-2, at=[0.0, 200.0])
     first, last = run.quantity("of_steep")
     assert abs(last - first) > 0.5 * (np.cosh(3.0) - 1.0)
     (text,) = texts
     assert text.startswith("the run has another of_steep at the end")
-    assert said(system, "fehlberg_5", v=0.0, y=3.0, tolerance=1e-5, at=[200.0])[1] == []
+    assert with_warnings(system, "fehlberg_5", v=0.0, y=3.0, tolerance=1e-5, at=[200.0])[1] == []
 
 
 @pytest.mark.parametrize("constant", [0.0, -5000.0])
 def test_a_fast_rotation_that_exchanges_little_is_tame(constant: float) -> None:
     """Of an energy of 5000 it exchanges 2. At 1e-6 relative to v each step may change it by 0.01, some thousand of them by 2."""
     for method in CHOOSE:
-        assert said(turning_round(constant=constant), method, v=100.0, y=0.0, tolerance=1e-6, at=[100.0])[1] == []
+        assert with_warnings(turning_round(constant=constant), method, v=100.0, y=0.0, tolerance=1e-6, at=[100.0])[1] == []

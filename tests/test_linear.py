@@ -195,13 +195,13 @@ def test_outputs_are_their_formula() -> None:
     n, m, r, b = 5, 3, 4, 6
     A, B = rng.normal(size=(n, n)) - 3 * np.eye(n), rng.normal(size=(n, m, b))
     C, D = rng.normal(size=(r, n)), rng.normal(size=(r, m, b))
-    sine, held = sw.Sinusoid(1.0, 2.0, rng.normal(size=b)), sw.Sampled(rng.normal(size=(9, b)), 0.1)
-    system = sw.LinearSystem(A, B, C, D, x=[sine, held, rng.normal(size=b)], velocities=[4, 1])
+    sine, sampled = sw.Sinusoid(1.0, 2.0, rng.normal(size=b)), sw.Sampled(rng.normal(size=(9, b)), 0.1)
+    system = sw.LinearSystem(A, B, C, D, x=[sine, sampled, rng.normal(size=b)], velocities=[4, 1])
     run = sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.03, steps=30, every=3)
     assert run.z.shape == (11, r, b)
     for i, t in enumerate(run.t):
         state = system.state(run.v[i], run.y[i])
-        x = np.array([np.sin(2 * t + sine.phase), held.values[min(int(t / 0.1 + 1e-6), 8)], system.x[2].values[0]])  # type: ignore[union-attr]
+        x = np.array([np.sin(2 * t + sine.phase), sampled.values[min(int(t / 0.1 + 1e-6), 8)], system.x[2].values[0]])  # type: ignore[union-attr]
         z = np.einsum("rn,nb->rb", C, state) + np.einsum("rmb,mb->rb", D, x)
         size = np.einsum("rn,nb->rb", abs(C), abs(state)) + np.einsum("rmb,mb->rb", abs(D), abs(x))
         # n + m products and as many sums in either order, and two sines that differ by 2 ulp.

@@ -86,8 +86,8 @@ def test_labels_lie_in_the_axes_and_not_on_each_other():
     axes = figure.add_axes((0.1, 0.1, 0.85, 0.85))
     axes.set(xscale="log", yscale="log", xlim=(1.0, 1e4), ylim=(1e-8, 1.0))
     x = np.geomspace(1.0, 1e4, 30)
-    given = [labels.Label(f"a curve of order {p:.2f}", np.array([x, x**-p]).T, {"size": 11}) for p in np.linspace(1.0, 1.2, 9)]
-    left = labels.beside(axes, given)
+    curves = [labels.Label(f"a curve of order {p:.2f}", np.array([x, x**-p]).T, {"size": 11}) for p in np.linspace(1.0, 1.2, 9)]
+    left = labels.beside(axes, curves)
     boxes = [text.get_window_extent() for text in axes.texts]
     assert len(boxes) + len(left) == 9
     assert len(boxes) > 4
@@ -98,7 +98,7 @@ def test_labels_lie_in_the_axes_and_not_on_each_other():
         assert not any(box.overlaps(other) for other in boxes[:i])
     # Where there is room for none, all are returned.
     narrow = figure.add_axes((0.0, 0.0, 0.05, 0.05), xlim=(1.0, 1e4), ylim=(1e-8, 1.0), xscale="log", yscale="log")
-    assert labels.beside(narrow, given) == [label.text for label in given]
+    assert labels.beside(narrow, curves) == [label.text for label in curves]
     assert not narrow.texts
 
 
@@ -186,9 +186,9 @@ def test_advice_is_drawn_in_one_line(tmp_path):
     assert (tmp_path / "advice.png").stat().st_size > 10_000
     (axes,) = figure.axes
     marks = [line for line in axes.lines if line.get_marker() not in ("None", "", None) and len(line.get_xdata()) == 1]
-    told = {(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in marks}
-    assert told == {(row.evaluations_per_frame, row.error) for row in advice.ranked}
-    assert all(error <= advice.tolerance for _, error in told)
+    points = {(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in marks}
+    assert points == {(row.evaluations_per_frame, row.error) for row in advice.ranked}
+    assert all(error <= advice.tolerance for _, error in points)
     assert any(np.array_equal(line.get_ydata(), [1e-3, 1e-3]) for line in axes.lines)
     best = advice.ranked[0]
     assert best.method.title in figure.texts[0].get_text()
@@ -245,9 +245,9 @@ def test_the_title_of_the_figures_counts_what_the_methods_do():
     ]
     assert all(samples.method.order >= 4 for samples in exact)
     assert all(abs(samples.y - np.cos(samples.t)).max() < 0.05 for samples in exact)
-    told = f"Of {len(COUNTED)} methods 2 gain energy, 2 lose it, 4 keep the amplitude but not the time, {len(exact)} look exact"
-    assert figures_finding(chart) == told
-    assert told in [text.get_text() for text in chart.plot().texts]
+    title = f"Of {len(COUNTED)} methods 2 gain energy, 2 lose it, 4 keep the amplitude but not the time, {len(exact)} look exact"
+    assert figures_finding(chart) == title
+    assert title in [text.get_text() for text in chart.plot().texts]
     # At Φ = 2 the four have a double eigenvalue −1, and grow, although r₁ is 1.
     assert "keep the amplitude" not in figures_finding(sw.charts.figures(["false_euler", "leapfrog"], phi=2.0))
 

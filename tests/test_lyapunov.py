@@ -19,35 +19,35 @@ def test_of_a_linear_system_they_are_the_logarithms_of_the_eigenvalues(method: s
     """Real rates far apart, so that vectors find their directions: ln|z|/dt of the method's own step."""
     system = sw.LinearSystem([[-1.0, 0.3, 0.1], [0.2, -2.0, 0.4], [0.1, 0.5, 0.5]], velocities=1)
     dt, transient, steps = 0.05, 1000, 600
-    found = sw.lyapunov(
+    spectrum = sw.lyapunov(
         system, method, v=np.zeros(1), y=np.zeros(2), dt=dt, steps=steps, transient=transient, exponents="all", every=7
     )
     radii = sw.analyse(system, method, dt=dt).radii
     # After the transient, directions are off by the ratio of two radii to the power of 1000: e^(−50·1.1) at most, which is below
     # eps. Each step rounds some ten times on each number of vectors of length 1, and so does each orthonormalisation; that is
     # eps/dt of a rate, and adds up over the condition of the eigenvectors, below 2 here.
-    np.testing.assert_allclose(found.exponents, np.sort(np.log(radii) / dt)[::-1], rtol=0, atol=40 * EPS / dt)
-    assert found.history.shape == (-(-steps // 7), 3)
-    assert found.t[-1] == (transient + steps) * dt
+    np.testing.assert_allclose(spectrum.exponents, np.sort(np.log(radii) / dt)[::-1], rtol=0, atol=40 * EPS / dt)
+    assert spectrum.history.shape == (-(-steps // 7), 3)
+    assert spectrum.t[-1] == (transient + steps) * dt
 
 
 def test_one_exponent_is_the_largest_of_all() -> None:
     system = sw.LinearSystem([[-1.0, 0.3], [0.2, 0.5]])
-    given = {"v": 0.0, "y": 0.0, "dt": 0.1, "steps": 200, "transient": 400}
-    every = sw.lyapunov(system, "rk4", exponents="all", **given).exponents
-    np.testing.assert_allclose(sw.lyapunov(system, "rk4", **given).exponents, every[:1], rtol=0, atol=40 * EPS / 0.1)
-    np.testing.assert_allclose(sw.lyapunov(system, "rk4", exponents=2, **given).exponents, every, rtol=0, atol=40 * EPS / 0.1)
+    arguments = {"v": 0.0, "y": 0.0, "dt": 0.1, "steps": 200, "transient": 400}
+    every = sw.lyapunov(system, "rk4", exponents="all", **arguments).exponents
+    np.testing.assert_allclose(sw.lyapunov(system, "rk4", **arguments).exponents, every[:1], rtol=0, atol=40 * EPS / 0.1)
+    np.testing.assert_allclose(sw.lyapunov(system, "rk4", exponents=2, **arguments).exponents, every, rtol=0, atol=40 * EPS / 0.1)
 
 
 @pytest.mark.parametrize("method", ["false_euler", "leapfrog", "pefrl", "verlet", "rk4"])
 def test_the_states_are_those_of_integrate(method: str) -> None:
     system = sw.Pendulum(np.array([1.0, 2.0]), a=sw.Sinusoid(0.5, 0.7, 0.1))
     v, y = np.array([0.3, 0.1]), np.array([[1.0], [2.0], [3.0]])
-    found = sw.lyapunov(system, method, v=v, y=y, dt=0.05, steps=60, transient=40, t0=2.0, every=8)
+    spectrum = sw.lyapunov(system, method, v=v, y=y, dt=0.05, steps=60, transient=40, t0=2.0, every=8)
     run = sw.integrate(system, method, v=v, y=y, dt=0.05, steps=100, t0=2.0)
-    np.testing.assert_array_equal(found.y, run.y[-1])
-    np.testing.assert_array_equal(found.v, run.v[-1] if run.carry is None else run.carry)
-    assert found.exponents.shape == (1, 3, 2)
+    np.testing.assert_array_equal(spectrum.y, run.y[-1])
+    np.testing.assert_array_equal(spectrum.v, run.v[-1] if run.carry is None else run.carry)
+    assert spectrum.exponents.shape == (1, 3, 2)
 
 
 @pytest.mark.parametrize("method", ["false_euler", "verlet", "rk4", "taylor"])
@@ -56,11 +56,11 @@ def test_vectors_on_one_tape_and_each_beside_a_copy_of_the_state_are_the_same(
 ) -> None:
     """To the bit: short steps go one way, long ones the other."""
     y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])[:, :, np.newaxis] * np.linspace(1.0, 1.1, 5)
-    given: dict[str, Any] = {"v": 0.0, "y": y, "dt": 0.05, "steps": 43, "transient": 12, "exponents": 4}
+    arguments: dict[str, Any] = {"v": 0.0, "y": y, "dt": 0.05, "steps": 43, "transient": 12, "exponents": 4}
     bodies = sw.NBody([1.0, 1.0, 1.0], softening=0.3)
-    together = sw.lyapunov(bodies, method, **given)
+    together = sw.lyapunov(bodies, method, **arguments)
     monkeypatch.setattr(exponents, "MAX_TOGETHER", 0)
-    apart = sw.lyapunov(bodies, method, **given)
+    apart = sw.lyapunov(bodies, method, **arguments)
     for name in ("exponents", "history", "v", "y"):
         np.testing.assert_array_equal(getattr(apart, name), getattr(together, name))
 
@@ -71,10 +71,10 @@ def test_threads_share_members_and_change_nothing(method: str, most: int, monkey
     monkeypatch.setattr(exponents, "MAX_TOGETHER", most)
     omega, y = np.linspace(1.0, 2.0, 4), np.linspace(0.5, 2.0, 3)[:, np.newaxis]
     pendulums = sw.Pendulum(omega, a=sw.Sinusoid(np.linspace(0.1, 0.5, 4), 0.7))
-    given: dict[str, Any] = {"v": 0.1, "y": y, "dt": 0.05, "steps": 95, "transient": 25, "exponents": "all"}
-    one = sw.lyapunov(pendulums, method, **given, threads=1)
+    arguments: dict[str, Any] = {"v": 0.1, "y": y, "dt": 0.05, "steps": 95, "transient": 25, "exponents": "all"}
+    one = sw.lyapunov(pendulums, method, **arguments, threads=1)
     for threads in (2, 5, 100, None):
-        several = sw.lyapunov(pendulums, method, **given, threads=threads)
+        several = sw.lyapunov(pendulums, method, **arguments, threads=threads)
         for name in ("exponents", "history", "v", "y"):
             np.testing.assert_array_equal(getattr(several, name), getattr(one, name))
 
@@ -89,7 +89,7 @@ def test_disturbances_obey_the_variational_equations() -> None:
         return [*rates, sigma * (b - a), a * (rho - z) - x * c - b, a * y + x * b - beta * c]
 
     y, steps, every, dt = near_the_attractor(8), 200, 10, 0.01
-    found = sw.lyapunov(Lorenz(), "rk4", y=y, dt=dt, steps=steps, every=every)
+    spectrum = sw.lyapunov(Lorenz(), "rk4", y=y, dt=dt, steps=steps, every=every)
     start = np.cos(1.7 * np.arange(1.0, 4.0))
     w = np.concatenate([y, np.broadcast_to((start / np.linalg.norm(start))[:, np.newaxis], y.shape)])
     growth = np.zeros(8)
@@ -100,7 +100,7 @@ def test_disturbances_obey_the_variational_equations() -> None:
     # Both sum the same numbers in other orders: some 150 roundings a step, amplified by e^(2·T) at most along so short a piece of
     # the motion, T = 2. A change of the state changes the rates of disturbances by |y| ~ 30 times as much, relatively.
     bound = 150 * steps * np.exp(4.0) * 30 * EPS
-    np.testing.assert_allclose(found.exponents[0], growth / (steps * dt), rtol=0, atol=bound)
+    np.testing.assert_allclose(spectrum.exponents[0], growth / (steps * dt), rtol=0, atol=bound)
 
 
 def test_a_step_that_is_too_long_is_refused_before_it_is_differentiated() -> None:
@@ -123,8 +123,8 @@ def test_damping_is_the_sum() -> None:
     """Volumes shrink by −2Dω₀ per unit of time. RK4 misses ln det by O(dt⁴): halving the step divides what is left by 16."""
     misses = []
     for dt in (0.025, 0.0125):
-        found = sw.lyapunov(sw.Pendulum(1.5, 0.1), "rk4", v=0.0, y=2.0, dt=dt, steps=round(20.0 / dt), exponents="all")
-        misses.append(float(found.sum) + 2 * 0.1 * 1.5)
+        spectrum = sw.lyapunov(sw.Pendulum(1.5, 0.1), "rk4", v=0.0, y=2.0, dt=dt, steps=round(20.0 / dt), exponents="all")
+        misses.append(float(spectrum.sum) + 2 * 0.1 * 1.5)
     assert abs(misses[1]) < 1e-8
     # a·h⁴·(1 + b·h) with b of the size of some rates of the motion: b·h/2 is 0.075 for b = 4ω₀.
     assert 16 * 0.925 < misses[0] / misses[1] < 16 * 1.075
@@ -135,32 +135,32 @@ def test_a_symplectic_method_keeps_pairs_and_volume() -> None:
     y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
     system = sw.NBody([1.0, 1.0, 1.0], softening=0.5)
     for method in ("false_euler", "pefrl"):
-        found = sw.lyapunov(system, method, v=np.zeros((3, 2)), y=y, dt=0.05, steps=400, exponents="all", every=5)
+        spectrum = sw.lyapunov(system, method, v=np.zeros((3, 2)), y=y, dt=0.05, steps=400, exponents="all", every=5)
         # A step has determinant 1, of which some 200 roundings leave eps each, and an orthonormalisation as many.
-        assert abs(found.sum) <= 400 * EPS / 0.05
-        np.testing.assert_allclose(found.history.sum(axis=1), 0.0, rtol=0, atol=400 * EPS / 0.05)
+        assert abs(spectrum.sum) <= 400 * EPS / 0.05
+        np.testing.assert_allclose(spectrum.history.sum(axis=1), 0.0, rtol=0, atol=400 * EPS / 0.05)
         # Pairs come out in time: a vector started as a unit one is not along its direction at once, which leaves ln(n·κ)/T.
-        np.testing.assert_allclose(found.exponents + found.exponents[::-1], 0.0, atol=np.log(12 * 20) / 20.0)
-        assert found.exponents[0] > 0.05  # three bodies close together part
+        np.testing.assert_allclose(spectrum.exponents + spectrum.exponents[::-1], 0.0, atol=np.log(12 * 20) / 20.0)
+        assert spectrum.exponents[0] > 0.05  # three bodies close together part
 
 
 def test_a_pendulum_that_swings_has_none() -> None:
     """Its disturbances grow linearly, as the period depends on the swing: (ln T)/T and no more, and not for ever."""
-    found = sw.lyapunov(sw.Pendulum(), "pefrl", v=0.0, y=2.0, dt=0.1, steps=4000, exponents="all", every=20)
+    spectrum = sw.lyapunov(sw.Pendulum(), "pefrl", v=0.0, y=2.0, dt=0.1, steps=4000, exponents="all", every=20)
     T = 400.0
     # Growth is at most 1 + c·T with c = |dω/dA|·A below 1 at this swing, in the norm of (v, y).
-    assert abs(found.exponents[0]) <= np.log(2 * T) / T
-    half = found.history[len(found.history) // 2 - 1].max()
-    assert found.exponents[0] < half
+    assert abs(spectrum.exponents[0]) <= np.log(2 * T) / T
+    half = spectrum.history[len(spectrum.history) // 2 - 1].max()
+    assert spectrum.exponents[0] < half
 
 
 def test_the_carry_has_the_same_exponents_as_the_state() -> None:
     """Verlet and leapfrog are False Euler in other numbers: what one grows by in the long run the others do."""
-    given: dict[str, Any] = {"v": 0.0, "y": np.array([1.0, 0.0]), "dt": 0.1, "steps": 500, "transient": 500, "exponents": "all"}
+    start: dict[str, Any] = {"v": 0.0, "y": np.array([1.0, 0.0]), "dt": 0.1, "steps": 500, "transient": 500, "exponents": "all"}
     unstable = sw.LinearSystem([[0, 0, 1.0, 0.5], [0, 0, 0.5, 2.0], [1, 0, 0, 0], [0, 1, 0, 0]])
-    found = [sw.lyapunov(unstable, method, **given).exponents for method in ("false_euler", "leapfrog", "verlet")]
+    spectra = [sw.lyapunov(unstable, method, **start).exponents for method in ("false_euler", "leapfrog", "verlet")]
     true = np.log(sw.analyse(unstable, "false_euler", dt=0.1).radii) / 0.1
-    for each in found:
+    for each in spectra:
         # Verlet divides by the step, which costs 1/dt of the digits; directions bring_to_rest as e^(−50·0.5).
         np.testing.assert_allclose(each, np.sort(true)[::-1], rtol=0, atol=1e4 * EPS / 0.1)
 
@@ -170,19 +170,21 @@ def test_under_a_control_volumes_change_as_the_steps_say() -> None:
     y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
     start = {"v": 0.1 * y[::-1], "y": y, "dt": 0.05, "steps": 40}
     run = sw.integrate(sw.NBody([1.0, 1.0, 1.0], softening=0.3), "rk4", **start, every=1, control=sw.EnergyControl(0.1))
-    found = sw.lyapunov(run.system, "rk4", **start, exponents="all")
-    np.testing.assert_array_equal(found.y, run.y[-1])
+    spectrum = sw.lyapunov(run.system, "rk4", **start, exponents="all")
+    np.testing.assert_array_equal(spectrum.y, run.y[-1])
     determinant = np.linalg.det(sw.analyse(run.system, "rk4", at=run).monodromy)
     # Forty products of matrices, and one determinant of a matrix whose condition is e^(2·1.1) at most: some thousand eps.
-    assert float(found.sum) * 2.0 == pytest.approx(np.log(determinant), abs=4000 * EPS)
+    assert float(spectrum.sum) * 2.0 == pytest.approx(np.log(determinant), abs=4000 * EPS)
 
 
 def test_the_dimension_of_kaplan_and_yorke() -> None:
     def dimension(*exponents: float) -> float:
         n = len(exponents)
         system = sw.LinearSystem(np.diag(exponents))
-        found = Lyapunov(system, sw.method("rk4"), 0.1, np.ones(1), np.array(exponents), np.ones((1, n)), np.ones(1), np.ones(1))
-        return float(found.dimension)
+        spectrum = Lyapunov(
+            system, sw.method("rk4"), 0.1, np.ones(1), np.array(exponents), np.ones((1, n)), np.ones(1), np.ones(1)
+        )
+        return float(spectrum.dimension)
 
     assert dimension(0.9, 0.0, -14.5) == pytest.approx(2 + 0.9 / 14.5, rel=4 * EPS)
     assert dimension(-1.0, -2.0) == 0.0
@@ -194,13 +196,13 @@ def test_the_dimension_of_kaplan_and_yorke() -> None:
 def test_a_member_that_diverges_has_none_and_is_named() -> None:
     system = sw.Oscillator(np.array([1.0, 50.0]))
     with pytest.warns(sw.DivergenceWarning, match="1 of 2"):
-        found = sw.lyapunov(sw.NBody([1.0, 1.0], force="newton"), "rk4", v=0.0, y=_pairs(), dt=0.1, steps=20)
-    assert np.isnan(found.exponents[:, 1]).all()
-    assert np.isfinite(found.exponents[:, 0]).all()
+        spectrum = sw.lyapunov(sw.NBody([1.0, 1.0], force="newton"), "rk4", v=0.0, y=_pairs(), dt=0.1, steps=20)
+    assert np.isnan(spectrum.exponents[:, 1]).all()
+    assert np.isfinite(spectrum.exponents[:, 0]).all()
     # Of a linear system the disturbances stay finite, since they are shortened, though the states overflow long before.
-    found = sw.lyapunov(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=1000)
+    spectrum = sw.lyapunov(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=1000)
     np.testing.assert_allclose(
-        found.exponents[0, 1], np.log(sw.analyse(sw.Oscillator(50.0), "rk4", dt=0.1).radius) / 0.1, rtol=1e-3
+        spectrum.exponents[0, 1], np.log(sw.analyse(sw.Oscillator(50.0), "rk4", dt=0.1).radius) / 0.1, rtol=1e-3
     )
 
 
@@ -215,14 +217,14 @@ PACED: dict[str, Any] = {"tolerance": 1e-9, "at": np.arange(1.0, 41.0), "transie
 @pytest.mark.parametrize("method", ["merson", "dop853", "fehlberg_5", "taylor"])
 def test_with_a_tolerance_they_are_the_rates_of_a_linear_system(method: str) -> None:
     matrix = np.array([[-1.0, 0.3, 0.1], [0.2, -2.0, 0.4], [0.1, 0.5, 0.5]])
-    found = sw.lyapunov(sw.LinearSystem(matrix, velocities=1), method, v=np.zeros(1), y=np.ones(2), **PACED)
+    spectrum = sw.lyapunov(sw.LinearSystem(matrix, velocities=1), method, v=np.zeros(1), y=np.ones(2), **PACED)
     rates = np.sort(np.linalg.eigvals(matrix).real)[::-1]
     # A step errs by the tolerance of what has been longest, at most e^0.5 in an interval, at whose end the smallest vector is
     # e^(−2.5) of that. Some hundred steps an interval by the method of lowest order.
-    np.testing.assert_allclose(found.exponents, rates, rtol=0, atol=100 * 1e-9 * np.exp(0.5 + 2.5))
-    assert found.t.tolist() == np.arange(21.0, 41.0).tolist()
-    assert found.history.shape == (20, 3)
-    assert found.dt is None
+    np.testing.assert_allclose(spectrum.exponents, rates, rtol=0, atol=100 * 1e-9 * np.exp(0.5 + 2.5))
+    assert spectrum.t.tolist() == np.arange(21.0, 41.0).tolist()
+    assert spectrum.history.shape == (20, 3)
+    assert spectrum.dt is None
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-9])
@@ -234,12 +236,12 @@ def test_with_a_tolerance_the_unit_of_the_state_does_not_matter(size: float) -> 
         return 50.0 * size * np.cos(50.0 * t) - y
 
     t = np.arange(1.0, 6.0)
-    found = sw.lyapunov(swept(size=size), "merson", y=size, tolerance=1e-9, at=t)
+    spectrum = sw.lyapunov(swept(size=size), "merson", y=size, tolerance=1e-9, at=t)
     swing = (2500.0 * np.sin(50.0 * 5.0) + 50.0 * np.cos(50.0 * 5.0)) / 2501.0
     right = size * ((1.0 - 50.0 / 2501.0) * np.exp(-5.0) + swing)
     # Errors of some thousand steps in each of five units of time, of which what e^(−t) leaves is one unit's.
-    np.testing.assert_allclose(found.y, right, rtol=0, atol=2000 * 1e-9 * size)
-    np.testing.assert_allclose(found.exponents, [-1.0], rtol=0, atol=2000 * 1e-9)
+    np.testing.assert_allclose(spectrum.y, right, rtol=0, atol=2000 * 1e-9 * size)
+    np.testing.assert_allclose(spectrum.exponents, [-1.0], rtol=0, atol=2000 * 1e-9)
 
 
 @pytest.mark.parametrize("k", [2, "all"])
@@ -248,10 +250,10 @@ def test_with_a_tolerance_bodies_have_those_of_short_steps(k: Any) -> None:
     y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
     bodies = sw.NBody([1.0, 1.0, 1.0], softening=0.5)
     at = np.arange(1.0, 11.0)
-    found = sw.lyapunov(bodies, "dop853", v=0.0, y=y, tolerance=1e-11, at=at, exponents=k)
+    spectrum = sw.lyapunov(bodies, "dop853", v=0.0, y=y, tolerance=1e-11, at=at, exponents=k)
     fixed = sw.lyapunov(bodies, "rk4", v=0.0, y=y, dt=0.002, steps=5000, every=500, exponents=k)
     # Some ten steps in a unit of time, whose errors grow with the motion, by e^(0.5·10).
-    np.testing.assert_allclose(found.history, fixed.history, rtol=0, atol=10 * 1e-11 * np.exp(5.0) + 100 * 0.002**4)
+    np.testing.assert_allclose(spectrum.history, fixed.history, rtol=0, atol=10 * 1e-11 * np.exp(5.0) + 100 * 0.002**4)
 
 
 def test_with_a_tolerance_a_member_has_the_same_alone_and_a_driven_pendulum_shrinks_volumes() -> None:
@@ -279,12 +281,12 @@ def test_with_a_tolerance_a_member_that_stops_has_none() -> None:
 
     rate = np.array([-1.0, 0.5, -2.0])
     with pytest.warns(sw.DivergenceWarning, match="1 of 3"):
-        found = sw.lyapunov(explosive(rate=rate), "dop853", y=1.0, tolerance=1e-9, at=np.arange(1.0, 6.0))
-    assert np.isnan(found.exponents[0, 1])
-    assert np.isfinite(found.history[0, 0, 1])  # up to t = 1 it was there
+        spectrum = sw.lyapunov(explosive(rate=rate), "dop853", y=1.0, tolerance=1e-9, at=np.arange(1.0, 6.0))
+    assert np.isnan(spectrum.exponents[0, 1])
+    assert np.isfinite(spectrum.history[0, 0, 1])  # up to t = 1 it was there
     # The derivative of 1/(1 − r·t) by the start is the square of that.
     right = -2.0 * np.log1p(-rate[[0, 2]] * 5.0) / 5.0
-    np.testing.assert_allclose(found.exponents[0, [0, 2]], right, rtol=0, atol=100 * 1e-9)
+    np.testing.assert_allclose(spectrum.exponents[0, [0, 2]], right, rtol=0, atol=100 * 1e-9)
 
 
 @pytest.mark.parametrize(
@@ -301,9 +303,9 @@ def test_with_a_tolerance_a_member_that_stops_has_none() -> None:
     ],
 )
 def test_wrong_calls_with_a_tolerance(wrong: dict[str, Any], message: str) -> None:
-    given: dict[str, Any] = {"method": "merson", "v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0, 2.0]}
+    arguments: dict[str, Any] = {"method": "merson", "v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0, 2.0]}
     with pytest.raises(sw.StepwellError, match=message):
-        sw.lyapunov(sw.Pendulum(), **(given | wrong))
+        sw.lyapunov(sw.Pendulum(), **(arguments | wrong))
 
 
 def test_wrong_derivatives_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -311,11 +313,11 @@ def test_wrong_derivatives_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> Non
     from stepwell.reference.tape import rules
 
     monkeypatch.setitem(rules.PARTIALS, "sin", (lambda f, y, x: -1e-3 - f("cos")(x),))
-    found = sw.lyapunov(sw.Pendulum(1.5, 0.1), "false_euler", v=0.0, y=2.0, dt=0.1, steps=200, exponents="all")
+    spectrum = sw.lyapunov(sw.Pendulum(1.5, 0.1), "false_euler", v=0.0, y=2.0, dt=0.1, steps=200, exponents="all")
     right = 2.0 * 0.1 * 1.5
     monkeypatch.undo()
     plain = sw.lyapunov(sw.Pendulum(1.5, 0.1), "false_euler", v=0.0, y=2.0, dt=0.1, steps=200, exponents="all")
-    assert abs(found.exponents[0] - plain.exponents[0]) > 0.1
+    assert abs(spectrum.exponents[0] - plain.exponents[0]) > 0.1
     # A step of False Euler has determinant 1 − 2Dω₀h: that alone does not depend on the sine.
     assert float(plain.sum) == pytest.approx(np.log(1 - right * 0.1) / 0.1, abs=40 * EPS / 0.1)
 
@@ -355,20 +357,20 @@ def near_the_attractor(members: int) -> Any:
 
 def test_the_exponents_of_lorenz() -> None:
     """0.9056, 0 and −14.572 (Sprott 2003), whose sum is −σ − 1 − β at every point of the motion."""
-    given: dict[str, Any] = {"y": near_the_attractor(64), "exponents": "all"}
-    found = sw.lyapunov(Lorenz(), "rk4", **given, dt=0.01, steps=3000, transient=2500)
-    assert_lorenz(found)
-    assert found.dimension.mean() == pytest.approx(2.062, abs=0.005)
+    arguments: dict[str, Any] = {"y": near_the_attractor(64), "exponents": "all"}
+    spectrum = sw.lyapunov(Lorenz(), "rk4", **arguments, dt=0.01, steps=3000, transient=2500)
+    assert_lorenz(spectrum)
+    assert spectrum.dimension.mean() == pytest.approx(2.062, abs=0.005)
     # RK4 misses the determinant by a·h⁴ per unit of time: with half the step by a sixteenth, so that (16·S(h/2) − S(h))/15 has
     # none of it. What is left is of the next order, and the averages of two motions differ a little: a third of the difference.
-    finer = sw.lyapunov(Lorenz(), "rk4", **given, dt=0.005, steps=1000, transient=200)
-    S, half = found.sum.mean(), finer.sum.mean()
+    finer = sw.lyapunov(Lorenz(), "rk4", **arguments, dt=0.005, steps=1000, transient=200)
+    S, half = spectrum.sum.mean(), finer.sum.mean()
     assert abs((16 * half - S) / 15 + 10.0 + 1.0 + 8.0 / 3.0) < abs(S - half) / 3 < 1e-4
 
 
-def assert_lorenz(found: Lyapunov) -> None:
-    members = found.exponents.shape[1]
-    mean, error = found.exponents.mean(axis=1), found.exponents.std(axis=1) / np.sqrt(members)
+def assert_lorenz(spectrum: Lyapunov) -> None:
+    members = spectrum.exponents.shape[1]
+    mean, error = spectrum.exponents.mean(axis=1), spectrum.exponents.std(axis=1) / np.sqrt(members)
     # Members lose sight of each other within the transient, so the error of the mean is that of so many samples.
     assert (np.abs(mean - [0.9056, 0.0, -14.572]) < 5 * error + 1e-3).all()
     assert (error < 0.01).all()
@@ -377,11 +379,11 @@ def assert_lorenz(found: Lyapunov) -> None:
 def test_equilibria_and_limits_of_lorenz() -> None:
     """The origin and (±√(β(ρ − 1)), ±√(β(ρ − 1)), ρ − 1)."""
     near = np.array([[0.1, 8.0, -8.0], [0.1, 8.0, -8.0], [0.1, 27.0, 27.0]])
-    found = sw.equilibria(Lorenz(), near=(None, near), method="rk4", dt=0.01)
+    equilibria = sw.equilibria(Lorenz(), near=(None, near), method="rk4", dt=0.01)
     c = np.sqrt(8 / 3 * 27)
-    np.testing.assert_allclose([each.y for each in found], [[0, 0, 0], [c, c, 27], [-c, -c, 27]], rtol=0, atol=27 * 20 * EPS)
-    assert [each.kind for each in found] == ["saddle"] * 3
-    for each in found:
+    np.testing.assert_allclose([each.y for each in equilibria], [[0, 0, 0], [c, c, 27], [-c, -c, 27]], rtol=0, atol=27 * 20 * EPS)
+    assert [each.kind for each in equilibria] == ["saddle"] * 3
+    for each in equilibria:
         z = np.exp(each.eigenvalues * 0.01)  # RK4's is that to (λh)⁵/120, below 10⁻⁵ for λ up to 22.8
         np.testing.assert_allclose(np.sort_complex(each.analysis.eigenvalues), np.sort_complex(z), rtol=0, atol=1e-5)
     limit = sw.stability_limit(Lorenz(), "rk4", y=np.zeros(3))

@@ -92,10 +92,10 @@ def test_a_map_is_fitted_to_the_limit(method):
     chart = sw.charts.stability_map(method, size=(8, 5))
     limits = [float(sw.stability_limit(sw.Oscillator(damping=d), method)) for d in np.linspace(0, 2, 33)]
     assert max(limits) < chart.phi[-1] <= 1.25 * (max(limits) + 0.06) + 0.05
-    said = chart.plot().texts[0].get_text()
-    assert said.startswith(f"{method.title}: ")
-    assert ("never stable undamped" in said) == (limits[0] == 0.0)
-    assert f"to Φ = {limits[16]:.3g} at D = 1" in said
+    title = chart.plot().texts[0].get_text()
+    assert title.startswith(f"{method.title}: ")
+    assert ("never stable undamped" in title) == (limits[0] == 0.0)
+    assert f"to Φ = {limits[16]:.3g} at D = 1" in title
 
 
 def test_a_map_takes_less_than_a_second():
@@ -196,28 +196,28 @@ def test_a_wrong_prediction_is_counted(false_euler):
     wrong = false_euler.stable.copy()
     wrong[:, :10] = False  # stable, but said to grow; with a radius that says so too
     radius = np.where(wrong == false_euler.stable, false_euler.radius, 2.0)
-    found = dataclasses.replace(false_euler, stable=wrong, radius=radius).observe(1000)
-    assert found.disagreements == 10 * 101
-    assert "1010 disagreements" in repr(found)
+    observed = dataclasses.replace(false_euler, stable=wrong, radius=radius).observe(1000)
+    assert observed.disagreements == 10 * 101
+    assert "1010 disagreements" in repr(observed)
 
 
 def test_threshold_and_band_are_as_derived(false_euler):
-    found = false_euler.observe(500)
+    observed = false_euler.observe(500)
     P = sw.analyse(false_euler.system, "false_euler", dt=1.0)
     shifted = P.P - P.eigenvalues[0] * np.eye(2)[:, :, np.newaxis, np.newaxis]
     norms = np.linalg.norm(np.moveaxis(shifted, (0, 1), (-2, -1)), axis=(-2, -1))[false_euler.stable]
-    assert found.threshold == pytest.approx(2 * (1 + 500 * norms.max()))
-    assert (1 + found.band) ** 500 / math.sqrt(2) == pytest.approx(found.threshold)
-    assert found.band > false_euler.observe(5000).band
+    assert observed.threshold == pytest.approx(2 * (1 + 500 * norms.max()))
+    assert (1 + observed.band) ** 500 / math.sqrt(2) == pytest.approx(observed.threshold)
+    assert observed.band > false_euler.observe(5000).band
     pair = P.eigenvalues[0].imag != 0
     with np.errstate(divide="ignore"):
         every = np.linalg.norm(np.moveaxis(shifted, (0, 1), (-2, -1)), axis=(-2, -1))
         kappa = 1 + every / np.abs(P.eigenvalues[0].imag)
     rounding = 2 * ROUNDING * kappa**2 * (P.radius + every) / P.radius**2
-    assert found.rounding[pair] == pytest.approx(rounding[pair])
-    assert np.isinf(found.rounding[~pair]).all()
-    seen = (false_euler.radius >= 1 + found.band) | (false_euler.radius**2 >= 1 + 3 * found.rounding)
-    assert np.array_equal(found.decided, false_euler.stable | seen)
+    assert observed.rounding[pair] == pytest.approx(rounding[pair])
+    assert np.isinf(observed.rounding[~pair]).all()
+    seen = (false_euler.radius >= 1 + observed.band) | (false_euler.radius**2 >= 1 + 3 * observed.rounding)
+    assert np.array_equal(observed.decided, false_euler.stable | seen)
 
 
 def area_of(run):
@@ -249,9 +249,9 @@ def test_the_area_of_a_pair_changes_as_its_determinant_says(method):
 def test_a_growth_too_slow_for_the_threshold_is_seen_by_the_area():
     """Fehlberg's fifth-order result at Φ = 0.1: r₁² = 1 + 1.8e-9, a growth of a millionth in 1000 steps. Reversed, it damps."""
     chart = sw.charts.stability_map("fehlberg_5", phi=(0.1, 1), damping=None, size=(900, 1))
-    found = chart.observe(1000)
-    assert not found.bounded.any()
-    assert found.decided.all()
+    observed = chart.observe(1000)
+    assert not observed.bounded.any()
+    assert observed.decided.all()
     wrong = dataclasses.replace(chart, stable=~chart.stable)
     assert wrong.observe(1000).disagreements == 900
 
@@ -259,11 +259,11 @@ def test_a_growth_too_slow_for_the_threshold_is_seen_by_the_area():
 def test_near_a_double_eigenvalue_the_transient_is_linear_and_stays_below_the_threshold():
     """At Φ = 2 − δ False Euler's states turn with a radius of about 1/√δ: large, bounded, and not to be called growing."""
     chart = sw.charts.stability_map("false_euler", phi=(1.999_999, 2.000_001), damping=None, size=(1000, 1))
-    found = chart.observe(4000)
-    assert found.disagreements == 0
-    assert found.bounded[found.predicted].all()
+    observed = chart.observe(4000)
+    assert observed.disagreements == 0
+    assert observed.bounded[observed.predicted].all()
     run = sw.integrate(sw.Oscillator(chart.phi[498]), "false_euler", v=0.0, y=1.0, dt=1.0, steps=4000, every=1)
-    assert 1000 < np.abs(run.y).max() < found.threshold
+    assert 1000 < np.abs(run.y).max() < observed.threshold
 
 
 def test_the_steps_are_checked(false_euler):

@@ -36,6 +36,6 @@ def test_the_misprinted_matrix_of_false_heun_is_not_the_method() -> None:
     run = sw.integrate(
         sw.Oscillator(phi), "false_heun", v=np.array([1.0, 0.0]), y=np.array([0.0, 1.0]), dt=1.0, steps=1, form="matrix"
     )
-    found = np.array([run.v[-1], run.y[-1]])
-    assert found[1, 1] == pytest.approx(1 - phi**2 + phi**4 / 2, abs=4 * EPS)
-    assert found[1, 1] - printed[1, 1] == pytest.approx(phi**4 / 2 - phi**2 / 2, abs=4 * EPS)
+    matrix = np.array([run.v[-1], run.y[-1]])
+    assert matrix[1, 1] == pytest.approx(1 - phi**2 + phi**4 / 2, abs=4 * EPS)
+    assert matrix[1, 1] - printed[1, 1] == pytest.approx(phi**4 / 2 - phi**2 / 2, abs=4 * EPS)

@@ -50,13 +50,13 @@ def test_a_divergence_in_words(omega: Any, words: str) -> None:
 
 
 def test_an_early_stop_in_words() -> None:
-    kept: dict[str, Any] = {"v": 0.0, "tolerance": 1e-6, "at": [99.0], "max_steps": 9}
+    arguments: dict[str, Any] = {"v": 0.0, "tolerance": 1e-6, "at": [99.0], "max_steps": 9}
     with pytest.warns(
         sw.ToleranceWarning, match=r"^the run stopped before t = 99, at t = [\d.]+; out of max_steps: 9 attempts, "
     ):
-        sw.integrate(sw.Oscillator(), "merson", y=1.0, **kept)
+        sw.integrate(sw.Oscillator(), "merson", y=1.0, **arguments)
     with pytest.warns(sw.ToleranceWarning, match=r"^2 of 2 members stopped before t = 99; the first was member [01] at t = "):
-        sw.integrate(sw.Oscillator(), "merson", y=[1.0, 2.0], **kept)
+        sw.integrate(sw.Oscillator(), "merson", y=[1.0, 2.0], **arguments)
 
 
 def test_lost_exponents_in_words() -> None:
@@ -64,20 +64,20 @@ def test_lost_exponents_in_words() -> None:
     def explosive(t: Any, y: Any, *, rate: Any = 1.0) -> Any:
         return rate * y * y
 
-    given: dict[str, Any] = {"y": 1.0, "dt": 0.5, "steps": 60}
+    arguments: dict[str, Any] = {"y": 1.0, "dt": 0.5, "steps": 60}
     with pytest.warns(sw.DivergenceWarning, match="^1 of 2 members left the range of finite numbers; its exponents are NaN$"):
-        sw.lyapunov(explosive(rate=[-1.0, 1.0]), "rk4", **given)
+        sw.lyapunov(explosive(rate=[-1.0, 1.0]), "rk4", **arguments)
 
 
 def test_a_stop_at_an_event_cannot_be_resumed_and_says_how_many() -> None:
     floor = sw.Event(lambda t, v, y: y, terminal=True, name="floor")
-    given: dict[str, Any] = {"v": 0.0, "dt": 0.1, "steps": 100, "events": floor}
-    one = sw.integrate(sw.Oscillator(), "rk4", y=1.0, **given)
+    arguments: dict[str, Any] = {"v": 0.0, "dt": 0.1, "steps": 100, "events": floor}
+    one = sw.integrate(sw.Oscillator(), "rk4", y=1.0, **arguments)
     with pytest.raises(
         sw.StepwellError, match=r"^resume: the run stopped at an event, at a time of its own; begin a new run from there: v="
     ):
         sw.integrate(one.system, "rk4", resume=one, steps=1)
-    two = sw.integrate(sw.Oscillator([1.0, 2.0]), "rk4", y=1.0, **given)
+    two = sw.integrate(sw.Oscillator([1.0, 2.0]), "rk4", y=1.0, **arguments)
     with pytest.raises(
         sw.StepwellError, match=r"^resume: 2 of 2 members stopped at an event, at times of their own; begin a new"
     ):

@@ -40,24 +40,24 @@ def test_more_kept_states_than_memory_are_refused_at_once(steps: int, monkeypatc
 
 
 @LINUX
-@pytest.mark.parametrize("how", ["steps=20_000_000, every=1", "at=np.linspace(0, 1e6, 20_000_001), tolerance=1e-3"])
-def test_a_limit_of_the_address_space_is_heard(how: str) -> None:
+@pytest.mark.parametrize("arguments", ["steps=20_000_000, every=1", "at=np.linspace(0, 1e6, 20_000_001), tolerance=1e-3"])
+def test_a_limit_of_the_address_space_is_heard(arguments: str) -> None:
     """20 million states of 32 bytes do not fit where 400 MB are left; what does fit is made."""
-    said = aside(f"""
+    output = aside(f"""
         used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + 400_000_000,) * 2)
         try:
-            sw.integrate(sw.Oscillator(1.0), "dop853", v=0.0, y=1.0, dt=0.1, {how})
+            sw.integrate(sw.Oscillator(1.0), "dop853", v=0.0, y=1.0, dt=0.1, {arguments})
         except MemoryError as error:
             print(type(error).__name__, error)
         print(len(sw.integrate(sw.Oscillator(1.0), "rk4", v=0.0, y=1.0, dt=0.1, steps=5_000_000, every=1).t))
     """)
-    if how.startswith("at"):
-        assert "MemoryError" in said or "TooLargeError" in said  # NumPy may be the first to want more than there is
+    if arguments.startswith("at"):
+        assert "MemoryError" in output or "TooLargeError" in output  # NumPy may be the first to want more than there is
     else:
-        assert said.startswith("TooLargeError the saved states need 610 MiB, but ")
-        assert "MiB are available (limit of the address space, ulimit -v); keep less with every=" in said
-    assert said.endswith("5000001\n")
+        assert output.startswith("TooLargeError the saved states need 610 MiB, but ")
+        assert "MiB are available (limit of the address space, ulimit -v); keep less with every=" in output
+    assert output.endswith("5000001\n")
 
 
 def test_a_long_chain_is_made_without_its_numbers() -> None:
@@ -76,7 +76,7 @@ def test_a_long_chain_is_made_without_its_numbers() -> None:
 @LINUX
 def test_a_system_that_does_not_fit_is_an_error_and_no_abort() -> None:
     """A long chain: its stages would take 1.3 GB."""
-    said = aside("""
+    output = aside("""
         n = 4_000_000
         system, y = sw.Chain(n), np.zeros(n)
         v = np.zeros(n)
@@ -91,25 +91,25 @@ def test_a_system_that_does_not_fit_is_an_error_and_no_abort() -> None:
             except MemoryError as error:
                 print("refused")
     """)
-    assert said == "refused\nrefused\n"
+    assert output == "refused\nrefused\n"
 
 
 @LINUX
 def test_threads_that_cannot_be_had_are_done_without() -> None:
     """A stack for each of 64 threads is more than there is."""
-    said = aside("""
+    output = aside("""
         used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + 60_000_000,) * 2)
         run = sw.integrate(sw.Oscillator(np.linspace(1, 2, 5000)), "rk4", v=0.0, y=1.0, dt=0.1, steps=300, threads=64)
         print(run.y.shape)
     """)
-    assert said == "(1, 5000)\n"
+    assert output == "(1, 5000)\n"
 
 
 @LINUX
 def test_no_thread_is_started_with_the_last_of_the_memory() -> None:
     """A second one while there are 60 MB, none where there are 8: it might find nothing to allocate, and end the process."""
-    said = aside("""
+    output = aside("""
         import contextlib, os
         from stepwell.base import progress
         threads = []
@@ -117,17 +117,17 @@ def test_no_thread_is_started_with_the_last_of_the_memory() -> None:
         def bar(title):
             yield lambda done: threads.append(len(os.listdir("/proc/self/task")))
         progress.bar = bar
-        system, given = sw.Oscillator(np.linspace(1, 2, 5000)), dict(v=0.0, y=1.0, dt=0.1, threads=2, progress=True)
+        system, arguments = sw.Oscillator(np.linspace(1, 2, 5000)), dict(v=0.0, y=1.0, dt=0.1, threads=2, progress=True)
         runs = []
         for left in (60_000_000, 8_000_000):
             used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
             resource.setrlimit(resource.RLIMIT_AS, (used + left, resource.RLIM_INFINITY))
-            runs.append(sw.integrate(system, "rk4", steps=200_000, **given))
+            runs.append(sw.integrate(system, "rk4", steps=200_000, **arguments))
             print(max(threads))
             threads.clear()
         print(np.array_equal(runs[0].y, runs[1].y))
     """)
-    assert said == "2\n1\nTrue\n"
+    assert output == "2\n1\nTrue\n"
 
 
 @LINUX
@@ -147,7 +147,7 @@ def test_the_peak_is_what_was_counted(run: str) -> None:
     Of three bodies the energy is counted beside the states; of the matrix form the matrix is, before them.
     The peak without the run is that of a run of few states.
     """
-    said = aside(f"""
+    output = aside(f"""
         counted = []
         from stepwell.base import checks
         fits = checks.fits
@@ -164,7 +164,7 @@ def test_the_peak_is_what_was_counted(run: str) -> None:
         most = 10**9
         print(go({run}) - before, max(counted))
     """)
-    peak, counted = map(float, said.split())
+    peak, counted = map(float, output.split())
     assert peak < 1.1 * counted + 24e6
     assert peak > 0.5 * counted - 24e6  # nor is it counted at random
 
@@ -307,7 +307,7 @@ def test_members_that_move_are_searched_some_at_a_time(monkeypatch: pytest.Monke
 @LINUX
 def test_limits_of_more_members_take_no_more_memory_than_their_results() -> None:
     """Of 12 numbers a state, 1820 members are searched at once, in 60 numbers for each element of their matrices: 126 MB."""
-    said = aside("""
+    output = aside("""
         from stepwell.analysis.stability import limit, limit_search
         def took(members):
             sw.stability_limit(sw.NBody([1.0, 1.0, 1.0]), "leapfrog", v=0.0, y=np.random.default_rng(1).random((3, 2, members)))
@@ -316,7 +316,7 @@ def test_limits_of_more_members_take_no_more_memory_than_their_results() -> None
         print((took(1500) - few) * 1024)
     """)
     counted = 8.0 * (60 * 144 + 250 + 4 * 12) * 1500
-    assert int(said) < counted < 126e6
+    assert int(output) < counted < 126e6
 
 
 @pytest.mark.parametrize("system", ["batch of systems", "batch of states"])
@@ -324,15 +324,15 @@ def test_limits_in_parts_are_those_of_all_at_once(system: str, monkeypatch: pyte
     """To the bit, and so are their modes."""
     random = np.random.default_rng(5)
     y = random.random((3, 2, 7))
-    given: dict[str, Any] = {"v": 0.0, "y": y}
+    arguments: dict[str, Any] = {"v": 0.0, "y": y}
     of: list[Any] = [sw.NBody([1.0, 2.0, 3.0])] if system == "batch of states" else []
     if not of:
         of = [sw.Oscillator(np.linspace(1, 2, 7), 0.1, x=sw.Sinusoid(1.0, 2.0)), sw.Chain(4, stiffness=1 + random.random((5, 7)))]
-        given = {}
+        arguments = {}
     for each in of:
-        whole = sw.stability_limit(each, "false_euler", **given)
+        whole = sw.stability_limit(each, "false_euler", **arguments)
         monkeypatch.setattr(limit, "members_at_once", lambda n: 3)
-        parts = sw.stability_limit(each, "false_euler", **given)
+        parts = sw.stability_limit(each, "false_euler", **arguments)
         monkeypatch.undo()
         np.testing.assert_array_equal(parts, whole)
         np.testing.assert_array_equal(parts.grows, whole.grows)
@@ -343,11 +343,11 @@ def test_limits_in_parts_are_those_of_all_at_once(system: str, monkeypatch: pyte
 @LINUX
 def test_a_jacobian_takes_little_more_memory_than_it_has_numbers() -> None:
     """Directions of the complex step go some at a time: what they take is below 20 times a million complex numbers."""
-    said = aside("""
+    output = aside("""
         y = np.random.default_rng(1).random((33, 2, 300))
         sw.jacobian(sw.NBody(np.ones(33)), v=0.0, y=y[..., :1])
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         matrix = sw.jacobian(sw.NBody(np.ones(33)), v=0.0, y=y).matrix
         print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 - matrix.nbytes)
     """)
-    assert int(said) < 20 * 16 * 2**20
+    assert int(output) < 20 * 16 * 2**20

@@ -65,23 +65,23 @@ def test_a_false_friend_is_another_method_or_explained(method: str, friend: str)
         return
     with pytest.raises(UnknownNameError) as caught:
         sw.method(friend)
-    told = str(caught.value).partition(" Known:")[0]
+    message = str(caught.value).partition(" Known:")[0]
     if holders(re.sub(r"( \(| with ).*", "", friend)):  # a method with a remark, of which the name alone is known
         return
-    assert "did you mean" not in told
-    if "implicit" in told:  # none is here, and no explicit method is near to it
+    assert "did you mean" not in message
+    if "implicit" in message:  # none is here, and no explicit method is near to it
         assert spelling(friend) in ("backward_euler", "implicit_euler")
         return
-    assert "is not here; nearest, but not the same: " in told.replace("which is", "is")
-    assert method in told or ", which is not here" in told or "Dormand-Prince 5(4)" in friend
+    assert "is not here; nearest, but not the same: " in message.replace("which is", "is")
+    assert method in message or ", which is not here" in message or "Dormand-Prince 5(4)" in friend
 
 
 @pytest.mark.parametrize("name", ["RK45", "rk45", "Dormand-Prince 5(4)", "dopri5", "ode45"])
 def test_the_method_that_most_people_know_is_explained(name: str) -> None:
     with pytest.raises(UnknownNameError) as caught:
         sw.method(name)
-    told = str(caught.value).partition(" Known:")[0]
-    assert re.search(r"Dormand-Prince 5\(4\)(, which)? is not here; nearest, but not the same: fehlberg_5\.$", told)
+    message = str(caught.value).partition(" Known:")[0]
+    assert re.search(r"Dormand-Prince 5\(4\)(, which)? is not here; nearest, but not the same: fehlberg_5\.$", message)
 
 
 @pytest.mark.parametrize(
@@ -90,10 +90,10 @@ def test_the_method_that_most_people_know_is_explained(name: str) -> None:
 def test_a_typing_error_in_a_false_friend_is_explained_too(wrong: str, meant: str | None) -> None:
     with pytest.raises(UnknownNameError) as caught:
         sw.method(wrong)
-    told = str(caught.value).partition("Known:")[0]
-    assert ("no implicit method is here" if "Euler" in wrong else "not here; nearest, but not the same: ") in told
-    assert ("did you mean" in told) == (meant is not None)
-    assert meant is None or f"did you mean {meant!r}?" in told
+    message = str(caught.value).partition("Known:")[0]
+    assert ("no implicit method is here" if "Euler" in wrong else "not here; nearest, but not the same: ") in message
+    assert ("did you mean" in message) == (meant is not None)
+    assert meant is None or f"did you mean {meant!r}?" in message
 
 
 def test_a_name_without_its_remark_says_what_there_is() -> None:

@@ -35,7 +35,7 @@ def located(event: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("call", "told"),
+    ("call", "message"),
     [
         (lambda: sw.system(lambda t, y, v: -y), "f(t, v, y), got (t, y, v): y stands at the place of v"),
         (lambda: sw.system(lambda t, x, v: -x), "f(t, v, y), got (t, x, v): v stands at the place of y"),
@@ -61,9 +61,9 @@ def located(event: Any) -> Any:
         ),
     ],
 )
-def test_a_name_at_the_place_of_another(call: Any, told: str) -> None:
+def test_a_name_at_the_place_of_another(call: Any, message: str) -> None:
     """Arguments go by their place, so a swapped name would silently stand for another number."""
-    with pytest.raises(ArgumentError, match=re.escape(told)):
+    with pytest.raises(ArgumentError, match=re.escape(message)):
         call()
 
 
@@ -80,13 +80,13 @@ def test_names_of_ones_own() -> None:
 
 def test_arguments_that_a_class_does_not_take() -> None:
     """What it takes is told, for every class that is called with numbers: a floor has no height, but an offset."""
-    for call, told in (
+    for call, message in (
         (lambda: sw.Floor(0.2), "Floor: too many positional arguments; expected Floor(*, restitution=1.0, friction=None, normal"),  # type: ignore[misc]
         (lambda: sw.Floor(height=0.2), "Floor: got an unexpected keyword argument 'height'; expected Floor(*, restitution"),  # type: ignore[call-arg]
         (lambda: sw.Sphere(), "Sphere: missing a required argument: 'centre'; expected Sphere(centre, radius, *, inside"),  # type: ignore[call-arg]
         (lambda: sw.NBody([1.0], mass=2.0), "NBody: got an unexpected keyword argument 'mass'; expected NBody(masses="),  # type: ignore[call-arg]
     ):
-        with pytest.raises(DTypeError, match=re.escape(told)):
+        with pytest.raises(DTypeError, match=re.escape(message)):
             call()
 
 
@@ -171,9 +171,9 @@ def test_bodies_whose_energy_the_method_made() -> None:
     with pytest.warns(sw.AccuracyWarning, match="so dop853 did not"):
         sw.integrate(scene.system, "dop853", v=0.0, y=scene.y, tolerance=3e-2, at=[10.0])
     # Whoever diverges is named as that alone; what is no invariant of the motion is not looked at.
-    with pytest.warns(sw.DivergenceWarning) as told:
+    with pytest.warns(sw.DivergenceWarning) as caught:
         sw.integrate(sw.NBody([1.0, 1.0]), "rk4", v=0.0, y=np.zeros((2, 2)), dt=0.1, steps=9, every=1, record="energy")
-    assert len(told) == 1
+    assert len(caught) == 1
     printed = sw.NBody([3.0, 4.0, 5.0], force="printed")
     wild: dict[str, Any] = {"dt": 0.1, "steps": 100, "every": 10, "record": "energy"}
     with pytest.warns(sw.AccuracyWarning, match="^bodies 1 and 2 met within step 13 "):
@@ -215,9 +215,9 @@ def test_bodies_without_mass_in_a_batch() -> None:
     with pytest.warns(sw.AccuracyWarning, match=match):
         sw.integrate(sw.NBody([1.0, 0.0], force="newton"), "dop853", **THROWN | {"v": v, "y": y})
     # Two attractors may throw out a third body in truth: nothing is said of its energy.
-    with pytest.warns(sw.AccuracyWarning) as told:
+    with pytest.warns(sw.AccuracyWarning) as caught:
         sw.integrate(sw.NBody([[1.0, 1.0, 1e-3], [0.0, 0.0, 0.0]], force="newton"), "dop853", **THROWN | {"v": v, "y": y})
-    assert len(told) == 1
+    assert len(caught) == 1
     heavy = sw.NBody([1.0, 1.0, 0.0], force="newton")
     apart = np.array([[-0.5, 0.0], [0.5, 0.0], [0.0, 3.0]])
     sw.integrate(heavy, "dop853", v=apart[:, ::-1] * [-1.4, 1.4] * [[1.0], [1.0], [0.0]], y=apart, tolerance=1e-10, at=[40.0])
@@ -230,8 +230,8 @@ def test_energies_at_both_ends_are_those_of_the_system() -> None:
         for dim in (2, 3):
             bodies = sw.NBody(rng.uniform(0.5, 2.0, 5), force=force, G=1.5, softening=0.2, dim=dim)
             v, y = rng.normal(size=(2, 5, dim))
-            found = diagnostics._summed(bodies, v.tolist(), y.tolist())
-            assert np.allclose(found, (bodies.energy(v, y), bodies.kinetic(v)), rtol=1e-14, atol=1e-13)
+            energies = diagnostics._summed(bodies, v.tolist(), y.tolist())
+            assert np.allclose(energies, (bodies.energy(v, y), bodies.kinetic(v)), rtol=1e-14, atol=1e-13)
     together = [[0.0, 0.0]] * 2
     assert np.isnan(diagnostics._summed(sw.NBody([1.0, 1.0], force="newton"), together, together)).all()
 

@@ -50,9 +50,9 @@ def test_a_gain_that_is_too_large_is_none() -> None:
 
 
 def test_files_and_picture(tmp_path: Path) -> None:
-    told: list[float] = []
-    chart = norm(gains=np.geomspace(0.02, 0.9, 9), progress=told.append)
-    assert told[-1] == 1.0
+    shares: list[float] = []
+    chart = norm(gains=np.geomspace(0.02, 0.9, 9), progress=shares.append)
+    assert shares[-1] == 1.0
     chart.to_csv(tmp_path / "n.csv")
     with (tmp_path / "n.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

@@ -56,13 +56,13 @@ def places(tmp_path: Path, file: str) -> dict[str, Path]:
     (tmp_path / "a file").write_text("kept")
     (tmp_path / "folder" / (file or "x")).mkdir(parents=True)
     long = "x" * 300
-    found = {
+    paths = {
         "Not a directory": tmp_path / "a file" / (file or "sub"),
         "File name too long": tmp_path / (f"{long}{Path(file).suffix}" if file else long) / ("" if file else "sub"),
     }
     if file:
-        found |= {"No such file": tmp_path / "no" / file, "Is a directory": tmp_path / "folder" / file}
-    return found
+        paths |= {"No such file": tmp_path / "no" / file, "Is a directory": tmp_path / "folder" / file}
+    return paths
 
 
 @EACH

@@ -36,12 +36,12 @@ def quietly(system: Any, method: str, **options: Any) -> sw.Run:
 def test_each_member_is_a_run_of_its_own_time(case: Case, backend: Any) -> None:
     """Its bits and times are those of the batch that all begins when it does, of which it is the same member."""
     begins = np.array([0.0, -1.3, 2.75, 100.0, 7e5 / 3.0])
-    system, given = case.make(5)
-    given |= {"steps": 23, "every": 5, "backend": backend}
-    together = quietly(system, t0=begins, **given)
+    system, arguments = case.make(5)
+    arguments |= {"steps": 23, "every": 5, "backend": backend}
+    together = quietly(system, t0=begins, **arguments)
     assert together.t.shape == (6, 5)
     for i, begin in enumerate(begins):
-        common = quietly(system, t0=float(begin), **given)
+        common = quietly(system, t0=float(begin), **arguments)
         np.testing.assert_array_equal(together.t[:, i], common.t)
         np.testing.assert_array_equal(together.v[..., i], common.v[..., i])
         np.testing.assert_array_equal(together.y[..., i], common.y[..., i])
@@ -194,9 +194,9 @@ def test_the_same_cases_are_the_reference() -> None:
         for case in [
             case for case in cases() if case.form == form and SYSTEMS[case.system](np.random.default_rng(0), 1).given_inputs()
         ][:6]:
-            system, given = case.make(3)
-            given |= {"steps": 23, "every": 5, "t0": np.array([0.0, 1.5, -2.0])}
-            assert_same(quietly(system, **given), quietly(system, backend="numpy", **given))
+            system, arguments = case.make(3)
+            arguments |= {"steps": 23, "every": 5, "t0": np.array([0.0, 1.5, -2.0])}
+            assert_same(quietly(system, **arguments), quietly(system, backend="numpy", **arguments))
 
 
 @pytest.mark.parametrize("method", ["rk4", "leapfrog"])
@@ -328,8 +328,8 @@ OF_OWN_TIMES: dict[str, Callable[[], sw.Run]] = {
 
 
 def _goes_on(run: sw.Run) -> sw.Run:
-    how: dict[str, Any] = {"steps": 5} if run.paces is None else {"at": run.t[-1:] + 3.0}
-    return quietly(run.system, run.method.name, **how, resume=run)
+    options: dict[str, Any] = {"steps": 5} if run.paces is None else {"at": run.t[-1:] + 3.0}
+    return quietly(run.system, run.method.name, **options, resume=run)
 
 
 def _saved(run: sw.Run, folder: Path, ending: str) -> None:

@@ -38,8 +38,8 @@ def test_every_record_is_complete(method: sw.Method) -> None:
     assert len(method.about) > 40
     assert method.reference
     assert method.__doc__
-    for told in (method.title, *method.other_names, *method.false_friends, method.reference, method.about):
-        assert told in method.__doc__
+    for text in (method.title, *method.other_names, *method.false_friends, method.reference, method.about):
+        assert text in method.__doc__
     assert sw.method(method.name) is method
     assert hasattr(method.steps, "start") == hasattr(method.steps, "finish") == (method.carry is not None)
 
@@ -92,8 +92,8 @@ def test_a_stage_of_weight_zero_is_not_evaluated(method: sw.Method) -> None:
         run = sw.integrate(sw.Oscillator(), method, v=0.0, y=1.0, tolerance=1e-5, at=[1.0])
         assert run.paces is not None
         # And twice for the output time; a series finds the coefficients of that step alone.
-        made = int(run.paces.accepted + run.paces.rejected) + (1 if method.has_series else 2)
-        assert run.paces.evaluations == method.attempt_evaluations * made
+        attempts = int(run.paces.accepted + run.paces.rejected) + (1 if method.has_series else 2)
+        assert run.paces.evaluations == method.attempt_evaluations * attempts
 
 
 def test_methods_are_in_the_documents_order() -> None:

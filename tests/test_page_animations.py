@@ -51,15 +51,15 @@ def shown(chart, unpacked):
     return at
 
 
-def off(values, given):
+def off(values, encoding):
     """How far decoded numbers may be off: half a step of the codes, and three roundings of the numbers themselves."""
-    return 0.5 * given["step"] + 3.0 * np.abs(values).max() * 2.0**-53
+    return 0.5 * encoding["step"] + 3.0 * np.abs(values).max() * 2.0**-53
 
 
 def test_codes_are_off_by_half_a_step():
     values = np.array([-1.0, math.nan, 0.123456, 2.0, math.inf])
-    given = page_animation.encoded(values)
-    assert (given["low"], given["step"]) == (-1.0, 3.0 / 65534)
+    encoding = page_animation.encoded(values)
+    assert (encoding["low"], encoding["step"]) == (-1.0, 3.0 / 65534)
     assert page_animation.encoded(np.array([5.0, 5.0]))["low"] == 5.0
     assert page_animation.encoded(np.array([math.nan])) == {"low": 0.0, "step": 1.0, "codes": "//8="}
 
@@ -72,12 +72,12 @@ def test_places_in_a_page_are_the_states(name, tmp_path):
     data = page_animation.data(chart, 3.0, 20.0)
     unpacked = in_node(data, tmp_path)
     at = shown(chart, unpacked)
-    (panel, given) = (unpacked["panels"][0], data["panels"][0])
+    (panel, coded) = (unpacked["panels"][0], data["panels"][0])
     places = chart.places[at]
     expected = FALLING.flat(places) if panel["name"].startswith("seen from the front") else places[..., :2]
-    found = numbers(panel["values"]).reshape(expected.shape)
-    assert np.abs(found - expected).max() <= off(expected, given["data"])
-    assert given["data"]["step"] <= 1e-4 * np.ptp(expected)  # four digits of what is seen
+    decoded = numbers(panel["values"]).reshape(expected.shape)
+    assert np.abs(decoded - expected).max() <= off(expected, coded["data"])
+    assert coded["data"]["step"] <= 1e-4 * np.ptp(expected)  # four digits of what is seen
     springs = getattr(scene.system, "pairs", None)
     if springs is not None:
         np.testing.assert_array_equal(np.array(panel["links"]), springs)
@@ -89,8 +89,8 @@ def test_a_page_that_decodes_wrongly_is_noticed(tmp_path):
     chart = own_picture(sw.scenes.figure_eight().run("rk4", steps=60, every=1))
     data = page_animation.data(chart, 3.0, 20.0)
     wrong = in_node(data, tmp_path, ("256 * bytes", "255 * bytes"))
-    found = numbers(wrong["panels"][0]["values"]).reshape(61, 3, 2)
-    assert np.abs(found - chart.places).max() > 2.0 * off(chart.places, data["panels"][0]["data"])
+    decoded = numbers(wrong["panels"][0]["values"]).reshape(61, 3, 2)
+    assert np.abs(decoded - chart.places).max() > 2.0 * off(chart.places, data["panels"][0]["data"])
 
 
 @needs_node
@@ -101,16 +101,16 @@ def test_other_views_hold_the_states_and_errors(name, tmp_path):
     data = page_animation.data(chart, 3.0, 20.0)
     unpacked = in_node(data, tmp_path)
     at = shown(chart, unpacked)
-    first, given = unpacked["panels"][0], data["panels"][0]
+    first, coded = unpacked["panels"][0], data["panels"][0]
     if name == "oscillator":
         line = first["lines"][-1]
-        expected, found, codes = chart.run.y[at], numbers(line["values"]), given["lines"][-1]["data"]
+        expected, decoded, codes = chart.run.y[at], numbers(line["values"]), coded["lines"][-1]["data"]
     elif name == "chain":
-        expected, found, codes = chart.run.y[at].ravel(), numbers(first["values"]), given["data"]
+        expected, decoded, codes = chart.run.y[at].ravel(), numbers(first["values"]), coded["data"]
     else:
         turned = solid_of(chart).matrices[..., at]
-        expected, found, codes = np.moveaxis(turned, -1, 0).ravel(), numbers(first["values"]), given["data"]
-    assert np.abs(found - expected).max() <= off(expected, codes)
+        expected, decoded, codes = np.moveaxis(turned, -1, 0).ravel(), numbers(first["values"]), coded["data"]
+    assert np.abs(decoded - expected).max() <= off(expected, codes)
     if chart.state_error is not None:
         line = unpacked["panels"][-1]["lines"][0]
         known = numbers(line["values"])

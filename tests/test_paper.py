@@ -69,19 +69,19 @@ def test_unknown_section():
 
 def test_command(tmp_path, capsys):
     assert main(["paper", "7", "-o", str(tmp_path), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert [each["name"] for each in told["statements"]] == [entry.name for entry in paper.entries("§7")]
-    assert all(each["holds"] for each in told["statements"])
-    assert [Path(file).name for file in told["files"]] == [path.name for path in tmp_path.iterdir()]
+    report = json.loads(capsys.readouterr().out)
+    assert [each["name"] for each in report["statements"]] == [entry.name for entry in paper.entries("§7")]
+    assert all(each["holds"] for each in report["statements"])
+    assert [Path(file).name for file in report["files"]] == [path.name for path in tmp_path.iterdir()]
 
 
 def test_command_fails_where_a_statement_does(monkeypatch, capsys):
     entry = paper.entries("§2")[0]
     monkeypatch.setattr(paper, "entries", lambda section=None: (entry._replace(check=lambda: paper.Finding(False, "0")),))
     assert main(["paper", "2"]) == 2
-    told = capsys.readouterr()
-    assert "not reproduced" in told.out
-    assert "not reproduced" in told.err
+    output = capsys.readouterr()
+    assert "not reproduced" in output.out
+    assert "not reproduced" in output.err
 
 
 def test_import_costs_nothing_until_asked():

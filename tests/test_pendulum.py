@@ -18,10 +18,10 @@ PERIOD = 17.0652165601579625588917206249
 @pytest.mark.parametrize("method", METHODS)
 def test_below_the_pendulum_is_the_oscillator(method):
     bottom, spring = sw.Pendulum(1.3), sw.Oscillator(1.3, form="physical")
-    found, wanted = sw.analyse(bottom, method, dt=0.4, at=(0.0, 0.0)), sw.analyse(spring, method, dt=0.4)
-    np.testing.assert_allclose(found.P, wanted.P, rtol=0, atol=1e-14)
-    np.testing.assert_allclose(found.eigenvalues, wanted.eigenvalues, rtol=0, atol=1e-14)
-    assert found.kind == wanted.kind
+    analysis, wanted = sw.analyse(bottom, method, dt=0.4, at=(0.0, 0.0)), sw.analyse(spring, method, dt=0.4)
+    np.testing.assert_allclose(analysis.P, wanted.P, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(analysis.eigenvalues, wanted.eigenvalues, rtol=0, atol=1e-14)
+    assert analysis.kind == wanted.kind
     limit, known = sw.stability_limit(bottom, method, at=(0.0, 0.0)), sw.stability_limit(spring, method)
     assert float(limit) == pytest.approx(float(known), rel=1e-9)
 
@@ -37,9 +37,9 @@ def test_off_the_bottom_the_pendulum_is_softer_and_above_it_falls():
 
 def test_a_damped_pendulum_is_a_damped_oscillator_for_any_push():
     push = sw.Sinusoid(0.3, 2.0)
-    found = sw.analyse(sw.Pendulum(1.3, 0.2, a=push), "false_euler", dt=0.4, at=(0.0, 0.0), t=1.7)
+    analysis = sw.analyse(sw.Pendulum(1.3, 0.2, a=push), "false_euler", dt=0.4, at=(0.0, 0.0), t=1.7)
     wanted = sw.analyse(sw.Oscillator(1.3, 0.2, form="physical"), "false_euler", dt=0.4)
-    np.testing.assert_allclose(found.P, wanted.P, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(analysis.P, wanted.P, rtol=0, atol=1e-15)
 
 
 def test_a_small_push_moves_pendulum_and_oscillator_alike():

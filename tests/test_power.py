@@ -33,14 +33,14 @@ def unforced(method: sw.Method) -> list[sw.System]:
 def forced(method: sw.Method) -> list[sw.System]:
     damping = None if method.needs_acceleration else 0.2
     wave = sw.Sinusoid(0.7, np.array([0.3, 1.9]), 0.4)
-    held: list[sw.System] = [
+    steady: list[sw.System] = [
         sw.Oscillator(1.0, damping, x=np.array([0.5, -2.0])),
         sw.Oscillator(0.9, damping, x=sw.Sampled([0.5, 0.5], 0.1), form="physical"),
     ]
     if method.has_series:  # it takes the derivatives of a wave, too
-        return held
+        return steady
     return [
-        *held,
+        *steady,
         sw.Oscillator(1.0, damping, x=wave),
         sw.Oscillator(0.8, damping, x=wave, a=sw.Sinusoid(1.0, 2.3)),
         sw.Oscillator(1.0, damping, x=-0.3, a=wave),
@@ -99,12 +99,12 @@ def test_a_million_million_steps_at_once() -> None:
     begin = time.perf_counter()
     run = sw.integrate(sw.Oscillator(phi), "false_euler", v=0.0, y=1.0, dt=1.0, steps=10**12, every=25 * 10**10, form="power")
     assert time.perf_counter() - begin < 5.0  # stepping would take an hour; generous, for it is some milliseconds
-    kept = run.v**2 - phi * run.v * run.y + run.y**2
+    invariant = run.v**2 - phi * run.v * run.y + run.y**2
     kappa = np.sqrt((2 + phi) / (2 - phi))
     # Twice the state's error, times ‖state‖ ≤ κ and the form's norm 1 + Φ/2. It grows with Φ; it must still mean something.
     off = [bound(1e12, k, 2, roundings=4, size=1 + p + p * p) for k, p in zip(kappa, phi, strict=True)]
     limit = 2 * (1 + phi / 2) * kappa * np.array(off)
-    assert (abs(kept - 1) < limit).all()
+    assert (abs(invariant - 1) < limit).all()
     assert limit[0] < 0.02
 
 
@@ -198,10 +198,10 @@ def test_a_power_that_overflows_is_a_member_that_diverged() -> None:
 def test_progress() -> None:
     from stepwell.runs import engine
 
-    told: list[float] = []
-    plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=100, every=25, form="power", progress=told.append)
+    shares: list[float] = []
+    plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=100, every=25, form="power", progress=shares.append)
     engine.advance(plan, np.zeros(()), np.ones(()))
-    assert told == [0.2, 0.4, 0.6, 0.8, 1.0]
+    assert shares == [0.2, 0.4, 0.6, 0.8, 1.0]
 
 
 def test_the_cosine() -> None:

@@ -86,9 +86,9 @@ def test_a_notebook_shows_an_element_of_its_page(monkeypatch: pytest.MonkeyPatch
 
 def test_a_notebook_is_not_written_anew_for_every_share(monkeypatch: pytest.MonkeyPatch) -> None:
     handle = in_a_notebook(monkeypatch)
-    with progress.bar("much") as told:
+    with progress.bar("much") as report:
         for i in range(10_000):
-            told(i / 10_000)
+            report(i / 10_000)
     assert len(handle.shown) < 100
 
 

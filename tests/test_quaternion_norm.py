@@ -177,11 +177,11 @@ def test_resetting_changes_no_attitude(method: str) -> None:
     """
     body = sw.RigidBody([1.0, 1.4, 2.0], weight=1.3, centre=[0.1, 0.2, 0.5], space_torque=[0.1, None, 0.2])
     start: dict[str, Any] = {"v": [0.4, 1.0, -0.6], "y": tops.some_attitude(3), "dt": 0.02, "steps": 300}
-    free, kept = (sw.integrate(body, method, **start, control=control) for control in (None, sw.Projection("norm")))
-    assert kept.quantity("norm_error")[-1] == pytest.approx(0.0, abs=1e-15)
-    np.testing.assert_allclose(free.v[-1], kept.v[-1], rtol=0, atol=1e-12)
+    free, reset = (sw.integrate(body, method, **start, control=control) for control in (None, sw.Projection("norm")))
+    assert reset.quantity("norm_error")[-1] == pytest.approx(0.0, abs=1e-15)
+    np.testing.assert_allclose(free.v[-1], reset.v[-1], rtol=0, atol=1e-12)
     length = math.sqrt((free.y[-1] ** 2).sum())
-    np.testing.assert_allclose(free.y[-1] / length, kept.y[-1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(free.y[-1] / length, reset.y[-1], rtol=0, atol=1e-12)
     if sw.method(method).order < 4:
         assert abs(length - 1.0) > 1e-7
 

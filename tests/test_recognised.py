@@ -98,8 +98,8 @@ CHANGES: dict[str, tuple[Callable[[], Any], Callable[[pytest.MonkeyPatch], None]
 }
 
 
-def end(function: Any, **given: Any) -> float:
-    system = sw.system(function)(**given)
+def end(function: Any, **parameters: Any) -> float:
+    system = sw.system(function)(**parameters)
     runs = [sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, backend=backend) for backend in ("rust", "numpy")]
     assert runs[0].y[-1] == runs[1].y[-1]  # the reference runs the function itself
     return float(runs[0].y[-1])
@@ -124,7 +124,7 @@ def test_the_same_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(own.OwnSystem, "_trace", counted)
 
-    def made(scale: float) -> Any:
+    def definition(scale: float) -> Any:
         @sw.system
         def duffing(t: Any, v: Any, y: Any, *, beta: Any = 1.0, drive: Any = 0.0) -> Any:
             return drive * math.cos(1.0) - scale * y - beta * y**3 + np.dot(TABLE, TABLE)
@@ -133,13 +133,13 @@ def test_the_same_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for beta in (1.0, 2.0, [1.0, 2.0]):
         for drive in (0.5, sw.Sinusoid(1.0, 2.0), sw.Sinusoid(0.5, 3.0), sw.Sampled([0.0, 1.0], 0.1)):
-            sw.integrate(made(1.0)(beta=beta, drive=drive), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+            sw.integrate(definition(1.0)(beta=beta, drive=drive), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
     assert len(traced) == 3  # a number, a sinusoid, samples
-    sw.integrate(made(2.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
-    sw.integrate(made(-0.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
-    sw.integrate(made(0.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+    sw.integrate(definition(2.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+    sw.integrate(definition(-0.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+    sw.integrate(definition(0.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
     assert len(traced) == 6
-    sw.integrate(made(1.0)(), "rk4", v=np.zeros((2, 3)), y=np.ones((2, 3)), dt=0.1, steps=1)
+    sw.integrate(definition(1.0)(), "rk4", v=np.zeros((2, 3)), y=np.ones((2, 3)), dt=0.1, steps=1)
     assert len(traced) == 6  # batches change nothing
 
 
@@ -149,7 +149,7 @@ def test_arguments_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     signature = inspect.signature
     monkeypatch.setattr(inspect, "signature", lambda function: looked.append(function) or signature(function))
 
-    def made(k: float, drive: Any) -> Any:
+    def with_defaults(k: float, drive: Any) -> Any:
         def rates(t: Any, v: Any, y: Any, a: Any = k, *, drive: Any = drive) -> Any:
             return drive - a * y
 
@@ -157,7 +157,7 @@ def test_arguments_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for k in (1.0, 2.0, [1.0, 2.0]):
         for drive in (0.0, 0.5, sw.Sinusoid(1.0, 2.0)):
-            definition = sw.system(made(k, drive))
+            definition = sw.system(with_defaults(k, drive))
             assert list(definition.parameters) == ["a", "drive"]
             np.testing.assert_array_equal(definition.parameters["a"], k)
             assert definition.parameters["drive"] is drive
@@ -188,13 +188,13 @@ def test_other_arguments_are_looked_at_again() -> None:
         sw.system(order=1)(lambda t, v, y: y)
 
     @functools.wraps(rates)
-    def wrapped(*given: Any, **named: Any) -> Any:
-        return rates(*given, **named)
+    def wrapped(*arguments: Any, **named: Any) -> Any:
+        return rates(*arguments, **named)
 
     assert sw.system(wrapped).parameters == {"a": 3.0, "b": 4.0}
 
-    def bare(*given: Any, **named: Any) -> Any:
-        return rates(*given, **named)
+    def bare(*arguments: Any, **named: Any) -> Any:
+        return rates(*arguments, **named)
 
     with pytest.raises(ArgumentError, match="bare: expected a function"):
         sw.system(bare)
@@ -207,7 +207,7 @@ def test_what_goes_to_other_processes_keeps_its_scale() -> None:
 
 
 def test_functions_of_the_time_and_invariants_count() -> None:
-    def made(k: float) -> Any:
+    def with_energy(k: float) -> Any:
         @sw.system
         def pushed(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
             return push - y
@@ -219,10 +219,10 @@ def test_functions_of_the_time_and_invariants_count() -> None:
         return pushed
 
     start: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 2}
-    ends = {sw.integrate(made(0.5)(push=lambda t, a=a: a * t), "rk4", **start).y[-1].item() for a in (1.0, 2.0)}
+    ends = {sw.integrate(with_energy(0.5)(push=lambda t, a=a: a * t), "rk4", **start).y[-1].item() for a in (1.0, 2.0)}
     assert len(ends) == 2
-    assert sw.integrate(made(0.5)(), "rk4", **start, record="energy").recorded["energy"][0] == pytest.approx(0.5, rel=1e-4)
-    assert sw.integrate(made(1.5)(), "rk4", **start, record="energy").recorded["energy"][0] == pytest.approx(1.5, rel=1e-4)
+    assert sw.integrate(with_energy(0.5)(), "rk4", **start, record="energy").recorded["energy"][0] == pytest.approx(0.5, rel=1e-4)
+    assert sw.integrate(with_energy(1.5)(), "rk4", **start, record="energy").recorded["energy"][0] == pytest.approx(1.5, rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -246,7 +246,7 @@ def test_numbers_are_told_apart_by_their_bits() -> None:
         return recognised.identity(lambda: value)
 
     different = [0.0, -0.0, 1.0, 1, True, "1", b"1", None, (1.0,), [1.0], np.array([1.0]), np.float32(1.0), np.array([1])]
-    found = [of(each) for each in different]
-    assert len(set(found)) == len(found)
+    identities = [of(each) for each in different]
+    assert len(set(identities)) == len(identities)
     assert of(math.nan) == of(math.nan)
     assert of(np.array([1.0, np.nan])) == of(np.array([1.0, np.nan]))

@@ -129,12 +129,12 @@ def test_work_is_the_energy_that_the_control_gave() -> None:
             "every": round(2.0 / dt),
             "record": ["energy"],
         }
-        held = sw.integrate(scene.system, "standard_euler", control=sw.EnergyControl(0.2), **ask)
+        controlled = sw.integrate(scene.system, "standard_euler", control=sw.EnergyControl(0.2), **ask)
         free = sw.integrate(scene.system, "standard_euler", **ask)
         drift = free.recorded["energy"][-1] - free.recorded["energy"][0]
-        assert held.work is not None
-        assert held.work < 0 < drift  # Standard Euler gains energy, and the control takes it
-        return abs(float(held.recorded["energy"][-1] - held.recorded["energy"][0] - drift - held.work))
+        assert controlled.work is not None
+        assert controlled.work < 0 < drift  # Standard Euler gains energy, and the control takes it
+        return abs(float(controlled.recorded["energy"][-1] - controlled.recorded["energy"][0] - drift - controlled.work))
 
     coarse, fine = left(1e-3), left(5e-4)
     assert coarse < 0.05

@@ -114,7 +114,7 @@ class Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
-def assert_a_table(html: str, *told: str) -> None:
+def assert_a_table(html: str, *texts: str) -> None:
     tags = Tags()
     tags.feed(html)
     assert tags.open == []
@@ -122,7 +122,7 @@ def assert_a_table(html: str, *told: str) -> None:
     assert tags.cells >= 4
     assert "np.float64" not in html
     assert "array([" not in html
-    for each in told:
+    for each in texts:
         assert each in html
 
 

@@ -79,8 +79,8 @@ def growth(inertia: Any, axis: int) -> Any:
     """Eigenvalues of ω̇ at a spin of 1.7 about one axis, but for the one that is zero."""
     v = np.zeros(3)
     v[axis] = 1.7
-    found = np.linalg.eigvals(sw.jacobian(sw.RigidBody(inertia), v=v, y=tops.UNIT).vv)
-    return found[np.argsort(np.abs(found))][1:]
+    eigenvalues = np.linalg.eigvals(sw.jacobian(sw.RigidBody(inertia), v=v, y=tops.UNIT).vv)
+    return eigenvalues[np.argsort(np.abs(eigenvalues))][1:]
 
 
 @pytest.mark.parametrize("inertia", [(1.0, 2.0, 3.0), (1.0, 1.001, 1.9), (1.3, 1.1, 0.9), (2.0, 1.2, 1.5)])
@@ -98,14 +98,14 @@ def test_a_small_tilt_grows_or_does_not() -> None:
     inertia, t = np.array([1.0, 2.0, 3.0]), 12.0
     sigma = math.sqrt((2.0 - 1.0) * (3.0 - 2.0) / (1.0 * 3.0))
     # ω̇₁ = −ω₃ and ω̇₃ = −ω₁/3 there: the mode that grows is (1, −σ).
-    made = sw.integrate(sw.RigidBody(inertia), "rk4", v=[1e-6, 1.0, -1e-6 * sigma], y=tops.UNIT, dt=0.01, steps=round(t / 0.01))
-    assert made.v[-1, 0] == pytest.approx(1e-6 * math.exp(sigma * t), rel=1e-5)  # 1.02e-3 by then, squared 1e-6
+    run = sw.integrate(sw.RigidBody(inertia), "rk4", v=[1e-6, 1.0, -1e-6 * sigma], y=tops.UNIT, dt=0.01, steps=round(t / 0.01))
+    assert run.v[-1, 0] == pytest.approx(1e-6 * math.exp(sigma * t), rel=1e-5)  # 1.02e-3 by then, squared 1e-6
     for axis in (0, 2):
         v = np.full(3, 1e-6)
         v[axis] = 1.0
-        made = sw.integrate(sw.RigidBody(inertia), "rk4", v=v, y=tops.UNIT, dt=0.01, steps=round(10 * t / 0.01), every=50)
+        run = sw.integrate(sw.RigidBody(inertia), "rk4", v=v, y=tops.UNIT, dt=0.01, steps=round(10 * t / 0.01), every=50)
         # |λ| = √(2/6) or √(2/2): an ellipse of an aspect of at most √3 through (1, 1)·1e-6
-        assert np.abs(np.delete(made.v, axis, axis=1)).max() < 2.5e-6
+        assert np.abs(np.delete(run.v, axis, axis=1)).max() < 2.5e-6
 
 
 # ---- what is constant
@@ -118,8 +118,8 @@ def test_energy_and_momentum_are_constant_to_the_order(method: sw.Method) -> Non
     errors = []
     for n in (40, 80):
         n = n // 4 if method.order > 4 else n
-        made = sw.integrate(body, method, v=v, y=q, dt=end / n, steps=n, every=n, record=["energy", "angular_momentum"])
-        energy, momentum = made.recorded["energy"], made.recorded["angular_momentum"]
+        run = sw.integrate(body, method, v=v, y=q, dt=end / n, steps=n, every=n, record=["energy", "angular_momentum"])
+        energy, momentum = run.recorded["energy"], run.recorded["angular_momentum"]
         length = np.sqrt((momentum**2).sum(axis=1))
         changes = (energy[-1] - energy[0], length[-1] - length[0], np.abs(momentum[-1] - momentum[0]).max())
         errors.append(np.abs(changes))
@@ -137,9 +137,9 @@ def test_free_tops_of_any_start(seed: int) -> None:
     inertia, v, q = np.sort(rng.uniform(1.0, 2.0, 3)), rng.normal(size=3), tops.some_attitude(seed)
     truth = FreeTop(tuple(inertia.tolist()), tuple(v.tolist()), tuple(q.tolist()))
     times = np.array([0.0, 3.0, 20.0])
-    made = sw.integrate(sw.RigidBody(inertia), "dop853", v=v, y=q, tolerance=1e-14, at=times)
-    for found, wanted in zip(truth(times), (made.v, made.y), strict=True):
-        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12)
+    run = sw.integrate(sw.RigidBody(inertia), "dop853", v=v, y=q, tolerance=1e-14, at=times)
+    for exact, wanted in zip(truth(times), (run.v, run.y), strict=True):
+        np.testing.assert_allclose(exact, wanted, rtol=0, atol=1e-12)
 
 
 def test_the_wing_nut_is_that_of_the_facts() -> None:
@@ -185,19 +185,19 @@ def test_a_batch_is_its_members() -> None:
             weight=float(i),
             centre=[0.1, 0.2, 0.3],
         )
-        made = sw.integrate(alone, "rk4", v=v[:, i], y=q[:, i], **rest, control=sw.NormControl(float(i)))
-        np.testing.assert_array_equal(whole.v[-1, :, i], made.v[-1])
-        np.testing.assert_array_equal(whole.y[-1, :, i], made.y[-1])
+        run = sw.integrate(alone, "rk4", v=v[:, i], y=q[:, i], **rest, control=sw.NormControl(float(i)))
+        np.testing.assert_array_equal(whole.v[-1, :, i], run.v[-1])
+        np.testing.assert_array_equal(whole.y[-1, :, i], run.y[-1])
 
 
 def test_a_batch_of_three_is_no_vector() -> None:
     """Three members of three axes each: the body's own numbers are along the first axis."""
     body = sw.RigidBody([1.0, 2.0, 3.0], weight=[1.0, 2.0, 3.0], centre=[0.0, 0.0, 1.0])
-    made = sw.integrate(body, "rk4", v=np.eye(3), y=tops.UNIT[:, np.newaxis] + 0.1 * np.eye(4, 3), dt=0.1, steps=9)
+    run = sw.integrate(body, "rk4", v=np.eye(3), y=tops.UNIT[:, np.newaxis] + 0.1 * np.eye(4, 3), dt=0.1, steps=9)
     for i in range(3):
         alone = sw.RigidBody([1.0, 2.0, 3.0], weight=i + 1.0, centre=[0.0, 0.0, 1.0])
         one = sw.integrate(alone, "rk4", v=np.eye(3)[:, i], y=tops.UNIT + 0.1 * np.eye(4, 3)[:, i], dt=0.1, steps=9)
-        np.testing.assert_array_equal(made.y[-1, :, i], one.y[-1])
+        np.testing.assert_array_equal(run.y[-1, :, i], one.y[-1])
 
 
 @pytest.mark.parametrize("keeper", KEEPERS, ids=repr)
@@ -282,10 +282,10 @@ def test_a_zero_quaternion_is_told() -> None:
 
 def test_they_say_what_they_are() -> None:
     body = sw.RigidBody([1.0, 2.0, 3.0], [None, 0.1, None], damping=0.2, weight=2.0, centre=[0.0, 0.0, 1.0])
-    said = "RigidBody([1.0, 2.0, 3.0], torque[1]=constant(0.1), damping=0.2, weight=2.0, "
-    assert repr(body) == said + "centre=[0.0, 0.0, 1.0])"
-    kept = sw.RigidBody([1.0, 2.0, 3.0]).under(sw.NormControl(0.5), ())
-    assert repr(kept) == "RigidBody([1.0, 2.0, 3.0], NormControl(0.5))"
+    text = "RigidBody([1.0, 2.0, 3.0], torque[1]=constant(0.1), damping=0.2, weight=2.0, "
+    assert repr(body) == text + "centre=[0.0, 0.0, 1.0])"
+    controlled = sw.RigidBody([1.0, 2.0, 3.0]).under(sw.NormControl(0.5), ())
+    assert repr(controlled) == "RigidBody([1.0, 2.0, 3.0], NormControl(0.5))"
 
 
 # ---- quaternions
@@ -324,12 +324,12 @@ def test_a_step_under_control_is_explained_and_exported(keeper: Any) -> None:
     assert sw.explain(body, "standard_euler", control=keeper) != sw.explain(body, "standard_euler")
     source = sw.export(body, "rk4", "python", dt=0.1, control=keeper).source
     assert source != sw.export(body, "rk4", "python", dt=0.1).source
-    kept = body.under(keeper, ())
-    free, held = (
+    controlled = body.under(keeper, ())
+    free, corrected = (
         sw.integrate(each, "merson", v=np.ones(3), y=1.01 * np.array(tops.UNIT), tolerance=1e-3, at=[3.0])
-        for each in (body, kept)
+        for each in (body, controlled)
     )
-    off = [abs(float(run.y[-1] @ run.y[-1]) - 1.0) for run in (free, held)]
+    off = [abs(float(run.y[-1] @ run.y[-1]) - 1.0) for run in (free, corrected)]
     assert off[1] < 0.1 * off[0]  # the control decays as exp(−2·0.7·3) = 0.015
 
 
@@ -339,7 +339,7 @@ def test_the_derivative_of_a_step_under_control(keeper: Any) -> None:
     free = sw.RigidBody([1.0, 1.5, 2.0], weight=1.2, centre=[0.1, 0.2, 0.3])
     body = free if keeper is None else free.under(keeper, ())
     v, q, e = np.array([0.4, -0.8, 1.1]), 1.1 * tops.some_attitude(8), 1e-5
-    found = sw.analyse(body, "rk4", dt=0.2, at=(v, q)).P
+    matrix = sw.analyse(body, "rk4", dt=0.2, at=(v, q)).P
     columns = []
     for i in range(7):
         change = e * np.eye(7)[i]
@@ -349,4 +349,4 @@ def test_the_derivative_of_a_step_under_control(keeper: Any) -> None:
         ]
         low, high = (np.concatenate([run.v[-1], run.y[-1]]) for run in ends)
         columns.append((high - low) / (2 * e))
-    np.testing.assert_allclose(found, np.stack(columns, axis=1), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(matrix, np.stack(columns, axis=1), rtol=0, atol=1e-9)

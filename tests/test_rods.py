@@ -212,16 +212,16 @@ def test_standard_euler_adds_energy_until_it_breaks_the_rod() -> None:
 
 def test_control_against_resetting() -> None:
     """FACTS §5: at 90°, T = 0.01, over 75 units. The document supposes that control is better: by False Euler it is."""
-    found = {}
+    results = {}
     for method in ("false_euler", "rk4"):
         for name, control in KEPT.items():
             run = quiet(sw.Pendulum3D(), method, **swing(90.0), dt=0.01, steps=7500, every=1, control=control)
-            found[method, name] = period(run), float(np.abs(run.energy - run.energy[0]).max())
-    assert found["false_euler", "control"] == pytest.approx((7.41611, 6.4e-3), rel=0.01)
-    assert found["false_euler", "control"][0] == pytest.approx(7.41611, abs=5e-6)
-    assert found["false_euler", "resetting"] == pytest.approx((8.266, 0.836), rel=1e-3)
-    assert found["rk4", "resetting"][1] == pytest.approx(1.45e-9, rel=0.02)
-    assert found["rk4", "control"][1] == pytest.approx(2.25e-6, rel=0.02)
+            results[method, name] = period(run), float(np.abs(run.energy - run.energy[0]).max())
+    assert results["false_euler", "control"] == pytest.approx((7.41611, 6.4e-3), rel=0.01)
+    assert results["false_euler", "control"][0] == pytest.approx(7.41611, abs=5e-6)
+    assert results["false_euler", "resetting"] == pytest.approx((8.266, 0.836), rel=1e-3)
+    assert results["rk4", "resetting"][1] == pytest.approx(1.45e-9, rel=0.02)
+    assert results["rk4", "control"][1] == pytest.approx(2.25e-6, rel=0.02)
 
 
 # ---- resetting
@@ -301,9 +301,9 @@ def test_small_swings_of_a_chain(n: int) -> None:
     """n equal rods and masses swing at √(g/l·x), x a zero of Laguerre's polynomial of degree n: for two 2 ± √2."""
     chain = sw.Rods(np.ones(n), [((0.0, 0.0), 0), *((i, i + 1) for i in range(n - 1))], 0.5, gravity=2.0)
     rest = np.stack([np.zeros(n), -0.5 * np.arange(1.0, n + 1.0)], axis=-1)
-    found = sw.jacobian(chain, v=0.0, y=rest).eigenvalues
+    eigenvalues = sw.jacobian(chain, v=0.0, y=rest).eigenvalues
     # n swings of two eigenvalues each, and as many zeros where a rod's length only stays what it is.
-    frequencies = np.sort(found.imag[found.imag > 1e-3])
+    frequencies = np.sort(eigenvalues.imag[eigenvalues.imag > 1e-3])
     known = np.sqrt(4.0 * np.sort(np.polynomial.laguerre.lagroots([0.0] * n + [1.0])))
     np.testing.assert_allclose(frequencies, known, rtol=1e-9)
 
@@ -401,9 +401,9 @@ def test_an_exported_step_and_its_explanation_have_the_control(control: Any) -> 
         swing.step(state)
     run = sw.integrate(TWO, "rk4", v=0.0, y=hanging(1.0, 2.0), dt=0.01, steps=20, control=control)
     assert (state.v, state.y) == (run.v[-1].reshape(-1).tolist(), run.y[-1].reshape(-1).tolist())
-    plain, kept = (sw.explain(TWO, "rk4", control=each) for each in (None, control))
-    assert sum(kept.computed.values()) > sum(plain.computed.values())
-    assert ("2·c" in str(kept)) == (control is CONTROL)
+    plain, controlled = (sw.explain(TWO, "rk4", control=each) for each in (None, control))
+    assert sum(controlled.computed.values()) > sum(plain.computed.values())
+    assert ("2·c" in str(controlled)) == (control is CONTROL)
 
 
 def test_a_long_chain_has_no_term_too_many() -> None:

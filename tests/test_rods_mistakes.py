@@ -181,10 +181,10 @@ def true_by_the_reference() -> bool:
     """The truths above, of the reference alone: angles, a free triangle, a control that decays, a cone, and lengths reset."""
     if not apart_from_angles("numpy") < 1e-9:
         return False
-    given: dict[str, Any] = {"dt": 0.01, "backend": "numpy"}
+    options: dict[str, Any] = {"dt": 0.01, "backend": "numpy"}
     triangle = sw.Rods([1.0, 2.0, 0.5], [(0, 1), (1, 2), (2, 0)], 1.0, gravity=0.0)
     y = np.array([[0, 0], [1, 0], [0.5, 0.75**0.5]])
-    run = quiet(triangle, "rk4", v=np.array([[0.3, 0.1], [0.3, 0.9], [-0.4, 0.766]]), y=y, steps=100, **given)
+    run = quiet(triangle, "rk4", v=np.array([[0.3, 0.1], [0.3, 0.9], [-0.4, 0.766]]), y=y, steps=100, **options)
     s = triangle.for_state_shapes(0.0, y).reference_at_step(0.01, ())
     off = [abs(float(rods.dot(d, u))) for d, u in zip(s.spans(run.y[-1]), s.closing(run.v[-1]), strict=True)]
     begun = [
@@ -204,7 +204,7 @@ def true_by_the_reference() -> bool:
     for system, y in pendulums:
         sideways = np.zeros(y.shape)
         sideways[..., 0] = 0.7
-        run = quiet(system, "rk4", v=sideways, y=y, steps=300, **given)
+        run = quiet(system, "rk4", v=sideways, y=y, steps=300, **options)
         if abs(np.sqrt((run.y[-1] ** 2).sum()) - 2.02) > 1e-6:  # C̈ = 0, so a rod that begins too long stays so
             return False
         run = quiet(system, "rk4", v=0.0, y=y, dt=1e-3, steps=10, backend="numpy", control=sw.LengthControl(0.1))

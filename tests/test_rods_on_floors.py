@@ -43,12 +43,12 @@ def test_bowls_and_balls_add_no_energy(method: str) -> None:
         y[2] = y[1] + 0.5 * apart[1] / np.sqrt((apart[1] ** 2).sum(axis=0))
         at = np.zeros(dim)
         floor = [sw.Sphere(at, 2.0, inside=True, restitution=0.6, friction=0.3), sw.Sphere(at - 1.2, 0.4, restitution=0.8)]
-        given: dict[str, Any] = {"dt": 0.01, "control": control}
+        options: dict[str, Any] = {"dt": 0.01, "control": control}
         v = np.broadcast_to(rng.normal(0.0, 1.0, (1, dim, 40)), y.shape)  # as one body
         make = [sw.Rods([1.0, 2.0, 0.5], [(0, 1), (1, 2)], [1.0, 0.5], gravity=G, dim=dim, floor=each) for each in (floor, None)]
-        run = sw.integrate(make[0], method, v=v, y=y, steps=300, every=1, **given)
+        run = sw.integrate(make[0], method, v=v, y=y, steps=300, every=1, **options)
         each = {"v": np.moveaxis(run.v[:-1], 0, -1), "y": np.moveaxis(run.y[:-1], 0, -1)}
-        bare = sw.integrate(make[1], method, **each, steps=1, **given)
+        bare = sw.integrate(make[1], method, **each, steps=1, **options)
         touched = (np.moveaxis(bare.v[-1], -1, 0) != run.v[1:]).any(axis=(1, 2))
         most = np.maximum(run.energy[:-1], np.moveaxis(bare.energy[-1], -1, 0))
         assert touched.sum() > 300
@@ -97,20 +97,20 @@ def test_newtons_law_with_friction_would_add_energy() -> None:
 def test_rods_apart_do_not_share_energy() -> None:
     """Two dumb-bells in one system are those of two systems, to the last bit."""
     y = np.concatenate([tilted(0.4, 0.1), tilted(1.1, 0.3) + np.array([3.0, 0.0])])
-    given: dict[str, Any] = {"v": 0.0, "dt": 1 / 120, "steps": 150, "every": 1, "control": RESETTING}
+    arguments: dict[str, Any] = {"v": 0.0, "dt": 1 / 120, "steps": 150, "every": 1, "control": RESETTING}
     floor = sw.Floor(restitution=0.8, friction=0.3)
-    both = sw.integrate(sw.Rods(np.ones(4), [(0, 1), (2, 3)], 1.0, gravity=G, floor=floor), "rk4", y=y, **given)
+    both = sw.integrate(sw.Rods(np.ones(4), [(0, 1), (2, 3)], 1.0, gravity=G, floor=floor), "rk4", y=y, **arguments)
     for part in (slice(0, 2), slice(2, 4)):
-        one = sw.integrate(dumb_bell(floor=floor), "rk4", y=y[part], **given)
+        one = sw.integrate(dumb_bell(floor=floor), "rk4", y=y[part], **arguments)
         assert np.array_equal(both.y[:, part], one.y)
 
 
 def test_one_rod_is_the_pendulum() -> None:
     floor = [sw.Floor(restitution=0.7, friction=0.2, normal=(1.0, 0.2, 0.0)), sw.Sphere((0.0, 0.5, -1.0), 0.3, restitution=0.5)]
-    given: dict[str, Any] = {"dt": 0.01, "steps": 200, "every": 1}
+    arguments: dict[str, Any] = {"dt": 0.01, "steps": 200, "every": 1}
     v, y = np.array([-0.5, 0.4, 0.0]), np.array([0.8, 0.0, -0.6])
-    one = sw.integrate(sw.Pendulum3D(1.0, G, floor=floor), "rk4", v=v, y=y, **given)
-    rod = sw.integrate(sw.Rods([1.0], [((0.0, 0.0, 0.0), 0)], 1.0, gravity=G, floor=floor), "rk4", v=[v], y=[y], **given)
+    one = sw.integrate(sw.Pendulum3D(1.0, G, floor=floor), "rk4", v=v, y=y, **arguments)
+    rod = sw.integrate(sw.Rods([1.0], [((0.0, 0.0, 0.0), 0)], 1.0, gravity=G, floor=floor), "rk4", v=[v], y=[y], **arguments)
     assert np.abs(rod.y[:, 0] - one.y).max() < 1e-9
     assert (np.abs(np.diff(one.v, axis=0)).max(axis=1) > 0.5).sum() >= 2
 
@@ -132,12 +132,12 @@ def rope(n: int, dim: int) -> tuple[sw.Rods, Any]:
 def test_large_and_small_a_world_and_a_run_in_pieces(method: str, n: int, dim: int) -> None:
     """Seven points in space with friction are a large system, resolved member by member; bits are the same everywhere."""
     rods, y = rope(n, dim)
-    given: dict[str, Any] = {"v": 0.0, "dt": 1 / 60, "control": RESETTING}
-    whole = sw.integrate(rods, method, y=y, steps=60, every=10, **given)
-    assert_same(whole, sw.integrate(rods, method, y=y, steps=60, every=10, **given, backend="numpy"))
-    many = sw.integrate(rods, method, y=np.repeat(y[..., np.newaxis], 5, axis=-1), steps=60, every=10, **given, threads=2)
+    arguments: dict[str, Any] = {"v": 0.0, "dt": 1 / 60, "control": RESETTING}
+    whole = sw.integrate(rods, method, y=y, steps=60, every=10, **arguments)
+    assert_same(whole, sw.integrate(rods, method, y=y, steps=60, every=10, **arguments, backend="numpy"))
+    many = sw.integrate(rods, method, y=np.repeat(y[..., np.newaxis], 5, axis=-1), steps=60, every=10, **arguments, threads=2)
     assert np.array_equal(many.y[..., 3], whole.y)
-    half = sw.integrate(rods, method, y=y, steps=20, **given)
+    half = sw.integrate(rods, method, y=y, steps=20, **arguments)
     rest = sw.integrate(rods, method, resume=half, steps=40)
     assert np.array_equal(rest.y[-1], whole.y[-1])
     world = sw.World(rods, method, v=np.zeros(y.shape), y=y.copy(), dt=1 / 60, control=RESETTING)

@@ -19,7 +19,7 @@ def of(scene: sw.Scene, method: str, dt: float | None = None, **options: Any) ->
     return run_picture(scene, scene.run(method, dt, **({"every": 1} | options)))
 
 
-def said(picture: RunPicture) -> str:
+def headline(picture: RunPicture) -> str:
     title = picture.plot().texts
     return next(text.get_text() for text in title if text.get_weight() == "bold")
 
@@ -29,7 +29,7 @@ def test_a_growing_oscillation_says_by_how_much() -> None:
     assert 430 * 0.5 * math.log10(1.09) == pytest.approx(8.05, abs=0.01)
     picture = of(sw.scenes.oscillator(), "standard_euler", 0.3, steps=430)
     assert finding(picture) == "grows to 10⁸ times the exact motion"
-    assert said(picture) == "Undamped oscillator by Standard Euler: grows to 10⁸ times the exact motion"
+    assert headline(picture) == "Undamped oscillator by Standard Euler: grows to 10⁸ times the exact motion"
 
 
 @pytest.mark.parametrize(("dt", "words"), [(0.1, "the exact motion to 5 digits"), (0.7, "up to 1.4 % from the exact motion")])
@@ -71,7 +71,7 @@ def test_without_an_exact_solution_the_energy_is_told(dt: float, words: str) -> 
     assert picture.energy_error is not None
     assert picture.energy_error.max() == pytest.approx(dt**2 / 4, rel=0.01)
     assert finding(picture) == words
-    assert said(picture) == f"Oscillator by Leapfrog: {words}"
+    assert headline(picture) == f"Oscillator by Leapfrog: {words}"
 
 
 def test_an_energy_that_is_lost_is_told_by_its_size() -> None:
@@ -203,8 +203,8 @@ def test_a_motion_of_which_no_error_is_known_shows_its_phase_plane() -> None:
 
 def controlled(steps: int = 4000, **options: Any) -> sw.Run:
     scene = sw.scenes.energy_control()
-    given: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": scene.dt, "steps": steps, "every": 4}
-    return sw.integrate(scene.system, "standard_euler", **given | options)
+    arguments: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": scene.dt, "steps": steps, "every": 4}
+    return sw.integrate(scene.system, "standard_euler", **arguments | options)
 
 
 @pytest.fixture(scope="module")

@@ -225,8 +225,8 @@ def test_the_distance_from_the_centre_is_drawn_over_the_angle(pictures):
     e = 0.9
     nearest = angle[np.argmin(r)]
     # The least is found among 6001 points, 1e-3 of a turn apart where r is least; the ellipse is flat there.
-    found = 0.5 * (1 - e * e) / (1 + e * np.cos(angle - nearest))
-    np.testing.assert_allclose(r, found, rtol=0.05)
+    ellipse = 0.5 * (1 - e * e) / (1 + e * np.cos(angle - nearest))
+    np.testing.assert_allclose(r, ellipse, rtol=0.05)
     assert not any(a.get_title(loc="left").startswith("distance") for a in pictures["orbits"].plot().axes)
 
 
@@ -376,17 +376,17 @@ def test_the_path_of_a_top_has_the_vertical_up(pictures):
         disc = looked_at(top, "rk4").plot().axes[1].patches[0].get_xy()
         assert np.sign(disc[:, 1].mean()) == side
     upside_down = sw.Scene(sw.RigidBody([1.0, 1.0, 0.5]), v=[0.0, 0.0, -1.0], y=[1.0, 0.0, 0.0, 0.0], horizon=3.0)
-    found = solids.upright(looked_at(upside_down, "rk4"))
-    assert (found @ [0.0, 0.0, -1.0]).tolist() == [0.0, 0.0, 1.0]
-    assert np.linalg.det(found) == 1.0
+    turned = solids.upright(looked_at(upside_down, "rk4"))
+    assert (turned @ [0.0, 0.0, -1.0]).tolist() == [0.0, 0.0, 1.0]
+    assert np.linalg.det(turned) == 1.0
 
 
 def test_the_energy_of_a_body_is_judged_as_far_as_it_is_constant():
     start = {"v": [0.1, 1.0, 0.1], "y": [1.0, 0.0, 0.0, 0.0], "horizon": 3.0}
     free = looked_at(sw.Scene(sw.RigidBody([1.0, 2.0, 2.5], damping=0.0), **start), "rk4")
     assert free.energy_error.max() < 1e-6
-    for given in ({"damping": 0.1}, {"torque": [0.1, None, None]}, {"space_torque": [None, 0.1, None]}):
-        chart = looked_at(sw.Scene(sw.RigidBody([1.0, 2.0, 2.5], **given), **start), "rk4")
+    for options in ({"damping": 0.1}, {"torque": [0.1, None, None]}, {"space_torque": [None, 0.1, None]}):
+        chart = looked_at(sw.Scene(sw.RigidBody([1.0, 2.0, 2.5], **options), **start), "rk4")
         assert chart.energy_error is None
         assert chart.plot().axes[-2].get_title(loc="left") == "energy over time; forces take or give it"
 

@@ -33,10 +33,10 @@ def true_end(values: Any, start: float, omega: float = OMEGA) -> tuple[Any, Any]
     return v, y
 
 
-def error(method: str, steps: int, start: float = 0.0, omega: float = OMEGA, **how: Any) -> float:
+def error(method: str, steps: int, start: float = 0.0, omega: float = OMEGA, **options: Any) -> float:
     """Of the state at ``END``."""
     system = sw.Oscillator(omega, a=sw.Sampled(VALUES, INTERVAL, start), form="physical")
-    run = sw.integrate(system, method, v=V, y=Y, dt=END / steps, steps=steps, **how)
+    run = sw.integrate(system, method, v=V, y=Y, dt=END / steps, steps=steps, **options)
     v, y = true_end(VALUES, start, omega)
     return float(max(abs(run.v[-1] - v), abs(run.y[-1] - y)))
 
@@ -117,8 +117,8 @@ def pushed(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
 def systems(kind: str) -> dict[str, tuple[sw.System, Any, Any]]:
     """Small and large ones, of each way in which inputs are looked up."""
     r = np.random.default_rng(5)
-    given = KINDS[kind]
-    common, own = sw.Sampled(r.normal(size=31), **given), sw.Sampled(r.normal(size=(31, 3)), **given)
+    options = KINDS[kind]
+    common, own = sw.Sampled(r.normal(size=31), **options), sw.Sampled(r.normal(size=(31, 3)), **options)
     large = -np.eye(140, k=0) + 0.1 * r.normal(size=(140, 140)) / 140
     return {
         "oscillator": (sw.Oscillator([1.0, 2.0, 3.0], a=common, x=own), 0.1, 1.0),
@@ -138,9 +138,9 @@ def test_core_and_reference_agree_to_the_bit(kind: str, method: str) -> None:
         np.testing.assert_array_equal(run.y, other.y, err_msg=name)
         np.testing.assert_array_equal(run.v, other.v, err_msg=name)
         if system.linear and kind != "hold, within steps" and method != "taylor":
-            made = [sw.integrate(system, method, **start, backend=backend, form="matrix") for backend in ("rust", "numpy")]
-            np.testing.assert_array_equal(made[0].y, made[1].y, err_msg=name)
-            assert made[0].y == pytest.approx(run.y, abs=1e-11)
+            runs = [sw.integrate(system, method, **start, backend=backend, form="matrix") for backend in ("rust", "numpy")]
+            np.testing.assert_array_equal(runs[0].y, runs[1].y, err_msg=name)
+            assert runs[0].y == pytest.approx(run.y, abs=1e-11)
 
 
 def test_large_own_equations() -> None:
@@ -164,11 +164,11 @@ def test_a_line_is_what_numpy_interpolates() -> None:
     times = np.linspace(-0.5, 2.5, 301)
     for values in (VALUES, np.random.default_rng(4).normal(size=(20, 3))):
         sampled = sw.Sampled(values, INTERVAL, 0.05, "linear")
-        found = np.array([sampled.signal().at(t) for t in times])
+        interpolated = np.array([sampled.signal().at(t) for t in times])
         rows = values.reshape(20, -1).T
-        expected = np.stack([np.interp(times, sampled.times, row) for row in rows], axis=-1).reshape(found.shape)
+        expected = np.stack([np.interp(times, sampled.times, row) for row in rows], axis=-1).reshape(interpolated.shape)
         # A slope times a time, and a sum: some roundings of values of a few units.
-        np.testing.assert_allclose(found, expected, atol=100 * EPS)
+        np.testing.assert_allclose(interpolated, expected, atol=100 * EPS)
 
 
 def test_cubics_go_through_the_samples_and_are_exact_for_polynomials_of_third_degree() -> None:
@@ -202,11 +202,11 @@ def test_few_samples(interpolation: Any, n: int) -> None:
     """Cubics of few samples are the polynomial through them, of as low a degree."""
     at = 0.25 * np.arange(n)
     polynomial = np.polynomial.Polynomial([1.0, 2.0, -1.0, 0.5][:n])
-    given = sw.Sampled(polynomial(at), 0.25, 0.0, interpolation)
-    run = sw.integrate(sw.Oscillator(a=given), "rk4", v=0.0, y=0.0, dt=0.05, steps=15)
+    sampled = sw.Sampled(polynomial(at), 0.25, 0.0, interpolation)
+    run = sw.integrate(sw.Oscillator(a=sampled), "rk4", v=0.0, y=0.0, dt=0.05, steps=15)
     assert np.isfinite(run.y).all()
     if interpolation == "cubic":
-        assert all(abs(given.signal().at(t) - polynomial(t)) < 1e-14 for t in np.linspace(0.0, at[-1], 9))
+        assert all(abs(sampled.signal().at(t) - polynomial(t)) < 1e-14 for t in np.linspace(0.0, at[-1], 9))
 
 
 def test_smooth_inputs_keep_the_order_of_a_method() -> None:
@@ -223,17 +223,17 @@ def test_smooth_inputs_keep_the_order_of_a_method() -> None:
 
 def test_jumps() -> None:
     """Held samples begin early by 2⁻⁴⁴ of the time since the first, as where they are looked up (HOLD_SLACK)."""
-    held = sw.Sampled([0.0, 0.0, 1.0, 1.0, -1.0], 0.5, 1.0)
+    sampled = sw.Sampled([0.0, 0.0, 1.0, 1.0, -1.0], 0.5, 1.0)
     begin = [1.0 + 1.0 / signal.HOLD_SLACK, 1.0 + 2.0 / signal.HOLD_SLACK]
-    np.testing.assert_array_equal(held.jumps(0.0, 9.0), begin)
-    np.testing.assert_array_equal(held.jumps(2.0, 2.9), [])
-    np.testing.assert_array_equal(held.jumps(*begin), begin)
+    np.testing.assert_array_equal(sampled.jumps(0.0, 9.0), begin)
+    np.testing.assert_array_equal(sampled.jumps(2.0, 2.9), [])
+    np.testing.assert_array_equal(sampled.jumps(*begin), begin)
     np.testing.assert_array_equal(sw.Sampled([0.0, 1.0, 4.0], 0.5, 1.0, "linear").jumps(0.0, 9.0), [1.0, 1.5, 2.0])
     assert not len(sw.Sampled([1.0, 1.0], 0.5, 0.0, "linear").jumps(-1.0, 9.0))
     assert not len(sw.Sinusoid(1.0, 2.0).jumps(0.0, 9.0))
-    system = pushed(push=held)
+    system = pushed(push=sampled)
     np.testing.assert_array_equal(system.jumps(0.0, 9.0), begin)
-    two = sw.Oscillator(a=held, x=sw.Sampled([[0.0, 0.0], [0.0, 1.0]], 2.0, 0.0))
+    two = sw.Oscillator(a=sampled, x=sw.Sampled([[0.0, 0.0], [0.0, 1.0]], 2.0, 0.0))
     np.testing.assert_array_equal(two.jumps(0.0, 9.0), [2.0 / signal.HOLD_SLACK, *begin])
     assert not len(sw.Pendulum().jumps(0.0, 9.0))
 

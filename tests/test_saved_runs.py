@@ -193,8 +193,8 @@ def test_a_function_that_is_found_nowhere_must_be_given(tmp_path: Path) -> None:
         ArgumentError, match=r"equations of your own, .*hidden, which are not in the file.*give them, system=hidden"
     ):
         sw.load(tmp_path / "run.npz")
-    for given in (hidden, hidden(k=3.0)):
-        back = sw.load(tmp_path / "run.npz", system=given)
+    for system in (hidden, hidden(k=3.0)):
+        back = sw.load(tmp_path / "run.npz", system=system)
         assert_equal_bits(back, run)  # with the parameter of the file
     again = sw.integrate(back.system, back.method, steps=10, resume=back)
     assert again.y[-1] == sw.integrate(hidden(k=2.0), "rk4", v=0.0, y=1.0, dt=0.1, steps=20).y[-1]
@@ -355,8 +355,8 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyt
     first = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=10)
     first.save(path)
 
-    def full(*given: Any, **named: Any) -> None:
-        given[0].write(b"half of it")
+    def full(*arguments: Any, **named: Any) -> None:
+        arguments[0].write(b"half of it")
         raise OSError("no space left")
 
     monkeypatch.setattr(np, "savez", full)

@@ -144,15 +144,15 @@ def test_memory_of_results_is_lent_again_when_nobody_uses_it() -> None:
 
 def test_memory_that_somebody_uses_is_not_lent() -> None:
     """A view, a view of a view and an export of its memory keep what they show."""
-    kept = []
+    views = []
     for keep in (lambda y: y, lambda y: y[5:][::2], lambda y: memoryview(y), lambda y: y.reshape(1, -1).T):
-        run = many(dt=0.01 * (1 + len(kept)))
-        kept.append((keep(run.y), np.array(keep(run.y))))
+        run = many(dt=0.01 * (1 + len(views)))
+        views.append((keep(run.y), np.array(keep(run.y))))
         del run
         gc.collect()
     for _ in range(3):
         many(dt=0.3)
-    for view, copy in kept:
+    for view, copy in views:
         np.testing.assert_array_equal(np.asarray(view), copy)
 
 

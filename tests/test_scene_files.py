@@ -31,13 +31,13 @@ def file(tmp_path: Path) -> str:
     return str(path)
 
 
-def told(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
+def report_of(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
     assert main([*words, "--json"]) == 0
     return json.loads(capsys.readouterr().out)
 
 
 def test_run(file: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    report = told(capsys, "run", file, "--method", "rk4", "--dt", "0.01", "-o", str(tmp_path / "run.png"))
+    report = report_of(capsys, "run", file, "--method", "rk4", "--dt", "0.01", "-o", str(tmp_path / "run.png"))
     scene = sw.scenes.scene(file)
     assert scene.name == report["scene"] == "my_scene"
     assert report["last_y"] == sw.integrate(scene.system, "rk4", v=0.0, y=1.0, dt=0.01, steps=500).y[-1]
@@ -45,7 +45,7 @@ def test_run(file: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> N
 
 
 def test_advise_and_explain(file: str, capsys: pytest.CaptureFixture[str]) -> None:
-    advice = told(capsys, "advise", file, "--tolerance", "1e-3")
+    advice = report_of(capsys, "advise", file, "--tolerance", "1e-3")
     assert advice["best"]["error"] <= 1e-3
     assert main(["explain", file, "rk4"]) == 0
     assert "gamma" in capsys.readouterr().out
@@ -67,7 +67,7 @@ def test_several_scenes_are_told_apart(tmp_path: Path, file: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("x = 1\n", r"makes no Scene; write scene = sw\.Scene"),
         ("1 / 0\n", r"cannot be run: ZeroDivisionError: division by zero"),
@@ -75,10 +75,10 @@ def test_several_scenes_are_told_apart(tmp_path: Path, file: str) -> None:
         ("import stepwell as sw\nscene = sw.Scene(sw.Pendulum(), v=0.0)\n", r"y: expected the coordinates"),
     ],
 )
-def test_what_is_wrong_with_a_file(text: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_wrong_with_a_file(text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "wrong.py"
     path.write_text(text)
-    with pytest.raises(ArgumentError, match=said):
+    with pytest.raises(ArgumentError, match=message):
         sw.scenes.scene(str(path))
     assert main(["run", str(path), "--method", "rk4"]) == 2
     assert capsys.readouterr().err.startswith("stepwell: ")

@@ -58,8 +58,8 @@ def test_the_scenes_are_the_files_in_the_folder():
 
 @every_scene
 def test_a_scene_is_found_by_its_name(scene):
-    found = sw.scenes.scene(scene.name)
-    assert (found.name, repr(found)) == (scene.name, repr(scene))
+    same = sw.scenes.scene(scene.name)
+    assert (same.name, repr(same)) == (scene.name, repr(scene))
     assert repr(getattr(sw.scenes, scene.name)()) == repr(scene)
     assert sw.scenes.scene(scene) is scene
 
@@ -96,11 +96,11 @@ def test_the_exact_solution_satisfies_the_equations_of_motion(scene):
         (v0, v, v1), (y0, y, y1) = scene.exact(np.array([t - e, t, t + e]))
         if scene.system.contacts and not y[..., -1].all():
             continue  # the floor holds it
-        for wanted, found, scale in (
+        for wanted, difference, scale in (
             (rates.dv(t, v, y) / e, (v1 - v0) / (2 * e), scene.scales[0]),
             (rates.dy(t, v, y) / e, (y1 - y0) / (2 * e), scene.scales[1]),
         ):
-            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-8 * scale / scene.dt)
+            np.testing.assert_allclose(difference, wanted, rtol=0, atol=1e-8 * scale / scene.dt)
 
 
 @every_gentle
@@ -250,8 +250,8 @@ def test_the_series_agrees_with_keplers_equation(e):
     scene = sw.scenes.kepler(e=e, share=0.25)
     t = np.linspace(0.0, scene.horizon, 400)
     series = Orbit(scene.system.masses.tolist(), scene.v, scene.y)(t)
-    for found, wanted, scale in zip(series, scene.exact(t), scene.scales, strict=True):
-        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-10 * scale)
+    for state, wanted, scale in zip(series, scene.exact(t), scene.scales, strict=True):
+        np.testing.assert_allclose(state, wanted, rtol=0, atol=1e-10 * scale)
 
 
 def test_runge_kutta_follows_keplers_ellipse_to_its_order():
@@ -283,8 +283,8 @@ def test_the_reference_does_not_depend_on_its_tolerance():
     scene = KEPT["pythagorean"]
     t = np.linspace(0.0, 10.0, 400)
     loose = Orbit([3.0, 4.0, 5.0], scene.v, scene.y, tolerance=1e-22)
-    for found, wanted in zip(loose(t), scene.exact(t), strict=True):
-        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-13)
+    for state, wanted in zip(loose(t), scene.exact(t), strict=True):
+        np.testing.assert_allclose(state, wanted, rtol=0, atol=1e-13)
     assert loose.steps < 0.7 * scene.exact.steps
 
 
@@ -399,8 +399,8 @@ def test_arenstorfs_orbit_is_that_of_the_facts():
     np.testing.assert_allclose(v[-1], [0.0, -2.00158510637908252240537862224], rtol=0, atol=1e-10)
     np.testing.assert_allclose(scene.system.energy(v.T, y.T), scene.system.energy(scene.v, scene.y), rtol=1e-13)
     loose = TurningOrbit(float(scene.system.mu), scene.v, scene.y, tolerance=1e-22)
-    for found, wanted in zip(loose(t), (v, y), strict=True):
-        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-13)
+    for state, wanted in zip(loose(t), (v, y), strict=True):
+        np.testing.assert_allclose(state, wanted, rtol=0, atol=1e-13)
 
 
 def test_runge_kutta_follows_arenstorfs_orbit_to_its_order():
@@ -474,10 +474,10 @@ def test_the_documents_own_start_meets_in_a_step():
 def test_three_bodies_that_meet_at_the_centre_are_reported():
     """ε = 0: what the user sees is the step, and the states up to it."""
     scene = sw.scenes.energy_control(eps=0.0, form="printed")
-    with pytest.warns(sw.DivergenceWarning, match=r"^the run diverged at step \d+ \(t = [\d.]+\), by standard_euler") as told:
+    with pytest.warns(sw.DivergenceWarning, match=r"^the run diverged at step \d+ \(t = [\d.]+\), by standard_euler") as caught:
         run = scene.run("standard_euler", steps=10_000, every=1)
     step = int(run.first_bad_step)
-    assert f"step {step} " in str(told[0].message)
+    assert f"step {step} " in str(caught[0].message)
     assert np.isfinite(run.y[:step]).all()
     assert not (np.isfinite(run.y[step]).all() and np.isfinite(run.v[step]).all())
 

@@ -52,11 +52,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert {"-n", "-W"} <= set(recipe.split()), "warnings are errors"
     proxies = {name: NOWHERE for each in ("http_proxy", "https_proxy", "all_proxy") for name in (each, each.upper())}
     # The package under test, whatever else is installed; an empty entry of the path would be the folder of the copy.
-    found = os.pathsep.join([str(Path(sw.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    pythonpath = os.pathsep.join([str(Path(sw.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run(
         [sys.executable, "-m", "sphinx", *recipe.split(), "docs", "built"],
         cwd=tree,
-        env=os.environ | proxies | {"PYTHONPATH": found, "no_proxy": "127.0.0.1,localhost", "MPLBACKEND": "agg"},
+        env=os.environ | proxies | {"PYTHONPATH": pythonpath, "no_proxy": "127.0.0.1,localhost", "MPLBACKEND": "agg"},
         capture_output=True,
         text=True,
         check=False,
@@ -78,14 +78,14 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        given = {name: value or "" for name, value in attrs}
-        if "id" in given:
-            self.places.add(given["id"])
-        if tag == "a" and "href" in given:
-            self.links.append(given["href"])
-        if LOADS.get(tag) in given:
-            self.loads.append(given[LOADS[tag]])
-        self.frames += [given["srcdoc"]] if "srcdoc" in given else []
+        attributes = {name: value or "" for name, value in attrs}
+        if "id" in attributes:
+            self.places.add(attributes["id"])
+        if tag == "a" and "href" in attributes:
+            self.links.append(attributes["href"])
+        if LOADS.get(tag) in attributes:
+            self.loads.append(attributes[LOADS[tag]])
+        self.frames += [attributes["srcdoc"]] if "srcdoc" in attributes else []
 
 
 @cache
@@ -95,14 +95,14 @@ def read(path: Path) -> Page:
 
 def from_the_web(site: Path) -> list[str]:
     """Everything that a page, a style or a frame within a page would load from the web."""
-    found = []
+    addresses = []
     for path in site.rglob("*.html"):
         pages = [read(path), *map(Page, read(path).frames)]
-        found += [f"{path.name}: {load[:80]}" for page in pages for load in page.loads if re.match(r"(https?:)?//", load)]
+        addresses += [f"{path.name}: {load[:80]}" for page in pages for load in page.loads if re.match(r"(https?:)?//", load)]
     for path in site.rglob("*.css"):
         style = path.read_text(encoding="utf-8")
-        found += [f"{path.name}: {load}" for load in re.findall(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^)\"']*)", style)]
-    return found
+        addresses += [f"{path.name}: {load}" for load in re.findall(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^)\"']*)", style)]
+    return addresses
 
 
 def test_nothing_is_loaded_from_the_web(site: Path) -> None:
@@ -118,7 +118,7 @@ def test_what_is_loaded_from_the_web_is_found(tmp_path: Path) -> None:
 
 def lost(site: Path) -> list[str]:
     """Links and pictures that lead nowhere: to a file or a place in it that is not there, or to no proper address."""
-    found = []
+    broken = []
     for path in site.rglob("*.html"):
         page = read(path)
         for link in page.links + page.loads:
@@ -133,8 +133,8 @@ def lost(site: Path) -> list[str]:
                     not parts.fragment or target.suffix != ".html" or unquote(parts.fragment) in read(target).places
                 )
             if not good:
-                found.append(f"{path.relative_to(site)}: {link}")
-    return found
+                broken.append(f"{path.relative_to(site)}: {link}")
+    return broken
 
 
 def test_links_lead_somewhere(site: Path) -> None:
@@ -151,8 +151,8 @@ def test_a_lost_link_is_found(tmp_path: Path) -> None:
 def thumbnails(site: Path) -> list[Path]:
     """The pages of the gallery's thumbnails."""
     text = (site / "gallery" / "index.html").read_text(encoding="utf-8")
-    found = re.findall(r'<div class="sphx-glr-thumbcontainer".*?<a[^>]* href="([^"#]*)', text, re.DOTALL)
-    return [site / "gallery" / link for link in found]
+    links = re.findall(r'<div class="sphx-glr-thumbcontainer".*?<a[^>]* href="([^"#]*)', text, re.DOTALL)
+    return [site / "gallery" / link for link in links]
 
 
 def test_every_picture_of_the_gallery_has_its_script_and_notebook(site: Path) -> None:
@@ -177,10 +177,10 @@ def test_every_picture_of_the_gallery_has_its_script_and_notebook(site: Path) ->
 def test_a_gallery_page_says_what_it_shows() -> None:
     """A title, and one to three sentences."""
     for script in (ROOT / "examples").glob("*/*.py"):
-        title, line, _, *told = script.read_text(encoding="utf-8").partition('"""')[2].partition('"""')[0].splitlines()
+        title, line, _, *description = script.read_text(encoding="utf-8").partition('"""')[2].partition('"""')[0].splitlines()
         assert re.fullmatch("=+", line), script.name
         assert len(title) == len(line), script.name
-        assert 40 < len(" ".join(told)) < 600, script.name
+        assert 40 < len(" ".join(description)) < 600, script.name
 
 
 def test_every_tutorial_ends_in_a_picture_or_an_animation(site: Path) -> None:

@@ -45,8 +45,8 @@ def lotka_volterra(t: Any, z: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
 def event(function: Callable[..., Any], **attributes: Any) -> Any:
     """An event function with attributes of its own."""
 
-    def copy(*given: Any) -> Any:
-        return function(*given)
+    def copy(*arguments: Any) -> Any:
+        return function(*arguments)
 
     for name, value in attributes.items():
         setattr(copy, name, value)
@@ -106,12 +106,12 @@ sol = solve_ivp(lotkavolterra, [0, 15], [10, 5], args=(1.5, 1, 3, 1), dense_outp
 @pytest.mark.parametrize("which", SCRIPTS)
 def test_scipys_examples_run_by_one_import(which: str) -> None:
     pytest.importorskip("scipy")
-    made = {}
+    results = {}
     for package in ("scipy.integrate", "stepwell"):
         namespace: dict[str, Any] = {}
         exec(f"from {package} import solve_ivp\n{SCRIPTS[which]}", namespace)
-        made[package] = namespace["sol"]
-    theirs, mine = made["scipy.integrate"], made["stepwell"]
+        results[package] = namespace["sol"]
+    theirs, mine = results["scipy.integrate"], results["stepwell"]
     assert set(mine) == set(theirs)
     for name in ("status", "message", "success", "njev", "nlu"):
         assert mine[name] == theirs[name]
@@ -130,13 +130,13 @@ def test_scipys_examples_run_by_one_import(which: str) -> None:
 
 
 def test_the_result_is_a_dictionary_with_attributes() -> None:
-    found = sw.solve_ivp(decay, (0, 1), [1.0])
-    assert found["t"] is found.t
-    assert {"t", "y", "sol"} <= set(dir(found))
+    result = sw.solve_ivp(decay, (0, 1), [1.0])
+    assert result["t"] is result.t
+    assert {"t", "y", "sol"} <= set(dir(result))
     with pytest.raises(AttributeError, match="nothing"):
-        _ = found.nothing
-    assert repr(found).splitlines()[0].split() == ["message:", *found.message.split()]
-    assert max(map(len, repr(found).splitlines())) < 120
+        _ = result.nothing
+    assert repr(result).splitlines()[0].split() == ["message:", *result.message.split()]
+    assert max(map(len, repr(result).splitlines())) < 120
 
 
 def test_backward_in_time() -> None:
@@ -186,32 +186,32 @@ def test_states_are_those_of_a_run_to_the_bit() -> None:
 
 
 def test_sol_is_refused_outside_its_steps() -> None:
-    found = sw.solve_ivp(decay, (0, 1), [1.0, 2.0], dense_output=True)
-    assert found.sol(0.5).shape == (2,)
-    assert found.sol([0.5]).shape == (2, 1)
-    assert found.sol([]).shape == (2, 0)
-    assert (found.sol.t_min, found.sol.t_max) == (0.0, 1.0)
+    result = sw.solve_ivp(decay, (0, 1), [1.0, 2.0], dense_output=True)
+    assert result.sol(0.5).shape == (2,)
+    assert result.sol([0.5]).shape == (2, 1)
+    assert result.sol([]).shape == (2, 0)
+    assert (result.sol.t_min, result.sol.t_max) == (0.0, 1.0)
     for wrong in (-1e-9, 1.0 + 1e-9, [0.5, 2.0]):
         with pytest.raises(ArgumentError, match="t: expected times from 0 to 1, between which there are steps"):
-            found.sol(wrong)
+            result.sol(wrong)
     with pytest.raises(ShapeError, match="t: expected a time, or times along one axis"):
-        found.sol([[0.5]])
+        result.sol([[0.5]])
 
 
 @pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.error_order is not None])
 def test_a_state_within_a_step_is_as_good_as_at_its_end(method: str) -> None:
     """Turning keeps lengths, so errors only add up: N steps and an extra one err by no more than (N + 1) tolerances."""
     rtol, atol = 1e-8, 1e-12
-    found = sw.solve_ivp(turning, (0, 10), [1.0, 0.0], method=method, dense_output=True, rtol=rtol, atol=atol)
+    result = sw.solve_ivp(turning, (0, 10), [1.0, 0.0], method=method, dense_output=True, rtol=rtol, atol=atol)
     t = np.linspace(0, 10, 301)
-    error = np.linalg.norm(found.sol(t) - [np.cos(t), -np.sin(t)], axis=0)
+    error = np.linalg.norm(result.sol(t) - [np.cos(t), -np.sin(t)], axis=0)
     # The estimate is of the result with which these methods go on, or of a lower order and so larger.
-    assert error.max() < (len(found.t) + 1) * (rtol + np.sqrt(2) * atol)
+    assert error.max() < (len(result.t) + 1) * (rtol + np.sqrt(2) * atol)
     # A cubic polynomial through both ends and their rates, which would cost nothing, is not as good.
-    i = np.clip(np.searchsorted(found.t, t, side="right") - 1, 0, len(found.t) - 2)
-    h = found.t[i + 1] - found.t[i]
-    s = (t - found.t[i]) / h
-    a, b = found.y[:, i], found.y[:, i + 1]
+    i = np.clip(np.searchsorted(result.t, t, side="right") - 1, 0, len(result.t) - 2)
+    h = result.t[i + 1] - result.t[i]
+    s = (t - result.t[i]) / h
+    a, b = result.y[:, i], result.y[:, i + 1]
     rates_a, rates_b = np.array([a[1], -a[0]]), np.array([b[1], -b[0]])
     cubic = (
         (1 + 2 * s) * (1 - s) ** 2 * a + s * (1 - s) ** 2 * h * rates_a + s * s * (3 - 2 * s) * b - s * s * (1 - s) * h * rates_b
@@ -243,11 +243,11 @@ def test_a_zero_is_found_to_four_roundings(g: Callable[[float], float], a: float
         calls.append(x)
         return float(g(x))
 
-    found = root(counted, a, b, counted(a), counted(b))
+    solution = root(counted, a, b, counted(a), counted(b))
     if "** 9" in inspect.getsource(g) and zero == 1 / 3:
-        assert abs(found - zero) < 1e-5  # where the power underflows it is zero all around
+        assert abs(solution - zero) < 1e-5  # where the power underflows it is zero all around
     else:
-        assert abs(found - zero) <= ROOT_TOLERANCE * (1.0 + abs(zero)) + 2 * EPS * abs(zero)
+        assert abs(solution - zero) <= ROOT_TOLERANCE * (1.0 + abs(zero)) + 2 * EPS * abs(zero)
     assert len(calls) < 150
 
 
@@ -270,20 +270,20 @@ def height(t: Any, y: Any) -> Any:
 def test_events_lie_where_they_do() -> None:
     """The zeros of the cosine: at each the error is that of the state, at most a tolerance a step, over the slope, which is 1."""
     rtol, atol = 1e-10, 1e-13
-    found = sw.solve_ivp(turning, (0, 20), [1.0, 0.0], events=height, rtol=rtol, atol=atol)
+    result = sw.solve_ivp(turning, (0, 20), [1.0, 0.0], events=height, rtol=rtol, atol=atol)
     true = np.pi * (np.arange(6) + 0.5)
-    bound = (len(found.t) + 1) * (rtol + np.sqrt(2) * atol)
-    assert found.t_events is not None
-    assert found.t_events[0].shape == true.shape
-    assert np.abs(found.t_events[0] - true).max() < bound
-    assert found.y_events[0].shape == (6, 2)
-    assert np.abs(found.y_events[0][:, 0]).max() < 100 * EPS
+    bound = (len(result.t) + 1) * (rtol + np.sqrt(2) * atol)
+    assert result.t_events is not None
+    assert result.t_events[0].shape == true.shape
+    assert np.abs(result.t_events[0] - true).max() < bound
+    assert result.y_events[0].shape == (6, 2)
+    assert np.abs(result.y_events[0][:, 0]).max() < 100 * EPS
     # A straight line between the ends of the steps would not find them.
-    i = np.flatnonzero(np.diff(np.sign(found.y[0])))
-    line = found.t[i] - found.y[0, i] * np.diff(found.t)[i] / np.diff(found.y[0])[i]
+    i = np.flatnonzero(np.diff(np.sign(result.y[0])))
+    line = result.t[i] - result.y[0, i] * np.diff(result.t)[i] / np.diff(result.y[0])[i]
     assert np.abs(line - true).max() > 1000 * bound
     # Events change no step.
-    np.testing.assert_array_equal(found.y, sw.solve_ivp(turning, (0, 20), [1.0, 0.0], rtol=rtol, atol=atol).y)
+    np.testing.assert_array_equal(result.y, sw.solve_ivp(turning, (0, 20), [1.0, 0.0], rtol=rtol, atol=atol).y)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -291,10 +291,10 @@ def test_events_lie_where_they_do() -> None:
 def test_directions_and_ends(direction: int, which: list[int], sign: int) -> None:
     """In the order of the run, forward or backward; SciPy's directions are those of the run as well."""
     options: dict[str, Any] = {"t_span": (0, 20 * sign), "y0": [1.0, 0.0], "rtol": 1e-9}
-    found = sw.solve_ivp(turning, events=event(height, direction=direction), **options)
+    result = sw.solve_ivp(turning, events=event(height, direction=direction), **options)
     true = sign * np.pi * (np.array(which) + 0.5)
-    assert found.t_events[0] == pytest.approx(true, abs=1e-6)
-    assert found.status == 0
+    assert result.t_events[0] == pytest.approx(true, abs=1e-6)
+    assert result.status == 0
     for terminal in (True, 1, 2):
         ended = sw.solve_ivp(turning, events=event(height, direction=direction, terminal=terminal), dense_output=True, **options)
         last = true[int(terminal) - 1]
@@ -316,29 +316,29 @@ def test_events_of_one_step_come_in_their_order() -> None:
     events = [
         event(lambda t, y, at=at: y[0] - at, terminal=terminal) for at, terminal in ((3.0, True), (2.0, True), (1.0, False))
     ]
-    found = sw.solve_ivp(lambda t, y: [1.0], (0, 10), [0.0], events=events, first_step=5.0)
-    assert [len(each) for each in found.t_events] == [0, 1, 1]
-    assert [each.shape for each in found.y_events] == [(0, 1), (1, 1), (1, 1)]
-    assert found.t[-1] == pytest.approx(2.0, abs=1e-14)
-    assert found.t_events[2] == pytest.approx([1.0], abs=1e-14)
+    result = sw.solve_ivp(lambda t, y: [1.0], (0, 10), [0.0], events=events, first_step=5.0)
+    assert [len(each) for each in result.t_events] == [0, 1, 1]
+    assert [each.shape for each in result.y_events] == [(0, 1), (1, 1), (1, 1)]
+    assert result.t[-1] == pytest.approx(2.0, abs=1e-14)
+    assert result.t_events[2] == pytest.approx([1.0], abs=1e-14)
 
 
 def test_times_end_with_an_event() -> None:
     ground = event(height, terminal=True, direction=-1)
-    found = sw.solve_ivp(cannon, (0, 100), [0.0, 10.0], t_eval=np.arange(0.0, 100.0, 15.0), events=ground)
-    assert found.t.tolist() == [0.0, 15.0, 30.0]
+    result = sw.solve_ivp(cannon, (0, 100), [0.0, 10.0], t_eval=np.arange(0.0, 100.0, 15.0), events=ground)
+    assert result.t.tolist() == [0.0, 15.0, 30.0]
     # y = 10·t − t²/4 is exact but for rounding: it errs by some roundings of 100 near the ground, where its slope is −10.
-    assert found.y[0] == pytest.approx([0.0, 93.75, 75.0], abs=100 * 30 * EPS)
-    assert found.t_events[0] == pytest.approx([40.0], abs=100 * 30 * EPS / 10 + ROOT_TOLERANCE * 41)
+    assert result.y[0] == pytest.approx([0.0, 93.75, 75.0], abs=100 * 30 * EPS)
+    assert result.t_events[0] == pytest.approx([40.0], abs=100 * 30 * EPS / 10 + ROOT_TOLERANCE * 41)
 
 
 def test_an_event_gets_the_arguments() -> None:
     def above(t: float, z: Any, a: float, b: float, c: float, d: float) -> float:
         return z[0] - c
 
-    found = sw.solve_ivp(lotka_volterra, (0, 15), [10, 5], args=(1.5, 1, 3, 1), events=above, rtol=1e-8)
-    assert len(found.t_events[0]) > 2
-    assert np.abs(found.y_events[0][:, 0] - 3).max() < 1e-12
+    result = sw.solve_ivp(lotka_volterra, (0, 15), [10, 5], args=(1.5, 1, 3, 1), events=above, rtol=1e-8)
+    assert len(result.t_events[0]) > 2
+    assert np.abs(result.y_events[0][:, 0] - 3).max() < 1e-12
 
 
 # ---- what is traced
@@ -385,14 +385,14 @@ WAYS: dict[str, tuple[Any, dict[str, Any]]] = {
 @pytest.mark.parametrize("way", WAYS)
 def test_any_callable_is_traced(way: str) -> None:
     fun, options = WAYS[way]
-    found = sw.solve_ivp(fun, (0, 5), [1.0, 0.0], rtol=1e-9, atol=1e-12, t_eval=[5.0], **options)
+    result = sw.solve_ivp(fun, (0, 5), [1.0, 0.0], rtol=1e-9, atol=1e-12, t_eval=[5.0], **options)
     run = sw.integrate(sw.Pendulum(np.sqrt(2.0)), "dop853", v=0.0, y=1.0, tolerance=1e-12, at=[5.0])
-    assert found.y[:, 0] == pytest.approx([run.y[-1], run.v[-1]], abs=1e-6)
+    assert result.y[:, 0] == pytest.approx([run.y[-1], run.v[-1]], abs=1e-6)
 
 
 def test_a_single_number_may_be_returned() -> None:
-    found = sw.solve_ivp(lambda t, y: -0.5 * y[0], (0, 1), [1.0], rtol=1e-9, atol=1e-12)
-    assert found.y[0, -1] == pytest.approx(np.exp(-0.5), abs=1e-8)
+    result = sw.solve_ivp(lambda t, y: -0.5 * y[0], (0, 1), [1.0], rtol=1e-9, atol=1e-12)
+    assert result.y[0, -1] == pytest.approx(np.exp(-0.5), abs=1e-8)
 
 
 def test_the_line_that_cannot_be_traced_is_named() -> None:
@@ -411,8 +411,8 @@ def test_the_line_that_cannot_be_traced_is_named() -> None:
 def test_steps_can_be_limited() -> None:
     free = sw.solve_ivp(decay, (0, 10), [1.0])
     assert np.diff(free.t).max() > 1.0
-    held = sw.solve_ivp(decay, (0, 10), [1.0], max_step=0.25)
-    assert np.diff(held.t).max() <= 0.25 + np.spacing(10.0)  # each time is rounded by half of that
+    limited = sw.solve_ivp(decay, (0, 10), [1.0], max_step=0.25)
+    assert np.diff(limited.t).max() <= 0.25 + np.spacing(10.0)  # each time is rounded by half of that
     first = sw.solve_ivp(decay, (0, 10), [1.0], first_step=0.3)
     assert first.t[1] == 0.3
     assert sw.solve_ivp(decay, (0, 10), [1.0], first_step=5.0, max_step=0.5).t[1] == 0.5
@@ -436,29 +436,29 @@ def test_two_zeros_within_a_step_are_found() -> None:
 def test_a_state_that_ends_is_told() -> None:
     """y = 1/(1 − t) ends at t = 1; the states before it are returned."""
     for options in ({}, {"t_eval": [0.0, 0.5, 0.9, 1.5]}, {"dense_output": True}):
-        found = sw.solve_ivp(lambda t, y: y * y, (0, 2), [1.0], rtol=1e-6, **options)  # type: ignore[arg-type]
-        assert (found.status, found.success) == (-1, False)
-        assert found.message in {
+        result = sw.solve_ivp(lambda t, y: y * y, (0, 2), [1.0], rtol=1e-6, **options)  # type: ignore[arg-type]
+        assert (result.status, result.success) == (-1, False)
+        assert result.message in {
             "Required step size is less than spacing between numbers.",
             "No step, however short, gives a finite state.",
         }
-        assert 0.9 <= found.t[-1] <= 1.01
-        assert found.y.shape == (1, len(found.t))
-        assert np.isfinite(found.y).all()
-    assert found.sol(0.5) == pytest.approx([2.0], rel=1e-3)
+        assert 0.9 <= result.t[-1] <= 1.01
+        assert result.y.shape == (1, len(result.t))
+        assert np.isfinite(result.y).all()
+    assert result.sol(0.5) == pytest.approx([2.0], rel=1e-3)
 
 
 def test_no_time_at_all() -> None:
     for options in ({}, {"t_eval": [1.0]}, {"dense_output": True}, {"events": height}):
-        found = sw.solve_ivp(decay, (1.0, 1.0), [2.0], **options)  # type: ignore[arg-type]
-        assert found.success
-        assert found.t.tolist() == [1.0]
-        assert found.y.tolist() == [[2.0]]
+        result = sw.solve_ivp(decay, (1.0, 1.0), [2.0], **options)  # type: ignore[arg-type]
+        assert result.success
+        assert result.t.tolist() == [1.0]
+        assert result.y.tolist() == [[2.0]]
 
 
 def test_the_absolute_tolerance_may_be_zero_or_several() -> None:
-    found = sw.solve_ivp(decay, (0, 10), [1.0, 2.0], rtol=1e-9, atol=0.0)
-    assert found.y[:, -1] == pytest.approx(np.exp(-5.0) * np.array([1.0, 2.0]), rel=1e-7)
+    result = sw.solve_ivp(decay, (0, 10), [1.0, 2.0], rtol=1e-9, atol=0.0)
+    assert result.y[:, -1] == pytest.approx(np.exp(-5.0) * np.array([1.0, 2.0]), rel=1e-7)
     several = sw.solve_ivp(decay, (0, 10), [1.0, 2.0], rtol=[1e-3, 1e-6], atol=[1e-6, 1e-9])
     np.testing.assert_array_equal(several.y, sw.solve_ivp(decay, (0, 10), [1.0, 2.0], rtol=1e-6, atol=1e-9).y)
     with pytest.warns(ToleranceWarning, match="rtol: 1e-20 is too small"):
@@ -482,10 +482,10 @@ def test_methods_that_are_not_here_are_never_replaced(name: str) -> None:
     match = (
         f"method: {name.upper() if name == 'rk45' else name} is .* here.*{'stay with SciPy' if stiff else 'write one of these: '}"
     )
-    with pytest.raises(UnknownNameError, match=match) as told:
+    with pytest.raises(UnknownNameError, match=match) as caught:
         sw.solve_ivp(decay, (0, 10), [1.0], name)
     able = [m.name for m in sw.methods() if m.error_order is not None]
-    assert all(repr(each) in str(told.value) for each in able)
+    assert all(repr(each) in str(caught.value) for each in able)
     scipy = pytest.importorskip("scipy.integrate")
     with pytest.raises(UnknownNameError, match=match):
         sw.solve_ivp(decay, (0, 10), [1.0], getattr(scipy, name.upper() if name == "rk45" else name))
@@ -540,11 +540,11 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
 
 
 @pytest.mark.parametrize(
-    ("given", "error", "match"), WRONG, ids=[f"{next(iter(given))} {i}" for i, (given, _, _) in enumerate(WRONG)]
+    ("arguments", "error", "match"), WRONG, ids=[f"{next(iter(arguments))} {i}" for i, (arguments, _, _) in enumerate(WRONG)]
 )
-def test_wrong_calls(given: dict[str, Any], error: type[Exception], match: str) -> None:
+def test_wrong_calls(arguments: dict[str, Any], error: type[Exception], match: str) -> None:
     with pytest.raises(error, match=match):
-        sw.solve_ivp(**RIGHT | given)
+        sw.solve_ivp(**RIGHT | arguments)
 
 
 def test_arguments_of_implicit_methods_are_of_no_use() -> None:

@@ -33,9 +33,9 @@ def accelerations(system: sw.Springs, v: Any, y: Any) -> Any:
         force[j] -= pull
     if system.drag is not None:
         force -= np.broadcast_to(system.drag, system.n)[:, np.newaxis] * v
-    found = force / masses[:, np.newaxis] + (0.0 if system.gravity is None else system.gravity)
-    found[system.fixed] = 0.0
-    return found
+    rates = force / masses[:, np.newaxis] + (0.0 if system.gravity is None else system.gravity)
+    rates[system.fixed] = 0.0
+    return rates
 
 
 VARIANTS: list[dict[str, Any]] = [
@@ -63,10 +63,10 @@ def off(system: sw.Springs, v: Any, y: Any) -> float:
     return worst
 
 
-@pytest.mark.parametrize("given", VARIANTS)
-def test_forces_are_those_of_the_formula_and_of_the_energy(given: dict[str, Any]) -> None:
+@pytest.mark.parametrize("options", VARIANTS)
+def test_forces_are_those_of_the_formula_and_of_the_energy(options: dict[str, Any]) -> None:
     """To rounding: some 16 terms of at most 10; differences of the energy to 1e-10, and a thousandth of that counts."""
-    system, state = tangled(1, 7, 3, 16, **given)
+    system, state = tangled(1, 7, 3, 16, **options)
     assert off(system, **state) < 100 * 16 * 10 * EPS
 
 
@@ -101,7 +101,7 @@ def test_mistakes_are_noticed(monkeypatch: pytest.MonkeyPatch, old: str, new: st
     mutant.__package__ = reference.__package__
     exec(compile(source.replace(old, new), "mutant", "exec"), vars(mutant))
     variants = [*VARIANTS, {"gravity": (0.3, -1.0, 0.2)}]
-    nets = [tangled(1, 7, 3, 16, **given) for given in variants]
+    nets = [tangled(1, 7, 3, 16, **options) for options in variants]
     assert max(off(system, **state) for system, state in nets) < 1e-10
     monkeypatch.setattr(sw.Springs, "reference", mutant.Springs)
     worst = []
@@ -155,15 +155,15 @@ def test_the_order_of_sums_is_that_of_the_springs(dim: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "given", [{}, {"damping": 0.1}, {"damping": 0.1, "drag": 0.2, "gravity": (0.0, -1.0, 0.3), "masses": 0.5}]
+    "options", [{}, {"damping": 0.1}, {"damping": 0.1, "drag": 0.2, "gravity": (0.0, -1.0, 0.3), "masses": 0.5}]
 )
 @pytest.mark.parametrize("dim", [2, 3])
-def test_a_large_net_has_the_bits_of_the_reference(given: dict[str, Any], dim: int) -> None:
+def test_a_large_net_has_the_bits_of_the_reference(options: dict[str, Any], dim: int) -> None:
     """One by vectors of springs, a batch by tapes of its rates; in rows of 13, so that runs end everywhere in a vector."""
     pairs, layout = lattice(17, 13, dim, diagonals=True)
     rng = np.random.default_rng(2)
-    given = given | ({"gravity": given["gravity"][:dim]} if "gravity" in given else {})
-    system = sw.Springs(pairs, stiffness=rng.uniform(5.0, 9.0, len(pairs)), layout=layout, fixed=[0, 12], **given)
+    options = options | ({"gravity": options["gravity"][:dim]} if "gravity" in options else {})
+    system = sw.Springs(pairs, stiffness=rng.uniform(5.0, 9.0, len(pairs)), layout=layout, fixed=[0, 12], **options)
     y = layout[..., np.newaxis] + 0.1 * rng.normal(size=(*layout.shape, 6))
     arguments: dict[str, Any] = {"v": 0.0, "dt": 0.01, "steps": 60, "every": 20}
     record = ["energy", "momentum", "stretch"]
@@ -249,8 +249,8 @@ def test_momentum_is_constant(method: str) -> None:
     started = (system.masses[:, np.newaxis] * state["v"]).sum(axis=0)
     np.testing.assert_allclose(p[0], started, rtol=0, atol=12 * EPS * 10 + carried)
     np.testing.assert_allclose(p[-1], p[0], rtol=0, atol=steps * (40 * EPS * 10 * sw.method(method).evaluations + carried))
-    held = sw.Springs(system.pairs, stiffness=system.stiffness, rest=system.rest, masses=system.masses, fixed=[0])
-    other = sw.integrate(held, method, **state, dt=h, steps=steps, every=steps, record="momentum").recorded["momentum"]
+    fixed = sw.Springs(system.pairs, stiffness=system.stiffness, rest=system.rest, masses=system.masses, fixed=[0])
+    other = sw.integrate(fixed, method, **state, dt=h, steps=steps, every=steps, record="momentum").recorded["momentum"]
     assert np.abs(other[-1] - other[0]).max() > 1e-3  # what holds a particle has the rest
 
 
@@ -361,11 +361,11 @@ def test_what_is_not_finite_stays_so() -> None:
 
 def test_an_undamped_net_takes_energy_control_and_a_damped_one_does_not() -> None:
     pairs, layout = lattice(3, 3, diagonals=True)
-    given: dict[str, Any] = {"stiffness": 20.0, "layout": layout, "fixed": [0, 2], "gravity": (0.0, 0.0, -1.0)}
+    options: dict[str, Any] = {"stiffness": 20.0, "layout": layout, "fixed": [0, 2], "gravity": (0.0, 0.0, -1.0)}
     for columns in (3, 20):  # on a tape, and by vectors
         pairs, layout = lattice(columns, columns, diagonals=True)
-        given |= {"layout": layout, "fixed": [0, columns - 1]}
-        net = sw.Springs(pairs, **given)
+        options |= {"layout": layout, "fixed": [0, columns - 1]}
+        net = sw.Springs(pairs, **options)
         for way in ("scaling", "nacozy"):
             arguments: dict[str, Any] = {"v": 0.0, "y": 1.01 * layout, "dt": 0.02, "steps": 50, "record": "energy"}
             runs = [
@@ -376,14 +376,14 @@ def test_an_undamped_net_takes_energy_control_and_a_damped_one_does_not() -> Non
             start = net.energy(np.zeros_like(layout), 1.01 * layout)
             assert runs[0].recorded["energy"][-1] == pytest.approx(float(start), rel=1e-3)
     with pytest.raises(UnsupportedError, match="loses energy by its damping"):
-        sw.integrate(sw.Springs(pairs, **given, damping=0.1), "rk4", v=0.0, y=layout, dt=0.1, steps=1, control=sw.Projection())
+        sw.integrate(sw.Springs(pairs, **options, damping=0.1), "rk4", v=0.0, y=layout, dt=0.1, steps=1, control=sw.Projection())
 
 
 # ---- wrong arguments
 
 
 @pytest.mark.parametrize(
-    ("given", "error", "said"),
+    ("arguments", "error", "message"),
     [
         ({"pairs": []}, ShapeError, r"pairs: expected two whole numbers for each spring.*got shape \(0,\)"),
         ({"pairs": [(0, 1, 2)]}, ShapeError, r"pairs: .*got shape \(1, 3\)"),
@@ -419,9 +419,9 @@ def test_an_undamped_net_takes_energy_control_and_a_damped_one_does_not() -> Non
         ({"dim": 4}, ArgumentError, "dim: expected 1 to 3|dim: expected"),
     ],
 )
-def test_wrong_arguments(given: dict[str, Any], error: type[Exception], said: str) -> None:
-    with pytest.raises(error, match=said):
-        sw.Springs(**{"pairs": [(0, 1), (1, 2)], "rest": 1.0} | given)
+def test_wrong_arguments(arguments: dict[str, Any], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        sw.Springs(**{"pairs": [(0, 1), (1, 2)], "rest": 1.0} | arguments)
 
 
 def test_wrong_states_and_uses() -> None:

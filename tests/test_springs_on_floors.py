@@ -39,17 +39,17 @@ def jelly(damping: float | None = None, floor: Any = None) -> tuple[sw.Springs, 
     turn, _ = np.linalg.qr(np.array([[1.0, 0.4, 0.2], [0.3, 1.0, -0.5], [-0.1, 0.6, 1.0]]))
     y = 0.1 * (at @ turn)
     y[:, 2] -= y[:, 2].min()
-    given: dict[str, Any] = {"stiffness": 100.0, "layout": y, "damping": damping, "masses": 0.02}
-    return sw.Springs(pairs, **given, gravity=(0.0, 0.0, -G), floor=floor), y
+    options: dict[str, Any] = {"stiffness": 100.0, "layout": y, "damping": damping, "masses": 0.02}
+    return sw.Springs(pairs, **options, gravity=(0.0, 0.0, -G), floor=floor), y
 
 
-def cloth(n: int, **given: Any) -> tuple[sw.Springs, Any]:
+def cloth(n: int, **options: Any) -> tuple[sw.Springs, Any]:
     """n × n particles, level, 1 wide."""
     at = np.arange(n * n).reshape(n, n)
     ends = [(at[:, :-1], at[:, 1:]), (at[:-1], at[1:]), (at[:-1, :-1], at[1:, 1:]), (at[:-1, 1:], at[1:, :-1])]
     pairs = np.concatenate([np.stack([i.ravel(), j.ravel()], axis=1) for i, j in ends])
     y = np.stack([(at % n) / (n - 1) - 0.5, (at // n) / (n - 1) - 0.5, 0.0 * at], axis=-1).reshape(-1, 3)
-    return sw.Springs(pairs, layout=y, masses=0.25 / n**2, gravity=(0.0, 0.0, -G), **given), y
+    return sw.Springs(pairs, layout=y, masses=0.25 / n**2, gravity=(0.0, 0.0, -G), **options), y
 
 
 FLOORS = {

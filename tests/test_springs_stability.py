@@ -18,18 +18,18 @@ LOSSES: list[dict[str, Any]] = [{}, {"damping": 0.6}, {"drag": 0.8}, {"damping":
 def with_losses() -> list[Any]:
     """Every method with every loss; the steps of a series go number by number, so most of its cases are for the long run."""
     return [
-        pytest.param(given, m.name, id=f"{m.name}-{i}", marks=pytest.mark.long if m.has_series and i != 0 else ())
-        for (i, given), m in itertools.product(enumerate(LOSSES), sw.methods())
+        pytest.param(losses, m.name, id=f"{m.name}-{i}", marks=pytest.mark.long if m.has_series and i != 0 else ())
+        for (i, losses), m in itertools.product(enumerate(LOSSES), sw.methods())
     ]
 
 
-@pytest.mark.parametrize(("given", "method"), with_losses())
-def test_the_safe_step_is_never_above_the_exact_limit(method: str, given: dict[str, Any]) -> None:
+@pytest.mark.parametrize(("losses", "method"), with_losses())
+def test_the_safe_step_is_never_above_the_exact_limit(method: str, losses: dict[str, Any]) -> None:
     """Of stretched nets in space, at two states each; ``stability_limit`` knows their eigenvalues."""
-    if given and sw.method(method).needs_acceleration:
+    if losses and sw.method(method).needs_acceleration:
         return
     for seed in (1,) if sw.method(method).has_series else (1, 2):
-        net, state = tangled(seed, 5, 3, 9, fixed=[0], **given)
+        net, state = tangled(seed, 5, 3, 9, fixed=[0], **losses)
         net = sw.Springs(
             **{name: getattr(net, name) for name in ("pairs", "stiffness", "masses", "fixed", "damping", "drag")}, rest=0.1
         )
@@ -46,19 +46,19 @@ def test_the_exact_limit_of_nets_that_drift_or_are_fixed_is_known() -> None:
     """A triangle at rest breathes with ω² = 3k/m, whichever way it drifts and turns; a mode has the shape of the net."""
     net = sw.Springs([(0, 1), (1, 2), (2, 0)], stiffness=np.array([[1.0, 4.0]]), rest=1.0)
     y = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, math.sqrt(0.75)]])
-    found = sw.stability_limit(net, "leapfrog", v=0.0, y=y)
-    np.testing.assert_allclose(found, 2.0 / np.sqrt([3.0, 12.0]), rtol=1e-9)
-    assert found.decided.all()
-    mode = found.modes[0].y
+    limits = sw.stability_limit(net, "leapfrog", v=0.0, y=y)
+    np.testing.assert_allclose(limits, 2.0 / np.sqrt([3.0, 12.0]), rtol=1e-9)
+    assert limits.decided.all()
+    mode = limits.modes[0].y
     assert mode.shape == (3, 2)
     out = y - y.mean(axis=0)
     assert abs(np.vdot(mode, out)) == pytest.approx(np.linalg.norm(mode) * np.linalg.norm(out), rel=1e-6)
-    held = sw.Springs([(0, 1)], stiffness=4.0, rest=1.0, fixed=[0])
-    limit = sw.stability_limit(held, "leapfrog", v=0.0, y=[[0.0, 0.0], [1.2, 0.0]])
+    fixed = sw.Springs([(0, 1)], stiffness=4.0, rest=1.0, fixed=[0])
+    limit = sw.stability_limit(fixed, "leapfrog", v=0.0, y=[[0.0, 0.0], [1.2, 0.0]])
     assert limit == pytest.approx(1.0, rel=1e-12)
     assert (limit.mode.y[0] == 0.0).all()
     with pytest.raises(UnsupportedError, match=r"give at=.* or ask its safe_step for a bound"):
-        sw.stability_limit(held, "leapfrog")
+        sw.stability_limit(fixed, "leapfrog")
 
 
 def test_a_lattice_needs_the_safe_step() -> None:

@@ -14,29 +14,29 @@ EPS = np.finfo(float).eps
 def test_the_pendulum_is_stiffest_where_it_hangs(method: str) -> None:
     """Where cos y > 0 the limit is that of an oscillator of ω₀²·cos y; the smallest is where y is nearest to 0."""
     run = sw.integrate(sw.Pendulum(1.5), "rk4", v=0.0, y=1.2, dt=0.01, steps=600, every=3)
-    found = sw.stability_along(run, method)
+    along = sw.stability_along(run, method)
     true = sw.method(method).limit / (1.5 * np.sqrt(np.cos(run.y)))
     # The square root halves what the cosine is off by: an ulp of 1 of 0.36 at least.
-    np.testing.assert_allclose(found.limits, true, rtol=1e-9 if method in ("verlet", "rk4", "merson") else 1e-12)
-    assert found.index == np.abs(run.y).argmin()
-    assert found.when == run.t[found.index]
-    assert found.dt == found.limits[found.index] == found.limits.min()
-    assert found.mode.rate == pytest.approx(1.5j * np.sqrt(np.cos(run.y[found.index])), abs=1e-12)
-    np.testing.assert_allclose(found.growth, 0.0, atol=1e-12)
-    assert not found.exceeded.any()
+    np.testing.assert_allclose(along.limits, true, rtol=1e-9 if method in ("verlet", "rk4", "merson") else 1e-12)
+    assert along.index == np.abs(run.y).argmin()
+    assert along.when == run.t[along.index]
+    assert along.dt == along.limits[along.index] == along.limits.min()
+    assert along.mode.rate == pytest.approx(1.5j * np.sqrt(np.cos(run.y[along.index])), abs=1e-12)
+    np.testing.assert_allclose(along.growth, 0.0, atol=1e-12)
+    assert not along.exceeded.any()
     # The limit at the mode: half a turn by the methods that keep volumes, and by Semi-False Heun.
     if method in ("false_euler", "leapfrog", "verlet", "pefrl", "semi_false_heun"):
-        assert found.mode.eigenvalue == pytest.approx(-1.0, abs=1e-6)
+        assert along.mode.eigenvalue == pytest.approx(-1.0, abs=1e-6)
 
 
 def test_what_grows_by_itself_does_not_count() -> None:
     """Above the horizontal the pendulum falls, and neither False Euler nor leapfrog has a limit there."""
     run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=3.0, dt=0.01, steps=200, every=10)
-    found = sw.stability_along(run, "leapfrog")
+    along = sw.stability_along(run, "leapfrog")
     falls = np.cos(run.y) < 0
     assert falls.any()
-    assert (found.limits[falls] == np.inf).all()
-    np.testing.assert_allclose(found.growth[falls], np.sqrt(-np.cos(run.y[falls])), rtol=1e-12)
+    assert (along.limits[falls] == np.inf).all()
+    np.testing.assert_allclose(along.growth[falls], np.sqrt(-np.cos(run.y[falls])), rtol=1e-12)
 
 
 @pytest.mark.parametrize("method", [m.name for m in sw.methods()])
@@ -45,13 +45,13 @@ def test_at_an_equilibrium_it_is_the_limit_there(method: str) -> None:
     damped = None if sw.method(method).needs_acceleration else 0.1
     pendulum = sw.Pendulum(2.0, damped)
     run = sw.integrate(pendulum, "merson" if damped else method, v=0.0, y=0.0, dt=0.01, steps=2, every=1)
-    found = sw.stability_along(run, method)
+    along = sw.stability_along(run, method)
     there = sw.stability_limit(pendulum, method, v=0.0, y=0.0)
     # That of a step comes from its derivative, which is rounded otherwise; Verlet's in 2 − Φ².
-    np.testing.assert_allclose(found.limits, float(there), rtol=1e-8)
-    if found.mode is not None and 0 < there < np.inf:
-        assert found.mode.kind == there.mode.kind
-        assert abs(found.mode.rate - there.mode.rate) <= 1e-8 * abs(there.mode.rate)
+    np.testing.assert_allclose(along.limits, float(there), rtol=1e-8)
+    if along.mode is not None and 0 < there < np.inf:
+        assert along.mode.kind == there.mode.kind
+        assert abs(along.mode.rate - there.mode.rate) <= 1e-8 * abs(there.mode.rate)
 
 
 @pytest.mark.parametrize("method", [m.name for m in sw.methods()])
@@ -73,35 +73,35 @@ def test_a_linear_system_has_one_limit() -> None:
     system = sw.LinearSystem([[-2.0, 1.0, 0.0], [0.0, -3.0, 1.0], [1.0, 0.0, -1.0]], velocities=1)
     run = sw.integrate(system, "rk4", v=np.ones(1), y=np.ones(2), dt=0.1, steps=3, every=1)
     for method in ("rk4", "merson", "false_euler"):
-        found = sw.stability_along(run, method)
-        np.testing.assert_allclose(found.limits, float(sw.stability_limit(system, method)), rtol=1e-9)
+        along = sw.stability_along(run, method)
+        np.testing.assert_allclose(along.limits, float(sw.stability_limit(system, method)), rtol=1e-9)
 
 
 def test_a_batch_has_a_limit_for_each_member() -> None:
     omega = np.array([1.0, 3.0])
     run = sw.integrate(sw.Pendulum(omega), "rk4", v=0.0, y=np.array([[0.5], [1.0], [1.4]]), dt=0.01, steps=300, every=10)
-    found = sw.stability_along(run, "false_euler")
-    assert found.dt.shape == found.index.shape == found.when.shape == found.mode.shape == (3, 2)
+    along = sw.stability_along(run, "false_euler")
+    assert along.dt.shape == along.index.shape == along.when.shape == along.mode.shape == (3, 2)
     for i in range(3):
         for j in range(2):
             alone = sw.integrate(sw.Pendulum(omega[j]), "rk4", v=0.0, y=run.y[0, i, j], dt=0.01, steps=300, every=10)
             one = sw.stability_along(alone, "false_euler")
-            assert found.dt[i, j] == pytest.approx(one.dt, rel=1e-12)
-            assert found.index[i, j] == one.index
-            assert found.mode[i, j].rate == pytest.approx(one.mode.rate, rel=1e-12)
+            assert along.dt[i, j] == pytest.approx(one.dt, rel=1e-12)
+            assert along.index[i, j] == one.index
+            assert along.mode[i, j].rate == pytest.approx(one.mode.rate, rel=1e-12)
 
 
 def test_the_limit_of_an_orbit_is_at_its_pericentre() -> None:
     scene = sw.scenes.kepler()
     run = scene.run("leapfrog", 0.001, steps=7000, every=7)
-    found = sw.stability_along(run)
+    along = sw.stability_along(run)
     d = run.y[:, 0] - run.y[:, 1]
     r = np.sqrt((d * d).sum(axis=1))
-    assert found.index == r.argmin()
+    assert along.index == r.argmin()
     # Across the line between the bodies the force is M/r³ times the distance, with M the sum of G·m.
     M = float(np.sum(scene.system.masses * scene.system.G))
-    np.testing.assert_allclose(found.limits, 2.0 / np.sqrt(M / r**3), rtol=1e-9)
-    np.testing.assert_allclose(found.growth, np.sqrt(2.0 * M / r**3), rtol=1e-9)
+    np.testing.assert_allclose(along.limits, 2.0 / np.sqrt(M / r**3), rtol=1e-9)
+    np.testing.assert_allclose(along.growth, np.sqrt(2.0 * M / r**3), rtol=1e-9)
 
 
 def test_past_the_limit_a_run_that_should_swing_grows() -> None:
@@ -120,8 +120,8 @@ def test_a_state_that_is_not_finite_has_no_limit() -> None:
     assert sw.stability_along(run).limits.shape == (4,)
     with pytest.warns(sw.DivergenceWarning):
         run = sw.integrate(sw.NBody([1.0, 1.0]), "rk4", v=0.0, y=np.zeros((2, 2)), dt=0.1, steps=2, every=1)
-    found = sw.stability_along(run)
-    assert np.isnan(found.limits[1:]).all()
+    along = sw.stability_along(run)
+    assert np.isnan(along.limits[1:]).all()
 
 
 def test_wrong_calls_say_what_is_wrong() -> None:

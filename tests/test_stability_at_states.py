@@ -20,10 +20,10 @@ def test_small_growth_is_seen_beside_what_is_on_the_circle() -> None:
     a[2, 0] = a[3, 1] = 1.0
     a[0, 2], a[1, 3] = -1.0, -(0.01**2)
     a[1, 1] = 2e-9
-    found = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.1)
-    assert (found.kind, bool(found.stable)) == ("unstable oscillation", False)
+    analysis = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.1)
+    assert (analysis.kind, bool(analysis.stable)) == ("unstable oscillation", False)
     # e^(½·2e-9·dt) a step, of which |z| has some eps times 1/|wᴴx| = 1/0.01.
-    assert found.radius - 1 == pytest.approx(1e-10, abs=100 * 10 * EPS)
+    assert analysis.radius - 1 == pytest.approx(1e-10, abs=100 * 10 * EPS)
 
 
 def test_the_angle_of_verlet_is_as_exact_as_its_matrix() -> None:
@@ -110,7 +110,7 @@ def test_overflow_is_said() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "error", "said"),
+    ("arguments", "error", "message"),
     [
         ({"system": 1, "dt": 0.1}, DTypeError, "system: expected a stepwell system"),
         ({"method": "eular", "dt": 0.1}, ArgumentError, "method: there is no 'eular'"),
@@ -134,8 +134,8 @@ def test_overflow_is_said() -> None:
         ({"system": sw.Chain(200), "dt": np.broadcast_to(0.1, 10**8)}, TooLargeError, "the matrices of 100000000 members need"),
     ],
 )
-def test_analyse_says_what_is_wrong(arguments: dict[str, Any], error: type[Exception], said: str) -> None:
-    with pytest.raises(error, match=said):
+def test_analyse_says_what_is_wrong(arguments: dict[str, Any], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
         sw.analyse(**({"system": sw.Oscillator(), "method": "false_euler"} | arguments))
     with pytest.raises(ArgumentError, match="monodromy"):
         _ = sw.analyse(sw.Oscillator(), "rk4", dt=0.1).monodromy
@@ -275,11 +275,11 @@ def test_only_members_whose_limit_is_sought_are_searched(method: str, of_each: b
     computed: list[int] = []
     of_matrices = eigen.eigen
     monkeypatch.setattr(eigen, "eigen", lambda m, *rest: computed.append(m[0, 0].size) or of_matrices(m, *rest))
-    found = sw.stability_limit(system, method, v=np.zeros(4), y=y)
-    assert (found[6:] == 0.0).all()
+    limits = sw.stability_limit(system, method, v=np.zeros(4), y=y)
+    assert (limits[6:] == 0.0).all()
     assert sum(computed) <= 3 * 60 + 2 * 6 * (562 + 60 + 16)
     monkeypatch.setattr(limit_search.Search, "of", lambda self, members: (self, ...))
     whole = sw.stability_limit(system, method, v=np.zeros(4), y=y)
-    np.testing.assert_array_equal(found, whole)
-    np.testing.assert_array_equal(found.grows, whole.grows)
-    assert found.modes.tolist() == whole.modes.tolist()
+    np.testing.assert_array_equal(limits, whole)
+    np.testing.assert_array_equal(limits.grows, whole.grows)
+    assert limits.modes.tolist() == whole.modes.tolist()

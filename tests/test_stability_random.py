@@ -76,9 +76,9 @@ def test_matrix_and_limit(method: str, seed: int) -> None:
     system, a, velocities = random_system(seed)
     n_v = len(velocities)
     h = 0.3 / np.abs(np.linalg.eigvals(a)).max()
-    found = sw.analyse(system, method, dt=h)
-    np.testing.assert_allclose(found.P, by_hand(method, h * a, n_v), rtol=0, atol=1e-13)
-    assert found.radius == pytest.approx(radius(method, a, n_v)(h), abs=1e-9)
+    analysis = sw.analyse(system, method, dt=h)
+    np.testing.assert_allclose(analysis.P, by_hand(method, h * a, n_v), rtol=0, atol=1e-13)
+    assert analysis.radius == pytest.approx(radius(method, a, n_v)(h), abs=1e-9)
 
     limit = sw.stability_limit(system, method)
     r = radius(method, a, n_v)
@@ -114,7 +114,7 @@ def test_runs_stay_bounded_or_grow_as_predicted(method: str, seed: int) -> None:
     a -= np.eye(3)[:, :, np.newaxis] * (np.linalg.eigvals(np.moveaxis(a, 2, 0)).real.max(axis=1) + 0.1)
     a *= rng.uniform(0.1, 2.0, b)  # the scale of A is the step
     system = sw.LinearSystem(a, velocities=int(rng.integers(0, 4)))
-    found = sw.analyse(system, method, dt=1.0)
+    analysis = sw.analyse(system, method, dt=1.0)
     start = rng.normal(size=(3, b))
     v, y = system.split(start)
     with warnings.catch_warnings():
@@ -124,10 +124,10 @@ def test_runs_stay_bounded_or_grow_as_predicted(method: str, seed: int) -> None:
     bounded = np.isfinite(size) & (size < 1e6)
     # The band: with |r₁ − 1| > 0.02, r₁ᵏ is above 6e25 or below 5e-27 after 3000 steps. The share of a random start in one of
     # three modes is above 1e-12, and what a non-normal P adds is below 1e12, but for odds of less than one in a million.
-    decided = np.abs(found.radius - 1.0) > 0.02
+    decided = np.abs(analysis.radius - 1.0) > 0.02
     assert decided.sum() > 200
-    np.testing.assert_array_equal(bounded[decided], found.stable[decided])
-    assert 0 < found.stable.sum() < b or method == "standard_euler"
+    np.testing.assert_array_equal(bounded[decided], analysis.stable[decided])
+    assert 0 < analysis.stable.sum() < b or method == "standard_euler"
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -205,12 +205,12 @@ def test_input_matrix_of_several_inputs() -> None:
     a, b = np.array([[-1.0, 2.0], [-2.0, -1.0]]), np.array([[1.0, 0.0, 2.0], [0.5, -1.0, 0.0]])
     system = sw.LinearSystem(a, b, velocities=0)
     h = 0.2
-    found = sw.analyse(system, "rk4", dt=h)
-    assert found.inputs == ("x[0]", "x[1]", "x[2]")
+    analysis = sw.analyse(system, "rk4", dt=h)
+    assert analysis.inputs == ("x[0]", "x[1]", "x[2]")
     z = h * a
     series_of_input = h * (np.eye(2) + z / 2 + z @ z / 6 + z @ z @ z / 24) @ b
-    np.testing.assert_allclose(found.Q, series_of_input, rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(sw.analyse(system, "rk4", dt=[h, 0.3]).Q[:, :, 0], found.Q)
+    np.testing.assert_allclose(analysis.Q, series_of_input, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(sw.analyse(system, "rk4", dt=[h, 0.3]).Q[:, :, 0], analysis.Q)
 
 
 def test_resonance_of_two_equal_pairs() -> None:
@@ -220,18 +220,18 @@ def test_resonance_of_two_equal_pairs() -> None:
     a[2, 0] = a[3, 1] = 1.0
     a[0, 2] = a[1, 3] = -1.0
     a[1, 2] = 1.0
-    found = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
-    assert (found.kind, bool(found.stable)) == ("unstable oscillation (double pair)", False)
+    analysis = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
+    assert (analysis.kind, bool(analysis.stable)) == ("unstable oscillation (double pair)", False)
     a[1, 2] = 0.0
-    found = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
-    assert (found.kind, bool(found.stable)) == ("harmonic", True)
+    analysis = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
+    assert (analysis.kind, bool(analysis.stable)) == ("harmonic", True)
 
 
 def test_the_slots_are_in_the_order_of_the_blocks() -> None:
     system = sw.LinearSystem(np.diag([-1.0, -2.0, -3.0]), velocities=[2])
-    found = sw.analyse(system, "standard_euler", dt=0.1)
-    assert found.slots == ["v[0]", "y[0]", "y[1]"]
-    np.testing.assert_allclose(np.diag(found.P), [0.7, 0.9, 0.8])
+    analysis = sw.analyse(system, "standard_euler", dt=0.1)
+    assert analysis.slots == ["v[0]", "y[0]", "y[1]"]
+    np.testing.assert_allclose(np.diag(analysis.P), [0.7, 0.9, 0.8])
     assert operations("standard_euler", system).multiplications == 9
     assert maps.size(system) == (1, 2)
     assert series("rk4").p[2] == -0.5

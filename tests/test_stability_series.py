@@ -53,9 +53,9 @@ RADII = {
 
 @pytest.mark.parametrize("method", sorted(RATIOS))
 def test_series_are_those_of_computer_algebra(method: str) -> None:
-    found = series(method)
-    assert found.ratio_terms(len(RATIOS[method])) == [(k, Fraction(c)) for k, c in RATIOS[method]]
-    assert found.radius_terms(9) == [(k, Fraction(c)) for k, c in RADII[method]]
+    expansion = series(method)
+    assert expansion.ratio_terms(len(RATIOS[method])) == [(k, Fraction(c)) for k, c in RATIOS[method]]
+    assert expansion.radius_terms(9) == [(k, Fraction(c)) for k, c in RADII[method]]
 
 
 @pytest.mark.parametrize(
@@ -70,23 +70,23 @@ def test_series_are_those_of_computer_algebra(method: str) -> None:
     ],
 )
 def test_series_of_methods_that_are_not_in_the_catalogue(method: Any, radius: Any, ratio: Any) -> None:
-    found = series(method)
+    expansion = series(method)
     if radius is None:
-        assert found.radius_terms() == []  # a product of shears: the determinant is 1, whatever the coefficients
+        assert expansion.radius_terms() == []  # a product of shears: the determinant is 1, whatever the coefficients
     else:
-        assert found.radius_terms(1)[0] == pytest.approx(radius, rel=1e-3)
+        assert expansion.radius_terms(1)[0] == pytest.approx(radius, rel=1e-3)
     if ratio is not None:
-        assert found.ratio_terms(1)[0] == pytest.approx(ratio, rel=1e-2)
+        assert expansion.ratio_terms(1)[0] == pytest.approx(ratio, rel=1e-2)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_series_approach_the_exact_values(method: str) -> None:
     """With terms up to Φ¹² the rest is some Φ¹⁴ = 6e-8 at Φ = 0.3, and less for the exact r₁²."""
-    found = series(method)
+    expansion = series(method)
     a = sw.analyse(sw.Oscillator(), method, dt=0.3)
-    assert a.frequency_ratio == pytest.approx(found.ratio(0.3), abs=1e-7)
-    assert a.q == pytest.approx(found.q(0.3), abs=20 * EPS)
-    assert a.p == pytest.approx(found.p(0.3), abs=20 * EPS)
+    assert a.frequency_ratio == pytest.approx(expansion.ratio(0.3), abs=1e-7)
+    assert a.q == pytest.approx(expansion.q(0.3), abs=20 * EPS)
+    assert a.p == pytest.approx(expansion.p(0.3), abs=20 * EPS)
 
 
 @pytest.mark.parametrize(
@@ -169,9 +169,9 @@ def test_eigenvalues_that_meet() -> None:
 
 
 def test_criteria() -> None:
-    found = sw.criteria(phi=[0.5, 1.0])
-    assert [c.method for c in found] == list(sw.methods())
-    by_name = {c.method.name: c for c in found}
+    criteria = sw.criteria(phi=[0.5, 1.0])
+    assert [c.method for c in criteria] == list(sw.methods())
+    by_name = {c.method.name: c for c in criteria}
     euler = by_name["false_euler"]
     assert euler.samples_per_period == pytest.approx(math.pi)
     assert euler.at[1].deviation == pytest.approx(math.pi / 3 - 1, abs=1e-12)  # Ψ = 2·asin(½) at Φ = 1
@@ -180,23 +180,23 @@ def test_criteria() -> None:
     assert by_name["standard_heun"].r1_squared == "Φ⁴/4"
     assert by_name["false_heun"].deviation == "−11Φ²/96 − 597Φ⁴/10240"
     assert by_name["standard_euler"].samples_per_period == math.inf
-    rows = found.rows()
+    rows = criteria.rows()
     assert json.loads(json.dumps(rows)) == rows
     assert rows[0]["samples_per_period"] is None
-    text = found.markdown()
-    assert text.count("\n") == 2 + len(found)
-    for c in found:
+    text = criteria.markdown()
+    assert text.count("\n") == 2 + len(criteria)
+    for c in criteria:
         assert f"| {c.method.title} |" in text
 
 
 def test_criteria_file(tmp_path: Any) -> None:
-    found = sw.criteria(["rk4"], phi=0.3)
-    found.to_json(tmp_path / "c.json")
-    assert json.loads((tmp_path / "c.json").read_text(encoding="utf-8")) == json.loads(json.dumps(found.rows()))
+    criteria = sw.criteria(["rk4"], phi=0.3)
+    criteria.to_json(tmp_path / "c.json")
+    assert json.loads((tmp_path / "c.json").read_text(encoding="utf-8")) == json.loads(json.dumps(criteria.rows()))
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         ({"methods": "rk4"}, "expected a list of names"),
         ({"methods": []}, "methods: expected at least one"),
@@ -205,8 +205,8 @@ def test_criteria_file(tmp_path: Any) -> None:
         ({"phi": [[1.0]]}, "phi: expected a list"),
     ],
 )
-def test_criteria_say_what_is_wrong(arguments: dict[str, Any], said: str) -> None:
-    with pytest.raises(ArgumentError, match=said):
+def test_criteria_say_what_is_wrong(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ArgumentError, match=message):
         sw.criteria(**arguments)
 
 

@@ -49,8 +49,8 @@ def test_out_of_steps_tells_how_many_and_how_long(method: str) -> None:
     paces = run.paces
     assert paces is not None
     mean = float(paces.t) / int(paces.accepted)
-    told = f"out of max_steps: 3000 attempts, {int(paces.rejected)} of them rejected, steps of {mean:.2g} on average; max_steps="
-    assert told in text
+    words = f"out of max_steps: 3000 attempts, {int(paces.rejected)} of them rejected, steps of {mean:.2g} on average; max_steps="
+    assert words in text
     assert run.stopped_at == paces.t
 
 
@@ -62,12 +62,12 @@ def test_stiffness_is_named_by_its_rate(method: str, members: tuple[int, ...]) -
     run, text = stopped(robertson(), method, y=y, tolerance=(1e-6, 1e-9), at=[1e4], max_steps=20_000)
     assert run.controller_state is not None
     state = run.controller_state.y[:, 0] if members else run.controller_state.y
-    found = re.search(r"the fastest rate there, 1/([\d.e-]+), lets no steps beyond ([\d.e-]+) be stable \(stiff", text)
-    assert found is not None
+    match = re.search(r"the fastest rate there, 1/([\d.e-]+), lets no steps beyond ([\d.e-]+) be stable \(stiff", text)
+    assert match is not None
     # Both are told with two digits.
-    assert float(found[1]) == pytest.approx(1.0 / (1e4 * state[2] + 6e7 * state[1]), rel=0.06)
-    longest = float(sw.stability_limit(sw.LinearSystem([[-1.0 / float(found[1])]]), method))
-    assert float(found[2]) == pytest.approx(longest, rel=0.1)
+    assert float(match[1]) == pytest.approx(1.0 / (1e4 * state[2] + 6e7 * state[1]), rel=0.06)
+    longest = float(sw.stability_limit(sw.LinearSystem([[-1.0 / float(match[1])]]), method))
+    assert float(match[2]) == pytest.approx(longest, rel=0.1)
 
 
 @pytest.mark.parametrize("method", CHOOSE)
@@ -135,10 +135,10 @@ def test_an_event_and_a_stop_are_told_side_by_side() -> None:
     np.testing.assert_allclose(run.stopped_at, [np.log(1.04) / 0.1, 0.25], rtol=1e-6)
 
 
-def told(system: Any, method: str = "merson", **how: Any) -> str:
+def message_of(system: Any, method: str = "merson", **options: Any) -> str:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        sw.integrate(system, method, **{"tolerance": 1e-6, **how})
+        sw.integrate(system, method, **{"tolerance": 1e-6, **options})
     (message,) = (str(each.message) for each in caught)
     return message
 
@@ -146,22 +146,24 @@ def told(system: Any, method: str = "merson", **how: Any) -> str:
 def test_what_positive_keeps_is_told_first() -> None:
     """Not that the solution blows up: it would be negative from there on. Two tanks: the one that is empty first is named."""
     tanks = sw.system(order=1, shape=(2,))(lambda t, y: np.array([-1.0, -0.3]))()
-    message = told(tanks, y=np.array([1.0, 0.1]), at=[2.0], positive=True)
+    message = message_of(tanks, y=np.array([1.0, 0.1]), at=[2.0], positive=True)
     assert re.search(r"at t = 0\.333333; y\[1\] becomes negative in every step, however short, which positive= does", message)
     assert "blows up" not in message
-    message = told(tanks, y=np.array([1.0, 0.1]), at=[2.0], positive=[0])
+    message = message_of(tanks, y=np.array([1.0, 0.1]), at=[2.0], positive=[0])
     assert "at t = 1; y[0] becomes negative" in message
-    assert "at t = 3; v becomes negative" in told(sw.system(lambda t, v, y: -1.0)(), v=3.0, y=0.0, at=[9.0], positive=[("v",)])
+    assert "at t = 3; v becomes negative" in message_of(
+        sw.system(lambda t, v, y: -1.0)(), v=3.0, y=0.0, at=[9.0], positive=[("v",)]
+    )
 
 
 def test_a_time_of_too_many_digits_is_no_collision() -> None:
     """An oscillator's step of about 0.1 to 1 at a time whose roundings are 16, or after some steps where the step shrinks."""
-    message = told(sw.Oscillator(), v=0.0, y=1.0, t0=1e17, at=[1e17 + 1600.0])
+    message = message_of(sw.Oscillator(), v=0.0, y=1.0, t0=1e17, at=[1e17 + 1600.0])
     assert "too small to move the time, whose roundings there are 16: count times from a nearer origin" in message
     assert "collision" not in message
-    message = told(sw.Oscillator(3e3), v=0.0, y=1.0, t0=1e12, at=[1e12 + 10.0])
+    message = message_of(sw.Oscillator(3e3), v=0.0, y=1.0, t0=1e12, at=[1e12 + 10.0])
     assert "whose roundings there are 0.00012" in message
     # A pole remains one, at t = 1 and at 1e9 + 1, where the time has 24 binary digits for a unit.
     pole = sw.system(order=1)(lambda t, y: y * y)()
-    assert "the solution blows up there" in told(pole, y=1.0, at=[2.0])
-    assert "the solution blows up there" in told(pole, y=1.0, t0=1e9, at=[1e9 + 2.0])
+    assert "the solution blows up there" in message_of(pole, y=1.0, at=[2.0])
+    assert "the solution blows up there" in message_of(pole, y=1.0, t0=1e9, at=[1e9 + 2.0])

@@ -50,11 +50,11 @@ def attribute(y: Any) -> Any:
     return getattr(y, "astype", lambda kind: 1.0)(float)
 
 
-def asked(y: Any) -> Any:
+def with_hasattr(y: Any) -> Any:
     return y if hasattr(y, "conj") else 1.0
 
 
-SWALLOWED = [number, branch, unknown, written, summed, attribute, asked]
+SWALLOWED = [number, branch, unknown, written, summed, attribute, with_hasattr]
 
 
 @pytest.mark.parametrize("function", SWALLOWED, ids=lambda each: each.__name__)

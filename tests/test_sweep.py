@@ -31,15 +31,15 @@ each_type = pytest.mark.parametrize("dtype", ["float64", "float32"])
 
 
 def test_a_product_is_what_integrate_gives() -> None:
-    found = small(outcomes="last", transient=0)
-    assert found.y_last.dims == ("gamma", "y0")
+    dataset = small(outcomes="last", transient=0)
+    assert dataset.y_last.dims == ("gamma", "y0")
     gamma, y = (values for _, values in AXES.values())
     run = sw.integrate(duffing(delta=0.2, gamma=gamma[:, None]), "rk4", v=0.0, y=y, dt=0.05, steps=80)
-    np.testing.assert_array_equal(found.y_last, run.y[-1])
-    np.testing.assert_array_equal(found.v_last, run.v[-1])
-    np.testing.assert_array_equal(found.gamma, gamma)
-    np.testing.assert_array_equal(found.y0, y)
-    one = found.sel(gamma=gamma[3], y0=y[1])
+    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
+    np.testing.assert_array_equal(dataset.v_last, run.v[-1])
+    np.testing.assert_array_equal(dataset.gamma, gamma)
+    np.testing.assert_array_equal(dataset.y0, y)
+    one = dataset.sel(gamma=gamma[3], y0=y[1])
     alone = sw.integrate(duffing(delta=0.2, gamma=gamma[3]), "rk4", v=0.0, y=y[1], dt=0.05, steps=80)
     assert float(one.y_last) == float(alone.y[-1])
 
@@ -47,22 +47,22 @@ def test_a_product_is_what_integrate_gives() -> None:
 def test_axes_of_one_dimension_vary_together() -> None:
     omega, y, d = np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.6, 0.7]), np.array([0.0, 0.1])
     axes = {"omega": ("run", omega), "y": ("run", y), "damping": d}
-    found = sw.sweep(Oscillator, axes, "rk4", v=0.0, dt=0.1, steps=10)
-    assert dict(found.sizes) == {"run": 3, "damping": 2}
-    assert found.coords.keys() == {"omega", "y_start", "damping"}
+    dataset = sw.sweep(Oscillator, axes, "rk4", v=0.0, dt=0.1, steps=10)
+    assert dict(dataset.sizes) == {"run": 3, "damping": 2}
+    assert dataset.coords.keys() == {"omega", "y_start", "damping"}
     for i in range(3):
         for j in range(2):
             run = sw.integrate(Oscillator(omega[i], d[j]), "rk4", v=0.0, y=y[i], dt=0.1, steps=10)
-            assert float(found.y_last[i, j]) == float(run.y[-1])
+            assert float(dataset.y_last[i, j]) == float(run.y[-1])
 
 
 def test_axes_of_xarray_and_of_two_dimensions() -> None:
     values = xarray.DataArray([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], dims=("a", "b"), attrs={"units": "1/s"})
-    found = sw.sweep(Oscillator, {"y": ("b", [0.1, 0.2, 0.3]), "omega": values}, "rk4", v=0.0, dt=0.1, steps=10, chunk=2)
-    assert found.y_last.dims == ("b", "a")
-    assert found.omega.attrs["units"] == "1/s"
+    dataset = sw.sweep(Oscillator, {"y": ("b", [0.1, 0.2, 0.3]), "omega": values}, "rk4", v=0.0, dt=0.1, steps=10, chunk=2)
+    assert dataset.y_last.dims == ("b", "a")
+    assert dataset.omega.attrs["units"] == "1/s"
     run = sw.integrate(Oscillator(values.values), "rk4", v=0.0, y=np.array([0.1, 0.2, 0.3]), dt=0.1, steps=10)
-    np.testing.assert_array_equal(found.y_last.transpose("a", "b"), run.y[-1])
+    np.testing.assert_array_equal(dataset.y_last.transpose("a", "b"), run.y[-1])
 
 
 def test_blocks_with_axes_of_their_own() -> None:
@@ -70,13 +70,13 @@ def test_blocks_with_axes_of_their_own() -> None:
     scene = sw.scenes.figure_eight()
     factor = np.array([0.9, 1.0, 1.1, 1.2])
     axes = {"v": ("speed", scene.v[..., None] * factor)}
-    found = sw.sweep(scene.system, axes, "leapfrog", y=scene.y, dt=0.01, steps=50, every=20, chunk=3)
-    assert found.y.dims[:2] == ("speed", "t")
-    assert found.y.shape == (4, 4, *scene.y.shape)
+    dataset = sw.sweep(scene.system, axes, "leapfrog", y=scene.y, dt=0.01, steps=50, every=20, chunk=3)
+    assert dataset.y.dims[:2] == ("speed", "t")
+    assert dataset.y.shape == (4, 4, *scene.y.shape)
     run = sw.integrate(scene.system, "leapfrog", v=scene.v[..., None] * factor, y=scene.y[..., None], dt=0.01, steps=50, every=20)
-    np.testing.assert_array_equal(found.y, np.moveaxis(run.y, -1, 0))
-    np.testing.assert_array_equal(found.t, run.t)
-    np.testing.assert_array_equal(found.v_start, np.moveaxis(scene.v[..., None] * factor, -1, 0))
+    np.testing.assert_array_equal(dataset.y, np.moveaxis(run.y, -1, 0))
+    np.testing.assert_array_equal(dataset.t, run.t)
+    np.testing.assert_array_equal(dataset.v_start, np.moveaxis(scene.v[..., None] * factor, -1, 0))
 
 
 @each_type
@@ -85,28 +85,28 @@ def test_a_step_as_an_axis(method: str, dtype: Any) -> None:
     """A run has one step, so those of one step are computed together; its dimension comes first."""
     dt, omega = np.array([0.01, 0.02, 0.05]), np.array([1.0, 2.0])
     axes = {"omega": ("omega", omega), "dt": ("dt", dt)}
-    found = sw.sweep(Oscillator, axes, method, v=0.0, y=1.0, steps=40, transient=7, every=16, dtype=dtype)
-    assert found.y.dims == ("dt", "omega", "saved")
+    dataset = sw.sweep(Oscillator, axes, method, v=0.0, y=1.0, steps=40, transient=7, every=16, dtype=dtype)
+    assert dataset.y.dims == ("dt", "omega", "saved")
     for i, h in enumerate(dt):
         run = sw.integrate(Oscillator(omega), method, v=0.0, y=1.0, dt=float(h), steps=47, every=1, dtype=dtype)
         assert (run.t[47] == 47 * h) == (dtype == "float64")  # a step of float32 is rounded
-        np.testing.assert_array_equal(found.y[i], run.y[[7, 23, 39, 47]].T)
-        np.testing.assert_array_equal(found.v[i], run.v[[7, 23, 39, 47]].T)
-        np.testing.assert_array_equal(found.t[i], run.t[[7, 23, 39, 47]])
+        np.testing.assert_array_equal(dataset.y[i], run.y[[7, 23, 39, 47]].T)
+        np.testing.assert_array_equal(dataset.v[i], run.v[[7, 23, 39, 47]].T)
+        np.testing.assert_array_equal(dataset.t[i], run.t[[7, 23, 39, 47]])
 
 
 def test_a_step_that_varies_with_a_parameter() -> None:
     axes = {"omega": ("run", [1.0, 2.0]), "dt": ("run", [0.1, 0.05])}
-    found = sw.sweep(Oscillator, axes, "rk4", v=0.0, y=1.0, steps=30)
+    dataset = sw.sweep(Oscillator, axes, "rk4", v=0.0, y=1.0, steps=30)
     for i, (omega, h) in enumerate([(1.0, 0.1), (2.0, 0.05)]):
-        assert float(found.y_last[i]) == float(sw.integrate(Oscillator(omega), "rk4", v=0.0, y=1.0, dt=h, steps=30).y[-1])
+        assert float(dataset.y_last[i]) == float(sw.integrate(Oscillator(omega), "rk4", v=0.0, y=1.0, dt=h, steps=30).y[-1])
 
 
 def test_a_force_as_an_axis() -> None:
     force = np.array([0.0, 0.5, 1.0])
-    found = sw.sweep(sw.Pendulum(), {"force": ("push", force)}, "rk4", v=0.0, y=1.0, dt=0.1, steps=30, chunk=2)
+    dataset = sw.sweep(sw.Pendulum(), {"force": ("push", force)}, "rk4", v=0.0, y=1.0, dt=0.1, steps=30, chunk=2)
     run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=30, force=force)
-    np.testing.assert_array_equal(found.y_last, run.y[-1])
+    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
 
 
 @pytest.mark.parametrize("shape", [(7,), (3, 5), (2, 3, 4), (1, 6, 1)])
@@ -134,11 +134,11 @@ def test_random_samples_have_a_seed() -> None:
     assert abs(one["omega"][1].mean() - 2.0) < 5 * 2.0 / np.sqrt(12 * 4096)
     assert one["omega"][1].min() >= 1.0
     assert one["omega"][1].max() < 3.0
-    found = sw.sweep(Oscillator, one, "rk4", v=0.0, dt=0.1, steps=10)
-    assert dict(found.sizes) == {"sample": 4096}
-    assert "seed 1" in found.omega.attrs["sampling"]
+    dataset = sw.sweep(Oscillator, one, "rk4", v=0.0, dt=0.1, steps=10)
+    assert dict(dataset.sizes) == {"sample": 4096}
+    assert "seed 1" in dataset.omega.attrs["sampling"]
     run = sw.integrate(Oscillator(one["omega"][1]), "rk4", v=0.0, y=one["y"][1], dt=0.1, steps=10)
-    np.testing.assert_array_equal(found.y_last, run.y[-1])
+    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
 
 
 def test_sobol_fills_the_box_evenly() -> None:
@@ -172,12 +172,12 @@ def test_sobol_fills_the_box_evenly() -> None:
 )
 @each_type
 def test_every_division_gives_the_same_bits(division: dict[str, Any], dtype: Any) -> None:
-    given: dict[str, Any] = {} if dtype == "float64" else {"dtype": dtype, "outcomes": WITH_FLOAT32}
-    one, other = small(**given), small(**given, **division)
+    options: dict[str, Any] = {} if dtype == "float64" else {"dtype": dtype, "outcomes": WITH_FLOAT32}
+    one, other = small(**options), small(**options, **division)
     assert unlike(one, other) == []
     assert one.attrs == other.attrs
     assert len(one.attrs["bits"]) == 32
-    assert given == {} or one.attrs["bits"] != small(outcomes=WITH_FLOAT32).attrs["bits"]
+    assert options == {} or one.attrs["bits"] != small(outcomes=WITH_FLOAT32).attrs["bits"]
 
 
 def test_a_bit_that_differs_has_another_hash() -> None:
@@ -215,16 +215,16 @@ def test_a_sum_in_another_order_would_be_noticed(monkeypatch: pytest.MonkeyPatch
 def test_memory_is_bounded() -> None:
     """The trajectories are 64 MB; a chunk may take 2 MiB."""
     members, steps, memory = 2000, 2000, 2 * 2**20
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.01, "outcomes": ["extremes", "mean", "period"], "threads": 1}
+    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.01, "outcomes": ["extremes", "mean", "period"], "threads": 1}
     axes = {"omega": np.linspace(0.5, 2.0, members)}
-    sw.sweep(Oscillator, axes, "rk4", steps=10, **given)  # imports
+    sw.sweep(Oscillator, axes, "rk4", steps=10, **arguments)  # imports
     tracemalloc.start()
     try:
-        sw.sweep(Oscillator, axes, "rk4", steps=steps, memory=memory, **given)
+        sw.sweep(Oscillator, axes, "rk4", steps=steps, memory=memory, **arguments)
         peak = tracemalloc.get_traced_memory()[1]
         # Results are 9 numbers a member, axes and coordinates a few more; some hundred kilobytes are Python's own.
         assert peak < memory + 8 * 30 * members + 2**19
-        sw.sweep(Oscillator, axes, "rk4", steps=steps, memory=64 * memory, **given)
+        sw.sweep(Oscillator, axes, "rk4", steps=steps, memory=64 * memory, **arguments)
         assert tracemalloc.get_traced_memory()[1] > 4 * peak  # so the bound above is one
     finally:
         tracemalloc.stop()
@@ -234,16 +234,16 @@ def test_memory_is_bounded() -> None:
 
 
 def test_attributes_tell_how_it_was_made() -> None:
-    found = small(units={"t": "s", "y": "m", "gamma": "m/s²", "y_period": "h"})
-    attrs = found.attrs
+    data = small(units={"t": "s", "y": "m", "gamma": "m/s²", "y_period": "h"})
+    attrs = data.attrs
     assert attrs["stepwell_version"] == sw.__version__
     assert attrs["numpy_version"] == np.__version__
     assert (attrs["method"], attrs["dt"], attrs["steps"], attrs["transient"], attrs["t0"]) == ("rk4", 0.05, 80, 10, 0.0)
     assert attrs["title"] == "duffing by Runge-Kutta 4: a sweep of 45 members"
-    assert found.y_last.attrs["units"] == found.y0.attrs["units"] == "m"
-    assert (found.y_crossing.attrs["units"], found.y_period.attrs["units"], found.gamma.attrs["units"]) == ("s", "h", "m/s²")
-    assert "units" not in found.v_last.attrs
-    assert found.y0.attrs["argument"] == "y"
+    assert data.y_last.attrs["units"] == data.y0.attrs["units"] == "m"
+    assert (data.y_crossing.attrs["units"], data.y_period.attrs["units"], data.gamma.attrs["units"]) == ("s", "h", "m/s²")
+    assert "units" not in data.v_last.attrs
+    assert data.y0.attrs["argument"] == "y"
 
 
 def test_progress_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -322,7 +322,7 @@ def test_what_is_refused(what: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "error", "said"),
+    ("options", "error", "message"),
     [
         (
             {"tolerance": 1e-9, "at": [1.0], "method": "merson"},
@@ -342,9 +342,9 @@ def test_what_is_refused(what: str) -> None:
     ],
 )
 def test_what_does_not_go_with_float32_is_said_before_any_work(
-    options: dict[str, Any], error: type[Exception], said: str
+    options: dict[str, Any], error: type[Exception], message: str
 ) -> None:
-    given = {
+    arguments = {
         "axes": {"omega": [1.0, 2.0, 3.0]},
         "method": "rk4",
         "v": 0.0,
@@ -353,10 +353,10 @@ def test_what_does_not_go_with_float32_is_said_before_any_work(
         "steps": 10,
         "dtype": "float32",
     } | options
-    if "tolerance" in given:
-        given |= {"dt": None, "steps": None}
-    with pytest.raises(error, match=said):
-        sw.sweep(sw.Oscillator(), **given) if "dt" in given["axes"] else sw.sweep(partial(sw.Oscillator), **given)  # type: ignore[arg-type]
+    if "tolerance" in arguments:
+        arguments |= {"dt": None, "steps": None}
+    with pytest.raises(error, match=message):
+        sw.sweep(sw.Oscillator(), **arguments) if "dt" in arguments["axes"] else sw.sweep(partial(sw.Oscillator), **arguments)  # type: ignore[arg-type]
 
 
 def test_a_component_must_be_given_where_there_are_several() -> None:
@@ -364,19 +364,19 @@ def test_a_component_must_be_given_where_there_are_several() -> None:
     axes = {"v": ("speed", scene.v[..., None] * np.ones(2))}
     with pytest.raises(ArgumentError, match=re.escape("of: expected one number for each member, such as ('y', 0, 0)")):
         sw.sweep(scene.system, axes, "leapfrog", y=scene.y, dt=0.01, steps=5, outcomes="crossing")
-    found = sw.sweep(
+    dataset = sw.sweep(
         scene.system, axes, "leapfrog", y=scene.y, dt=0.01, steps=300, outcomes=sw.sweeps.Crossing(("y", 0, 0), 0.5, "both")
     )
     run = sw.integrate(scene.system, "leapfrog", v=scene.v, y=scene.y, dt=0.01, steps=300, every=1)
     k = int(np.flatnonzero(np.diff(np.sign(run.y[:, 0, 0] - 0.5)))[0])
-    assert run.t[k] <= float(found.y_0_0_crossing[0]) <= run.t[k + 1]
+    assert run.t[k] <= float(dataset.y_0_0_crossing[0]) <= run.t[k + 1]
 
 
 def test_a_package_that_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(UnsupportedError, match=re.escape("sweep: needs the package xarray, which is missing (")) as told:
+    with pytest.raises(UnsupportedError, match=re.escape("sweep: needs the package xarray, which is missing (")) as caught:
         sw.sweep(**GOOD)
-    assert 'pip install "stepwell[sweep]"' in str(told.value)
+    assert 'pip install "stepwell[sweep]"' in str(caught.value)
 
 
 def test_importing_stepwell_imports_nothing_of_this() -> None:
@@ -402,23 +402,23 @@ def test_every_kind_of_outcome_is_tried() -> None:
 def test_everything_public_has_an_example_that_runs(name: str) -> None:
     import doctest
 
-    thing, told = getattr(sw.sweeps, name), []
+    thing, output = getattr(sw.sweeps, name), []
     examples = doctest.DocTestParser().get_doctest(thing.__doc__ or "", {"sw": sw, "np": np}, name, None, None)
     assert examples.examples
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE, verbose=False)
-    runner.run(examples, out=told.append)
-    assert runner.failures == 0, "".join(told)
+    runner.run(examples, out=output.append)
+    assert runner.failures == 0, "".join(output)
 
 
 def test_a_function_alone_makes_the_run_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside reductions, which go piece by piece, its run is one more."""
     from stepwell.studies.sweeps import task
 
-    made: list[int] = []
+    lengths: list[int] = []
     original = task.quietly
 
     def counted(*args: Any, **options: Any) -> sw.Run:
-        made.append(options["steps"])
+        lengths.append(options["steps"])
         return original(*args, **options)
 
     monkeypatch.setattr(task, "quietly", counted)
@@ -426,10 +426,10 @@ def test_a_function_alone_makes_the_run_once(monkeypatch: pytest.MonkeyPatch) ->
     def end(run: sw.Run) -> Any:
         return run.y[-1]
 
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 50, "threads": 1}
-    alone = sw.sweep(Oscillator, {"omega": [1.0, 2.0]}, "rk4", outcomes=end, **given)
-    assert made.count(50) == 1
-    both = sw.sweep(Oscillator, {"omega": [1.0, 2.0]}, "rk4", outcomes=[end, "last"], **given)
-    assert made.count(50) == 3
+    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 50, "threads": 1}
+    alone = sw.sweep(Oscillator, {"omega": [1.0, 2.0]}, "rk4", outcomes=end, **arguments)
+    assert lengths.count(50) == 1
+    both = sw.sweep(Oscillator, {"omega": [1.0, 2.0]}, "rk4", outcomes=[end, "last"], **arguments)
+    assert lengths.count(50) == 3
     np.testing.assert_array_equal(alone.end, both.y_last)
     np.testing.assert_array_equal(alone.status, both.status)

@@ -41,14 +41,14 @@ def whole() -> Any:
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made:
-        yield made
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local_cluster:
+        yield local_cluster
 
 
 @pytest.fixture
 def client(cluster: Any) -> Iterator[Any]:
-    with distributed.Client(cluster) as made:
-        yield made
+    with distributed.Client(cluster) as dask_client:
+        yield dask_client
 
 
 # ---- the same bits everywhere
@@ -63,16 +63,16 @@ def test_threads_of_an_executor(whole: Any, chunk: int | None) -> None:
 @pytest.mark.parametrize("start", ["spawn", "forkserver"])
 def test_processes(whole: Any, start: str) -> None:
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(start)) as pool:
-        found = small(engine=pool, chunk=11)
-        assert unlike(whole, found) == []
-        assert found.attrs == whole.attrs
+        dataset = small(engine=pool, chunk=11)
+        assert unlike(whole, dataset) == []
+        assert dataset.attrs == whole.attrs
 
 
 def test_a_cluster(whole: Any, client: Any, tmp_path: Path) -> None:
     for options in ({}, {"store": tmp_path / "a.zarr", "chunk": 10}, {"store": tmp_path / "a.nc", "chunk": 15}):
-        with small(engine=client, **options) as found:
-            assert unlike(whole, found) == []
-            assert found.attrs["bits"] == whole.attrs["bits"]
+        with small(engine=client, **options) as dataset:
+            assert unlike(whole, dataset) == []
+            assert dataset.attrs["bits"] == whole.attrs["bits"]
 
 
 def test_samples_on_a_cluster(client: Any) -> None:
@@ -99,9 +99,9 @@ def test_progress_on_a_cluster(client: Any, monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(progress, "bar", bar)
     with distributed.get_task_stream(client=client) as stream:
-        found = small(engine=client, chunk=5, outcomes="last", progress=True)
+        dataset = small(engine=client, chunk=5, outcomes="last", progress=True)
     chunks = len(stream.data)
-    assert chunks == found.sizes["gamma"] * found.sizes["y0"] // 5
+    assert chunks == dataset.sizes["gamma"] * dataset.sizes["y0"] // 5
     assert {each["key"].rsplit("-", 5)[0] for each in stream.data} == {"sweep_chunk"}
     assert {each["status"] for each in stream.data} == {"OK"}
     assert shares == sorted(shares)
@@ -126,8 +126,8 @@ def dying(mark: str, run: sw.Run) -> Any:
     raise AssertionError("not reached")
 
 
-@pytest.mark.parametrize("kept", [False, True])
-def test_a_worker_that_is_lost(tmp_path: Path, kept: bool) -> None:
+@pytest.mark.parametrize("stored", [False, True])
+def test_a_worker_that_is_lost(tmp_path: Path, stored: bool) -> None:
     """Its chunks are computed by others."""
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
@@ -135,8 +135,8 @@ def test_a_worker_that_is_lost(tmp_path: Path, kept: bool) -> None:
     ):
         before = set(client.scheduler_info(n_workers=-1)["workers"])
         lost = partial(dying, str(tmp_path / "mark"))
-        store = {"store": tmp_path / "a.zarr"} if kept else {}
-        found = small(engine=client, chunk=5, outcomes=["last", lost], **store)
+        store = {"store": tmp_path / "a.zarr"} if stored else {}
+        dataset = small(engine=client, chunk=5, outcomes=["last", lost], **store)
         assert (tmp_path / "mark").exists()
         for _ in range(100):
             if set(client.scheduler_info(n_workers=-1)["workers"]) != before:
@@ -144,8 +144,8 @@ def test_a_worker_that_is_lost(tmp_path: Path, kept: bool) -> None:
             time.sleep(0.05)
         assert set(client.scheduler_info(n_workers=-1)["workers"]) != before
         whole = small(outcomes="last")
-        np.testing.assert_array_equal(found.y_last, whole.y_last)
-        np.testing.assert_array_equal(found.end, whole.y_last)
+        np.testing.assert_array_equal(dataset.y_last, whole.y_last)
+        np.testing.assert_array_equal(dataset.end, whole.y_last)
 
 
 def test_a_process_that_is_lost_leaves_a_store_that_goes_on(tmp_path: Path) -> None:
@@ -156,8 +156,8 @@ def test_a_process_that_is_lost_leaves_a_store_that_goes_on(tmp_path: Path) -> N
     with ProcessPoolExecutor(1, mp_context=context) as pool, pytest.raises(BrokenProcessPool):
         small(engine=pool, chunk=5, outcomes=["last", lost], store=tmp_path / "a.zarr")
     with ProcessPoolExecutor(1, mp_context=context) as pool:
-        found = small(engine=pool, chunk=5, outcomes=["last", lost], store=tmp_path / "a.zarr")
-    np.testing.assert_array_equal(found.end, small(outcomes="last").y_last)
+        dataset = small(engine=pool, chunk=5, outcomes=["last", lost], store=tmp_path / "a.zarr")
+    np.testing.assert_array_equal(dataset.end, small(outcomes="last").y_last)
 
 
 # ---- what travels
@@ -190,13 +190,13 @@ def test_equations_that_are_written_in_a_function(client: Any, whole: Any) -> No
 
     with pytest.raises(ArgumentError, match="an own system is pickled by the name of its function"):
         pickle.dumps(local)
-    found = [
+    datasets = [
         sw.sweep(
             local, AXES, "rk4", v=0.0, dt=0.05, steps=100, outcomes=["last", sw.sweeps.Mean("energy")], engine=engine, chunk=5
         )
         for engine in (None, client)
     ]
-    assert unlike(*found) == []
+    assert unlike(*datasets) == []
 
 
 #: As a user writes it: equations in the script that is started, or in a notebook.
@@ -212,19 +212,19 @@ SCRIPT = """
 
     if __name__ == "__main__":
         from distributed import Client, LocalCluster
-        given = dict(v=0.0, y=1.0, dt=0.1, steps=50, outcomes=["last", half])
-        here = sw.sweep(spring, {"k": np.linspace(1.0, 2.0, 9)}, "rk4", **given)
+        arguments = dict(v=0.0, y=1.0, dt=0.1, steps=50, outcomes=["last", half])
+        here = sw.sweep(spring, {"k": np.linspace(1.0, 2.0, 9)}, "rk4", **arguments)
         with LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=":0") as cluster, Client(cluster) as client:
-            there = sw.sweep(spring, {"k": np.linspace(1.0, 2.0, 9)}, "rk4", **given, engine=client, chunk=2)
+            there = sw.sweep(spring, {"k": np.linspace(1.0, 2.0, 9)}, "rk4", **arguments, engine=client, chunk=2)
         assert here.attrs["bits"] == there.attrs["bits"]
         print("equal", (here.half == here.y_last / 2).all().item())
 """
 
 
-@pytest.mark.parametrize("how", ["script", "standard input"])
-def test_equations_of_a_script(how: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("source", ["script", "standard input"])
+def test_equations_of_a_script(source: str, tmp_path: Path) -> None:
     text = textwrap.dedent(SCRIPT)
-    if how == "script":
+    if source == "script":
         (tmp_path / "script.py").write_text(text)
         done = subprocess.run([sys.executable, str(tmp_path / "script.py")], capture_output=True, text=True, timeout=120)
     else:
@@ -264,8 +264,8 @@ def test_kernels_are_compiled_once_a_worker() -> None:
         lines = Path("/proc/self/maps").read_text().splitlines()
         return [line for line in lines if re.match(r"\S+ ..x. \S+ \S+ 0\s*$", line)]
 
-    given = {"v": 0.0, "y": 1.0, "dt": 0.05, "t0": 0.0, "fused": False, "threads": 1}
-    task = Task(partial(duffing, delta=0.123), "rk4", given, 0, 2000, 1, None, _outcomes(["last", "extremes"], None), 2.0**26)
+    arguments = {"v": 0.0, "y": 1.0, "dt": 0.05, "t0": 0.0, "fused": False, "threads": 1}
+    task = Task(partial(duffing, delta=0.123), "rk4", arguments, 0, 2000, 1, None, _outcomes(["last", "extremes"], None), 2.0**26)
     package = portable.packed(task)
     before = mapped()
     kernels = []
@@ -306,19 +306,19 @@ def test_integrate_within_apply_ufunc(chunks: Any, client: Any) -> None:
     omega = xarray.DataArray(np.linspace(1.0, 2.0, 11), dims="omega")
     y = xarray.DataArray(np.linspace(0.1, 1.0, 5), dims="y0")
     truth = sw.integrate(sw.Oscillator(omega.values[:, None]), "rk4", v=0.0, y=y.values, dt=0.1, steps=50).y[-1]
-    given = (omega, y) if chunks is None else xarray.broadcast(omega, y)
+    inputs = (omega, y) if chunks is None else xarray.broadcast(omega, y)
     if chunks is not None:
-        given = tuple(each.chunk(chunks) for each in given)
-    found = xarray.apply_ufunc(last, *given, dask="parallelized", output_dtypes=[float])
-    np.testing.assert_array_equal(found.transpose("omega", "y0"), truth)
+        inputs = tuple(each.chunk(chunks) for each in inputs)
+    states = xarray.apply_ufunc(last, *inputs, dask="parallelized", output_dtypes=[float])
+    np.testing.assert_array_equal(states.transpose("omega", "y0"), truth)
 
 
 def test_integrate_within_dask_arrays(client: Any) -> None:
     import dask.array as da
 
     omega = np.linspace(1.0, 2.0, 100)
-    found = da.map_blocks(last, da.from_array(omega, chunks=17), 1.0, dtype=float).compute()
-    np.testing.assert_array_equal(found, sw.integrate(sw.Oscillator(omega), "rk4", v=0.0, y=1.0, dt=0.1, steps=50).y[-1])
+    states = da.map_blocks(last, da.from_array(omega, chunks=17), 1.0, dtype=float).compute()
+    np.testing.assert_array_equal(states, sw.integrate(sw.Oscillator(omega), "rk4", v=0.0, y=1.0, dt=0.1, steps=50).y[-1])
 
 
 def test_a_graph_of_dask_delayed(client: Any) -> None:

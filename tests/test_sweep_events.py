@@ -31,28 +31,28 @@ STEPS: list[dict[str, Any]] = [{"dt": 0.01, "steps": 300}, {"tolerance": 1e-9, "
 @pytest.mark.parametrize("steps", STEPS, ids=["fixed", "tolerance"])
 def test_counts_and_times_are_those_of_a_closed_form(steps: dict[str, Any]) -> None:
     """Bounce k is after fall·(1 + 2·(e + … + e^(k−1))); members whose series ends before t = 3 rest from there on."""
-    made = sw.sweep(ball, AXES, "dop853", v=0.0, events=[GROUND, TOP], outcomes=["last", "extremes"], **steps)
+    dataset = sw.sweep(ball, AXES, "dop853", v=0.0, events=[GROUND, TOP], outcomes=["last", "extremes"], **steps)
     fall = np.sqrt(2.0 * HEIGHT / GRAVITY)
-    np.testing.assert_allclose(made.ground_t, np.broadcast_to(fall, (9, 3)), rtol=1e-12)
-    np.testing.assert_allclose(made.top_t, fall * (1.0 + E[:, np.newaxis]), rtol=1e-12)
+    np.testing.assert_allclose(dataset.ground_t, np.broadcast_to(fall, (9, 3)), rtol=1e-12)
+    np.testing.assert_allclose(dataset.top_t, fall * (1.0 + E[:, np.newaxis]), rtol=1e-12)
     ends = fall * ((1.0 + E) / (1.0 - E))[:, np.newaxis]
     rests = ends < 3.0
-    np.testing.assert_allclose(made.stopped_at, np.where(rests, ends, np.nan), rtol=1e-9)
-    np.testing.assert_array_equal(made.status, np.where(rests, int(sw.Status.REST), 0))
+    np.testing.assert_allclose(dataset.stopped_at, np.where(rests, ends, np.nan), rtol=1e-9)
+    np.testing.assert_array_equal(dataset.status, np.where(rests, int(sw.Status.REST), 0))
     k = np.arange(200)
     bounces = fall[:, np.newaxis] * (1.0 + 2.0 * np.cumsum(np.where(k > 0, E[:, np.newaxis, np.newaxis] ** k, 0.0), axis=-1))
     counts = (bounces < 3.0).sum(axis=-1)
-    np.testing.assert_array_equal(made.ground_count.values[~rests], counts[~rests])
-    assert (made.ground_count.values[rests] > 5).all()
-    assert (made.y_min > -1e-12).all()
+    np.testing.assert_array_equal(dataset.ground_count.values[~rests], counts[~rests])
+    assert (dataset.ground_count.values[rests] > 5).all()
+    assert (dataset.y_min > -1e-12).all()
 
 
 @pytest.mark.parametrize("steps", STEPS, ids=["fixed", "tolerance"])
 def test_chunks_processes_and_stores_have_the_same_bits(steps: dict[str, Any], tmp_path: Path) -> None:
     def bits(**options: Any) -> str:
         outcomes = ["last", "mean", "history"] if "at" in steps else ["last", "mean"]
-        made = sw.sweep(ball, AXES, "merson", v=0.0, events=[GROUND, TOP], outcomes=outcomes, **steps, **options)
-        return str(made.attrs["bits"])
+        dataset = sw.sweep(ball, AXES, "merson", v=0.0, events=[GROUND, TOP], outcomes=outcomes, **steps, **options)
+        return str(dataset.attrs["bits"])
 
     expected = bits()
     assert bits(chunk=4, threads=2) == expected
@@ -74,17 +74,17 @@ def test_a_function_sees_the_events_of_its_run() -> None:
     def second(run: sw.Run) -> Any:
         return np.array([run.events["ground"].of(i).t[1] for i in range(run.status.size)])
 
-    made = sw.sweep(ball, AXES, "rk4", v=0.0, dt=0.01, steps=300, events=GROUND, outcomes=second)
+    dataset = sw.sweep(ball, AXES, "rk4", v=0.0, dt=0.01, steps=300, events=GROUND, outcomes=second)
     fall = np.sqrt(2.0 * HEIGHT / GRAVITY)
-    np.testing.assert_allclose(made.second, fall * (1.0 + 2.0 * E[:, np.newaxis]), rtol=1e-12)
+    np.testing.assert_allclose(dataset.second, fall * (1.0 + 2.0 * E[:, np.newaxis]), rtol=1e-12)
 
 
 def test_members_that_an_event_stops_are_told_by_their_status_without_a_warning() -> None:
     """And those that diverge with one."""
     stop = sw.Event(lambda t, v, y: y, direction=-1, terminal=True, name="ground")
-    made = sw.sweep(ball, AXES, "rk4", v=0.0, dt=0.01, steps=300, events=stop)
-    assert (made.status == int(sw.Status.EVENT)).all()
-    np.testing.assert_allclose(made.stopped_at, np.broadcast_to(np.sqrt(2.0 * HEIGHT / GRAVITY), (9, 3)), rtol=1e-12)
+    dataset = sw.sweep(ball, AXES, "rk4", v=0.0, dt=0.01, steps=300, events=stop)
+    assert (dataset.status == int(sw.Status.EVENT)).all()
+    np.testing.assert_allclose(dataset.stopped_at, np.broadcast_to(np.sqrt(2.0 * HEIGHT / GRAVITY), (9, 3)), rtol=1e-12)
 
 
 def test_what_does_not_go_is_refused_in_words() -> None:

@@ -66,10 +66,10 @@ def test_a_map_is_its_mirror_image_to_the_last_bit_for_the_order_of_the_sum(tmp_
     other: dict[str, Any] = {"__name__": "other"}
     exec(compile(code.replace(right, "pulls[0] + (pulls[1] + pulls[2])"), "other", "exec"), other)
     starts = np.array([[-1.3, 1.3], [0.7, 0.7]])
-    for made, alike in ((names, True), (other, False)):
+    for namespace, alike in ((names, True), (other, False)):
         import stepwell as sw
 
-        run = sw.integrate(made["pendulum"](), "rk4", v=0.0, y=starts, dt=0.04, steps=200)
+        run = sw.integrate(namespace["pendulum"](), "rk4", v=0.0, y=starts, dt=0.04, steps=200)
         assert np.array_equal(run.y[-1, :, 0], [-1.0, 1.0] * run.y[-1, :, 1]) is alike
 
 

@@ -21,29 +21,29 @@ each_type = pytest.mark.parametrize("dtype", ["float64", "float32"])
 def whole(**options: Any) -> tuple[Any, sw.Run]:
     """A sweep, and the run of the same members with every observed state."""
     gamma = np.linspace(0.1, 0.6, 40)
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.05}
-    found = sw.sweep(duffing, {"gamma": ("gamma", gamma)}, "rk4", steps=400, transient=30, chunk=7, **given, **options)
-    start = sw.integrate(duffing(gamma=gamma), "rk4", steps=30, **given)
-    return found, sw.integrate(duffing(gamma=gamma), "rk4", steps=400, every=1, resume=start)
+    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.05}
+    dataset = sw.sweep(duffing, {"gamma": ("gamma", gamma)}, "rk4", steps=400, transient=30, chunk=7, **arguments, **options)
+    start = sw.integrate(duffing(gamma=gamma), "rk4", steps=30, **arguments)
+    return dataset, sw.integrate(duffing(gamma=gamma), "rk4", steps=400, every=1, resume=start)
 
 
 def test_extremes() -> None:
-    found, run = whole(outcomes=["extremes", sw.sweeps.Extremes("energy"), sw.sweeps.Extremes(power)])
+    dataset, run = whole(outcomes=["extremes", sw.sweeps.Extremes("energy"), sw.sweeps.Extremes(power)])
     for name, values in {"v": run.v, "y": run.y, "energy": run.quantity("energy"), "power": run.v * run.y}.items():
-        np.testing.assert_array_equal(found[f"{name}_min"], values.min(axis=0))
-        np.testing.assert_array_equal(found[f"{name}_max"], values.max(axis=0))
+        np.testing.assert_array_equal(dataset[f"{name}_min"], values.min(axis=0))
+        np.testing.assert_array_equal(dataset[f"{name}_max"], values.max(axis=0))
 
 
 @pytest.mark.parametrize("observe", [1, 7, 400])
 def test_means(observe: int) -> None:
     """By the trapezoidal rule, the last interval shorter where the steps are no multiple of the interval."""
-    found, run = whole(outcomes=["mean", sw.sweeps.Mean(power, name="p")], observe=observe)
+    dataset, run = whole(outcomes=["mean", sw.sweeps.Mean(power, name="p")], observe=observe)
     k = np.unique(np.append(np.arange(0, 401, observe), 400))
     for name, values in {"v": run.v, "y": run.y, "p": run.v * run.y}.items():
         t = run.t[k]
         sums = ((t[1:] - t[:-1])[:, None] / 2 * (values[k][1:] + values[k][:-1])).sum(axis=0) / (t[-1] - t[0])
         # n additions of numbers of size 1 err by n·2⁻⁵³ at most, on both sides.
-        np.testing.assert_allclose(found[f"{name}_mean"], sums, atol=2 * 400 * 2**-53 * abs(values).max())
+        np.testing.assert_allclose(dataset[f"{name}_mean"], sums, atol=2 * 400 * 2**-53 * abs(values).max())
 
 
 def mean_of(t: Any, values: Any) -> Any:
@@ -56,20 +56,20 @@ def mean_of(t: Any, values: Any) -> Any:
 
 def test_what_is_found_of_states_of_float32_is_computed_in_float64() -> None:
     outcomes = ["mean", "extremes", sw.sweeps.Mean(power), sw.sweeps.Extremes("energy"), ends]
-    found = small(dtype="float32", outcomes=outcomes, transient=0)
+    dataset = small(dtype="float32", outcomes=outcomes, transient=0)
     gamma, y = (values for _, values in AXES.values())
     system = duffing(delta=0.2, gamma=gamma[:, None])
     run = sw.integrate(system, "rk4", v=0.0, y=y, dt=0.05, steps=80, every=1, dtype="float32")
     y, v = run.y.astype(np.float64), run.v.astype(np.float64)
-    np.testing.assert_array_equal(found.y_mean, mean_of(run.t, y))
-    np.testing.assert_array_equal(found.power_mean, mean_of(run.t, v * y))
-    np.testing.assert_array_equal(found.energy_max, run.energy.max(axis=0))
-    np.testing.assert_array_equal(found.y_max, run.y.max(axis=0))
-    assert found.y_max.dtype == found.twice.dtype == F
-    assert found.y_mean.dtype == found.power_mean.dtype == found.energy_max.dtype == np.float64
+    np.testing.assert_array_equal(dataset.y_mean, mean_of(run.t, y))
+    np.testing.assert_array_equal(dataset.power_mean, mean_of(run.t, v * y))
+    np.testing.assert_array_equal(dataset.energy_max, run.energy.max(axis=0))
+    np.testing.assert_array_equal(dataset.y_max, run.y.max(axis=0))
+    assert dataset.y_max.dtype == dataset.twice.dtype == F
+    assert dataset.y_mean.dtype == dataset.power_mean.dtype == dataset.energy_max.dtype == np.float64
     # Sums and products of float32 are others.
-    assert (mean_of(run.t.astype(F), run.y) != found.y_mean).any()
-    assert (mean_of(run.t, (run.v * run.y).astype(np.float64)) != found.power_mean).any()
+    assert (mean_of(run.t.astype(F), run.y) != dataset.y_mean).any()
+    assert (mean_of(run.t, (run.v * run.y).astype(np.float64)) != dataset.power_mean).any()
 
 
 def test_means_of_a_closed_form() -> None:
@@ -77,10 +77,10 @@ def test_means_of_a_closed_form() -> None:
     steps = 200
     axes = {"y": ("y0", [1.0, 2.0])}
     of = sw.sweeps.Mean(lambda t, v, y: y * y, name="square")
-    found = sw.sweep(Oscillator(1.0), axes, "rk4", v=0.0, dt=2 * np.pi / steps, steps=steps, outcomes=of)
+    dataset = sw.sweep(Oscillator(1.0), axes, "rk4", v=0.0, dt=2 * np.pi / steps, steps=steps, outcomes=of)
     # RK4 errs by Φ⁵/120 a step, so y by 2π·Φ⁴/120 after a period, and y² by twice that, times the amplitude squared.
     bound = 2 * 2 * np.pi * (2 * np.pi / steps) ** 4 / 120
-    np.testing.assert_allclose(found.square_mean, [0.5, 2.0], rtol=2 * bound)
+    np.testing.assert_allclose(dataset.square_mean, [0.5, 2.0], rtol=2 * bound)
 
 
 def crossing_errors(steps: int, **options: Any) -> Any:
@@ -88,13 +88,13 @@ def crossing_errors(steps: int, **options: Any) -> Any:
     omega = np.array([1.0, 1.3, 1.7])
     h = 2.0 / steps
     of = sw.sweeps.Crossing("y", 0.5, "falling", **options)
-    found = sw.sweep(Oscillator, {"omega": omega}, "rk4", v=0.0, y=1.0, dt=h, steps=steps, outcomes=of)
+    dataset = sw.sweep(Oscillator, {"omega": omega}, "rk4", v=0.0, y=1.0, dt=h, steps=steps, outcomes=of)
     t, phi = np.pi / 3 / omega, omega * h
     # A cubic by values and slopes at both ends errs by h⁴/384 of the fourth derivative, which is ω⁴ at most. RK4's states err by
     # Φ⁵/120 a step. The slopes err as much, and a cubic takes 4/27 of an interval of them: 4/27·Φ < 3 % more. The speed there is
     # ω·sin 60°.
     bound = 1.1 * (phi**4 / 384 + t / h * phi**5 / 120) / (omega * np.sin(np.pi / 3)) + 1e-15
-    return abs(found.y_crossing.values - t), bound
+    return abs(dataset.y_crossing.values - t), bound
 
 
 @pytest.mark.parametrize("steps", [20, 40, 80, 400])
@@ -112,7 +112,7 @@ def test_linear_crossings_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.mutant
 def test_slopes_of_the_wrong_sign_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(crossings, "rates", lambda *given: -np.asarray(observed.rates(*given)))
+    monkeypatch.setattr(crossings, "rates", lambda *arguments: -np.asarray(observed.rates(*arguments)))
     errors, bound = crossing_errors(40)
     assert (errors > 10 * bound).any()
 
@@ -121,8 +121,8 @@ def test_crossings_of_other_quantities_are_linear() -> None:
     """Of a function: (interval)²/8 · largest curvature / speed."""
     omega, h = np.array([1.0, 1.7]), 0.02
     of = sw.sweeps.Crossing(lambda t, v, y: y, 0.5, "falling", name="first")
-    found = sw.sweep(Oscillator, {"omega": omega}, "rk4", v=0.0, y=1.0, dt=h, steps=100, outcomes=of)
-    errors = abs(found.first_crossing.values - np.pi / 3 / omega)
+    dataset = sw.sweep(Oscillator, {"omega": omega}, "rk4", v=0.0, y=1.0, dt=h, steps=100, outcomes=of)
+    errors = abs(dataset.first_crossing.values - np.pi / 3 / omega)
     assert (errors < 1.01 * h**2 / 8 * omega**2 / (omega * np.sin(np.pi / 3))).all()
     assert (errors > 1e-7).any()
 
@@ -134,23 +134,23 @@ def test_a_crossing_is_found_between_states_of_float32() -> None:
     """
     steps, h = 20, 0.1
     crossing = sw.sweeps.Crossing("y", direction="falling")
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": h, "steps": steps, "outcomes": crossing, "dtype": "float32"}
-    found = sw.sweep(sw.Oscillator, {"omega": [1.0, 1.0]}, "dop853", **given)
-    assert found.y_crossing.dtype == np.float64
-    assert abs(found.y_crossing.values - np.pi / 2).max() < 10 * steps * 2.0**-25 + h**4 / 384
+    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": h, "steps": steps, "outcomes": crossing, "dtype": "float32"}
+    dataset = sw.sweep(sw.Oscillator, {"omega": [1.0, 1.0]}, "dop853", **arguments)
+    assert dataset.y_crossing.dtype == np.float64
+    assert abs(dataset.y_crossing.values - np.pi / 2).max() < 10 * steps * 2.0**-25 + h**4 / 384
     run = sw.integrate(sw.Oscillator(1.0), "dop853", v=0.0, y=1.0, dt=h, steps=steps, every=1, dtype="float32")
     after = int(np.argmax(run.y <= 0.0))
-    assert run.t[after - 1] < found.y_crossing.values[0] < run.t[after]
+    assert run.t[after - 1] < dataset.y_crossing.values[0] < run.t[after]
 
 
 def test_directions_and_what_never_passes() -> None:
     outcomes = [sw.sweeps.Crossing("y", 0.5, d, name=d) for d in ("falling", "rising", "both")]
-    found = sw.sweep(Oscillator(1.0), {"y": [1.0, 0.4]}, "rk4", v=0.0, dt=0.01, steps=600, outcomes=[*outcomes, "crossing"])
+    dataset = sw.sweep(Oscillator(1.0), {"y": [1.0, 0.4]}, "rk4", v=0.0, dt=0.01, steps=600, outcomes=[*outcomes, "crossing"])
     third = np.pi / 3
     for name, time in {"falling": third, "rising": 5 * third, "both": third}.items():
-        assert float(found[f"{name}_crossing"][0]) == pytest.approx(time, abs=1e-8)
-        assert np.isnan(found[f"{name}_crossing"][1])
-    np.testing.assert_allclose(found.y_crossing, 1.5 * np.pi, atol=1e-8)
+        assert float(dataset[f"{name}_crossing"][0]) == pytest.approx(time, abs=1e-8)
+        assert np.isnan(dataset[f"{name}_crossing"][1])
+    np.testing.assert_allclose(dataset.y_crossing, 1.5 * np.pi, atol=1e-8)
 
 
 @pytest.mark.parametrize(("number", "word"), [(1, "rising"), (-1, "falling"), (0, "both")])
@@ -173,10 +173,10 @@ def test_a_crossing_at_a_state_counts_once() -> None:
         sw.sweeps.Crossing(lambda t, v, y: t + 0.0 * y, 0.5, name="met"),
         sw.sweeps.Period(lambda t, v, y: t + 0.0 * y, 0.5, name="met"),
     ]
-    found = sw.sweep(Oscillator(1.0), {"y": [1.0, 2.0]}, "rk4", v=0.0, dt=0.25, steps=8, outcomes=of)
-    np.testing.assert_array_equal(found.met_crossing, 0.5)
-    np.testing.assert_array_equal(found.met_passages, 1)
-    assert np.isnan(found.met_period).all()
+    dataset = sw.sweep(Oscillator(1.0), {"y": [1.0, 2.0]}, "rk4", v=0.0, dt=0.25, steps=8, outcomes=of)
+    np.testing.assert_array_equal(dataset.met_crossing, 0.5)
+    np.testing.assert_array_equal(dataset.met_passages, 1)
+    assert np.isnan(dataset.met_period).all()
 
 
 @pytest.mark.parametrize("memory", [64 * 2**20, 3000])
@@ -184,17 +184,17 @@ def test_periods(memory: float) -> None:
     """Of 2π/ω: RK4's own frequency is lower by Φ⁴/120; n intervals share the errors of two passages, of Φ⁴/384 each at most."""
     omega, h, steps = np.array([1.0, 1.5, 2.0]), 0.05, 1000
     of = sw.sweeps.Period("y", 0.2)
-    found = sw.sweep(Oscillator, {"omega": omega}, "rk4", v=0.0, y=1.0, dt=h, steps=steps, outcomes=of, memory=memory)
+    dataset = sw.sweep(Oscillator, {"omega": omega}, "rk4", v=0.0, y=1.0, dt=h, steps=steps, outcomes=of, memory=memory)
     phi, period = omega * h, 2 * np.pi / omega
     expected = np.floor((steps * h - np.arccos(-0.2) / omega) / period)
-    n = found.y_passages.values - 1
+    n = dataset.y_passages.values - 1
     assert (abs(n - expected) <= 1).all()
     speed = omega * np.sqrt(1 - 0.2**2)
     # The amplitude falls by Φ⁶/144 a step, which moves a passage of 0.2 by 0.2/speed times that.
     drift = 0.2 / speed * steps * phi**6 / 144 / n
     bound = 1.1 * (period * phi**4 / 120 + 2 * phi**4 / 384 / speed / n + drift)
-    assert (abs(found.y_period.values - period) < bound).all()
-    wrong = found.y_period.values * n / (n + 1)  # as many intervals as passages
+    assert (abs(dataset.y_period.values - period) < bound).all()
+    wrong = dataset.y_period.values * n / (n + 1)  # as many intervals as passages
     assert (abs(wrong - period) > bound).all()
 
 
@@ -213,69 +213,71 @@ def test_a_sweep_of_exponents_stops_between_two_orthonormalisations() -> None:
 
 def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
     gamma = np.array([0.2, 0.5])
-    found = sw.sweep(
+    dataset = sw.sweep(
         duffing, {"gamma": gamma}, "rk4", v=0.0, y=1.0, dt=0.05, steps=300, transient=40, outcomes=sw.sweeps.Exponents("all", 5)
     )
     truth = sw.lyapunov(duffing(gamma=gamma), "rk4", v=0.0, y=1.0, dt=0.05, steps=300, transient=40, exponents="all", every=5)
-    np.testing.assert_array_equal(found.lyapunov, truth.exponents.T)
+    np.testing.assert_array_equal(dataset.lyapunov, truth.exponents.T)
     # The sum of both is minus the damping, up to the error of RK4.
-    np.testing.assert_allclose(found.lyapunov.sum("exponent"), -0.3, atol=1e-5)
+    np.testing.assert_allclose(dataset.lyapunov.sum("exponent"), -0.3, atol=1e-5)
 
 
 @each_type
 @pytest.mark.parametrize(("every", "steps"), [(1, 10), (4, 10), (5, 10), (20, 10)])
 def test_histories_are_those_of_integrate(every: int, steps: int, dtype: Any) -> None:
     omega = np.array([1.0, 2.0, 3.0])
-    given: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": steps, "every": every, "dtype": dtype}
-    found = sw.sweep(Oscillator, {"omega": omega}, "verlet", **given, memory=1500, chunk=2)
-    run = sw.integrate(Oscillator(omega), "verlet", **given)
-    assert found.y.dtype == found.v.dtype == run.y.dtype == dtype
-    assert found.attrs.get("dtype", "float64") == dtype
-    np.testing.assert_array_equal(found.y, run.y.T)
-    np.testing.assert_array_equal(found.v, run.v.T)
-    np.testing.assert_array_equal(found.t, run.t)
+    arguments: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": steps, "every": every, "dtype": dtype}
+    dataset = sw.sweep(Oscillator, {"omega": omega}, "verlet", **arguments, memory=1500, chunk=2)
+    run = sw.integrate(Oscillator(omega), "verlet", **arguments)
+    assert dataset.y.dtype == dataset.v.dtype == run.y.dtype == dtype
+    assert dataset.attrs.get("dtype", "float64") == dtype
+    np.testing.assert_array_equal(dataset.y, run.y.T)
+    np.testing.assert_array_equal(dataset.v, run.v.T)
+    np.testing.assert_array_equal(dataset.t, run.t)
 
 
 def test_a_history_beside_reductions_that_see_other_states() -> None:
-    found = sw.sweep(
+    dataset = sw.sweep(
         Oscillator, {"omega": [1.0, 2.0]}, "rk4", v=0.0, y=1.0, dt=0.1, steps=20, every=6, observe=4,
         outcomes=["history", "extremes", "last"], memory=1500,
     )  # fmt: skip
     run = sw.integrate(Oscillator([1.0, 2.0]), "rk4", v=0.0, y=1.0, dt=0.1, steps=20, every=1)
-    np.testing.assert_array_equal(found.y, run.y[[0, 6, 12, 18, 20]].T)
-    np.testing.assert_array_equal(found.y_min, run.y[[0, 4, 8, 12, 16, 20]].min(axis=0))
-    np.testing.assert_array_equal(found.y_last, run.y[-1])
+    np.testing.assert_array_equal(dataset.y, run.y[[0, 6, 12, 18, 20]].T)
+    np.testing.assert_array_equal(dataset.y_min, run.y[[0, 4, 8, 12, 16, 20]].min(axis=0))
+    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
 
 
 def test_functions_of_a_run() -> None:
     def seen(run: sw.Run) -> Any:
         return {"largest": abs(run.y).max(axis=0), "states": ("k", run.y), "number": np.full(run.status.size, len(run.t))}
 
-    found, run = whole(outcomes=[seen, lambda run: run.y[-1] > 0], every=50)
-    assert "y" not in found
-    np.testing.assert_array_equal(found.states, run.y[::50].T)
-    np.testing.assert_array_equal(found.largest, abs(run.y[::50]).max(axis=0))
-    assert found.number.dtype.kind == "i"
-    np.testing.assert_array_equal(found.function, run.y[-1] > 0)
+    dataset, run = whole(outcomes=[seen, lambda run: run.y[-1] > 0], every=50)
+    assert "y" not in dataset
+    np.testing.assert_array_equal(dataset.states, run.y[::50].T)
+    np.testing.assert_array_equal(dataset.largest, abs(run.y[::50]).max(axis=0))
+    assert dataset.number.dtype.kind == "i"
+    np.testing.assert_array_equal(dataset.function, run.y[-1] > 0)
 
 
 def test_what_diverges_leaves_the_others_alone() -> None:
     omega = np.array([1.0, 30.0, 2.0, 40.0])
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1000}
+    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1000}
     message = r"2 of 4 members diverged, the first of them at omega = 30, at step 369; status and first_bad_step tell"
     with pytest.warns(sw.DivergenceWarning, match=message) as caught:
-        found = sw.sweep(Oscillator, {"omega": omega}, "false_euler", outcomes=["last", "extremes", "period"], chunk=3, **given)
+        dataset = sw.sweep(
+            Oscillator, {"omega": omega}, "false_euler", outcomes=["last", "extremes", "period"], chunk=3, **arguments
+        )
     assert len(caught) == 1
     assert caught[0].filename == __file__
     with pytest.warns(sw.DivergenceWarning):
-        run = sw.integrate(Oscillator(omega), "false_euler", **given)
-    np.testing.assert_array_equal(found.status, run.status)
-    np.testing.assert_array_equal(found.first_bad_step, run.first_bad_step)
-    alone = sw.sweep(Oscillator, {"omega": omega[::2]}, "false_euler", outcomes=["last", "extremes", "period"], **given)
+        run = sw.integrate(Oscillator(omega), "false_euler", **arguments)
+    np.testing.assert_array_equal(dataset.status, run.status)
+    np.testing.assert_array_equal(dataset.first_bad_step, run.first_bad_step)
+    alone = sw.sweep(Oscillator, {"omega": omega[::2]}, "false_euler", outcomes=["last", "extremes", "period"], **arguments)
     for name in alone.data_vars:
-        np.testing.assert_array_equal(found[name][::2], alone[name])
-    assert found.status.attrs["flag_meanings"].split()[:3] == ["not_computed", "ok", "diverged"]
-    assert np.isnan(found.y_max[1])
+        np.testing.assert_array_equal(dataset[name][::2], alone[name])
+    assert dataset.status.attrs["flag_meanings"].split()[:3] == ["not_computed", "ok", "diverged"]
+    assert np.isnan(dataset.y_max[1])
 
 
 def test_finite_numbers_that_mean_nothing_are_told() -> None:
@@ -299,10 +301,10 @@ def test_rates_are_those_of_the_motion(name: str) -> None:
     v, y = (rng.uniform(0.5, 1.0, (*shape, 3)) for shape in (system.v_shape, system.y_shape))
     run = sw.integrate(system, "rk4", v=v, y=y, dt=0.1, steps=1)
     for block in ("v", "y"):
-        found = observed.rates(run, block, t, v, y)
-        assert found is not None
+        rates = observed.rates(run, block, t, v, y)
+        assert rates is not None
         for i in range(3):
             after = sw.integrate(system, "rk4", v=v, y=y, dt=h, steps=1, t0=float(t[i]))
             change = (getattr(after, block)[-1] - (v if block == "v" else y))[..., i] / h
             # Rates change by some units in a unit of time (bodies that are near: some hundred), and differences are rounded.
-            np.testing.assert_allclose(found[..., i], change, atol=1e3 * h, rtol=1e-4)
+            np.testing.assert_allclose(rates[..., i], change, atol=1e3 * h, rtol=1e-4)

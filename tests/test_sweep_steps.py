@@ -25,18 +25,18 @@ STEPS = [0.1, 0.05, 0.025]
 )
 def test_the_step_alone_is_varied(system: sw.System, v: Any, y: Any) -> None:
     for axes in ({"dt": STEPS}, {"dt": ("run", STEPS)}, {"dt": (("a", "b"), np.array([STEPS, STEPS[::-1]]))}):
-        found = sw.sweep(system, axes, "rk4", v=v, y=y, steps=10, outcomes=["last", "extremes", "mean"])
+        dataset = sw.sweep(system, axes, "rk4", v=v, y=y, steps=10, outcomes=["last", "extremes", "mean"])
         for i, dt in enumerate(STEPS):
             run = sw.integrate(system, "rk4", v=v, y=y, dt=dt, steps=10)
             for name, block in (("v_last", run.v[-1]), ("y_last", run.y[-1])):
-                values = found[name].values
-                np.testing.assert_array_equal(values[0, i] if len(found["status"].dims) == 2 else values[i], block)
+                values = dataset[name].values
+                np.testing.assert_array_equal(values[0, i] if len(dataset["status"].dims) == 2 else values[i], block)
 
 
 def test_systems_made_of_parameters_and_the_step_alone() -> None:
-    found = sw.sweep(sw.Oscillator, {"dt": STEPS}, "rk4", v=0.0, y=1.0, steps=10, every=2)
-    assert found["y"].dims == ("dt", "saved")
-    assert found["status"].shape == (3,)
+    dataset = sw.sweep(sw.Oscillator, {"dt": STEPS}, "rk4", v=0.0, y=1.0, steps=10, every=2)
+    assert dataset["y"].dims == ("dt", "saved")
+    assert dataset["status"].shape == (3,)
 
 
 def test_means_are_summed_state_after_state_whatever_the_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,18 +51,18 @@ def test_means_are_summed_state_after_state_whatever_the_pieces(monkeypatch: pyt
         whole(self, t, all_of)
 
     monkeypatch.setattr(outcomes._Mean, "_add", counted)
-    found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, steps=2000, outcomes="mean")
+    dataset = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, steps=2000, outcomes="mean")
     assert len(calls) <= 6  # one for each member, and one for each of two that are tried
     monkeypatch.setattr(outcomes, "NUMBERS_AT_ONCE", 7)
     np.testing.assert_array_equal(
-        sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, steps=2000, outcomes="mean").y_mean, found.y_mean
+        sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, steps=2000, outcomes="mean").y_mean, dataset.y_mean
     )
     for i, each in enumerate(omega):
         run = sw.integrate(sw.Oscillator(each), "rk4", v=0.0, y=1.0, dt=0.1 / each, steps=2000, every=1)
         total = 0.0
         for k in range(2000):
             total += 0.5 * (run.t[k + 1] - run.t[k]) * (run.y[k] + run.y[k + 1])
-        assert found.y_mean.values[i] == total / (run.t[-1] - run.t[0])
+        assert dataset.y_mean.values[i] == total / (run.t[-1] - run.t[0])
 
 
 def test_a_dimension_that_two_arguments_have_in_common_has_a_name_of_its_own() -> None:
@@ -72,7 +72,7 @@ def test_a_dimension_that_two_arguments_have_in_common_has_a_name_of_its_own() -
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("options", "message"),
     [
         ({"outcomes": ["mean", sw.sweeps.Mean("y", name="y")]}, "two results 'y_mean'"),
         ({"outcomes": ["last", "last"]}, "two results"),
@@ -80,13 +80,13 @@ def test_a_dimension_that_two_arguments_have_in_common_has_a_name_of_its_own() -
         ({"axes": {"omega": ("y_mean", [1.0, 2.0])}, "outcomes": "mean"}, "'y_mean' is the name of a result"),
     ],
 )
-def test_names_that_clash_are_refused_before_any_chunk(given: Any, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_names_that_clash_are_refused_before_any_chunk(options: Any, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
     from stepwell.studies.sweeps import engines
 
     def never(*_: Any) -> Any:
         raise AssertionError("a chunk was computed")
 
     monkeypatch.setattr(engines, "run", never)
-    axes = given.pop("axes", {"omega": [1.0, 2.0]})
+    axes = options.pop("axes", {"omega": [1.0, 2.0]})
     with pytest.raises(ArgumentError, match=message):
-        sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.1, steps=10, **given)
+        sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.1, steps=10, **options)

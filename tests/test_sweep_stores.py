@@ -48,12 +48,12 @@ def test_a_store_holds_what_memory_would(ending: str, every: int | None, tmp_pat
         "units": {"t": "s"},
     }
     there = small(**options)
-    with small(**options, store=tmp_path / f"a.{ending}", chunk=7) as found:
-        assert unlike(there, found) == []
-        assert there.attrs == {name: value.item() if hasattr(value, "item") else value for name, value in found.attrs.items()}
-        assert found.y_last.attrs == there.y_last.attrs
-        assert set(found.coords) == set(there.coords)
-        assert list(found.data_vars) == list(there.data_vars)
+    with small(**options, store=tmp_path / f"a.{ending}", chunk=7) as dataset:
+        assert unlike(there, dataset) == []
+        assert there.attrs == {name: value.item() if hasattr(value, "item") else value for name, value in dataset.attrs.items()}
+        assert dataset.y_last.attrs == there.y_last.attrs
+        assert set(dataset.coords) == set(there.coords)
+        assert list(dataset.data_vars) == list(there.data_vars)
     assert os.listdir(tmp_path) == [f"a.{ending}"]
 
 
@@ -78,11 +78,11 @@ def interrupted(path: Path, after: int, monkeypatch: pytest.MonkeyPatch, error: 
     """A sweep that stops after so many chunks."""
     original, left = stores.Zarr.write, [after]
 
-    def write(self: Any, chunk: Any, found: Any) -> None:
+    def write(self: Any, chunk: Any, results: Any) -> None:
         if left[0] == 0:
             raise error
         left[0] -= 1
-        original(self, chunk, found)
+        original(self, chunk, results)
 
     with monkeypatch.context() as patch:
         patch.setattr(stores.Zarr, "write", write)
@@ -95,10 +95,10 @@ def test_it_goes_on_where_it_stopped(ending: str, tmp_path: Path, monkeypatch: p
     path = tmp_path / f"a.{ending}"
     interrupted(path, 3, monkeypatch)
     computed.clear()
-    with small(store=path, outcomes="last") as found:
+    with small(store=path, outcomes="last") as dataset:
         assert len(computed) == 2
-        assert unlike(small(outcomes="last"), found) == []
-        assert found.attrs["bits"] == small(outcomes="last").attrs["bits"]
+        assert unlike(small(outcomes="last"), dataset) == []
+        assert dataset.attrs["bits"] == small(outcomes="last").attrs["bits"]
 
 
 def test_ctrl_c_leaves_a_valid_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,9 +118,9 @@ def chunk_files(path: Path, name: str) -> list[Path]:
     return sorted(each for each in (path / name / "c").rglob("*") if each.is_file())
 
 
-@pytest.mark.parametrize("how", ["empty", "half", "a bit", "gone", "another"])
+@pytest.mark.parametrize("damage", ["empty", "half", "a bit", "gone", "another"])
 @pytest.mark.parametrize("name", ["y_last", "status", "progress/hashes"])
-def test_a_torn_chunk_is_done_again(how: str, name: str, tmp_path: Path, computed: list[int]) -> None:
+def test_a_torn_chunk_is_done_again(damage: str, name: str, tmp_path: Path, computed: list[int]) -> None:
     """And no other one. Whole numbers are compressed, so a bit may be an error of the codec, or another number."""
     path = tmp_path / "a.zarr"
     whole = small(store=path, outcomes=["last"], chunk=10).load()
@@ -128,7 +128,7 @@ def test_a_torn_chunk_is_done_again(how: str, name: str, tmp_path: Path, compute
     files = chunk_files(path, name)
     assert len(files) == 5
     file, data = files[2], files[2].read_bytes()
-    match how:
+    match damage:
         case "empty":
             file.write_bytes(b"")
         case "half":
@@ -139,7 +139,7 @@ def test_a_torn_chunk_is_done_again(how: str, name: str, tmp_path: Path, compute
             file.unlink()
         case "another":
             file.write_bytes(files[3].read_bytes())
-    same = name == "status" and how == "another"  # since all members of all chunks ended well
+    same = name == "status" and damage == "another"  # since all members of all chunks ended well
     again = small(store=path, outcomes=["last"]).load()
     assert len(computed) == (5 if same else 6)
     assert unlike(whole, again) == []
@@ -175,18 +175,18 @@ def test_a_store_of_another_sweep_is_refused(tmp_path: Path) -> None:
 
 def test_a_store_holds_float32_and_goes_on_with_no_other(tmp_path: Any) -> None:
     store = tmp_path / "sweep.zarr"
-    given: dict[str, Any] = {"outcomes": ("last", "extremes", "mean"), "chunk": 9}
-    found = small(dtype="float32", store=store, **given)
-    assert found.y_last.dtype == np.float32
-    assert unlike(found.compute(), small(dtype="float32", **given)) == []
-    assert unlike(small(dtype="float32", store=store, **given).compute(), found.compute()) == []
+    options: dict[str, Any] = {"outcomes": ("last", "extremes", "mean"), "chunk": 9}
+    dataset = small(dtype="float32", store=store, **options)
+    assert dataset.y_last.dtype == np.float32
+    assert unlike(dataset.compute(), small(dtype="float32", **options)) == []
+    assert unlike(small(dtype="float32", store=store, **options).compute(), dataset.compute()) == []
     with pytest.raises(ArgumentError, match="is of another sweep and is not continued"):
-        small(store=store, **given)
+        small(store=store, **options)
 
 
 def test_other_equations_of_the_same_name_are_refused(tmp_path: Path) -> None:
     """The first steps of two members are compared to the bit."""
-    path, given = tmp_path / "a.zarr", {"y": 1.0, "v": 0.0, "dt": 0.1, "steps": 10}
+    path, arguments = tmp_path / "a.zarr", {"y": 1.0, "v": 0.0, "dt": 0.1, "steps": 10}
 
     def spring(factor: float) -> Any:
         @sw.system
@@ -195,10 +195,10 @@ def test_other_equations_of_the_same_name_are_refused(tmp_path: Path) -> None:
 
         return spring
 
-    sw.sweep(spring(1.0), {"k": [1.0, 2.0]}, "rk4", **given, store=path).close()
-    sw.sweep(spring(1.0), {"k": [1.0, 2.0]}, "rk4", **given, store=path).close()
+    sw.sweep(spring(1.0), {"k": [1.0, 2.0]}, "rk4", **arguments, store=path).close()
+    sw.sweep(spring(1.0), {"k": [1.0, 2.0]}, "rk4", **arguments, store=path).close()
     with pytest.raises(ArgumentError, match=r"is not continued \(the equations are others: their first steps have other bits"):
-        sw.sweep(spring(1.0 + 2**-50), {"k": [1.0, 2.0]}, "rk4", **given, store=path)
+        sw.sweep(spring(1.0 + 2**-50), {"k": [1.0, 2.0]}, "rk4", **arguments, store=path)
 
 
 @KINDS
@@ -227,10 +227,10 @@ def test_xarray_reads_it_by_itself(ending: str, tmp_path: Path) -> None:
     opened = xarray.open_dataset(
         path, **({"engine": "zarr", "consolidated": False} if ending == "zarr" else {"engine": "h5netcdf"})
     )
-    with opened as found:
-        assert found.y_last.dims == ("gamma", "y0")
-        assert float(found.y_last.sel(gamma=0.1, y0=1.0)) == float(small(outcomes="last").y_last.sel(gamma=0.1, y0=1.0))
-        assert json.loads(found.attrs["sweep"])["method"] == "rk4"
+    with opened as dataset:
+        assert dataset.y_last.dims == ("gamma", "y0")
+        assert float(dataset.y_last.sel(gamma=0.1, y0=1.0)) == float(small(outcomes="last").y_last.sel(gamma=0.1, y0=1.0))
+        assert json.loads(dataset.attrs["sweep"])["method"] == "rk4"
 
 
 #: A sweep of some seconds in a process of its own.
@@ -245,11 +245,11 @@ SLOW = """
         time.sleep(0.15)
         return {{"end": run.y[-1]}}
 
-    found = sw.sweep(
+    dataset = sw.sweep(
         partial(duffing, delta=0.2), AXES, "rk4", v=0.0, dt=0.05, steps=60, outcomes=["last", slow], chunk=2, threads=2,
         store={store!r},
     )
-    print("finished", found.attrs["bits"])
+    print("finished", dataset.attrs["bits"])
 """
 
 
@@ -305,9 +305,9 @@ def test_after_a_signal_in_the_middle(sent: signal.Signals, ending: str, tmp_pat
     whole = small(outcomes=["last", lambda run: {"end": run.y[-1]}], steps=60, transient=0)
     assert done_by.stdout.split() == ["finished", whole.attrs["bits"]]
     options = {"engine": "zarr", "consolidated": False} if ending == "zarr" else {"engine": "h5netcdf"}
-    with xarray.open_dataset(store, **options) as found:
-        np.testing.assert_array_equal(found.y_last, whole.y_last)
-        np.testing.assert_array_equal(found.end, whole.y_last)
+    with xarray.open_dataset(store, **options) as dataset:
+        np.testing.assert_array_equal(dataset.y_last, whole.y_last)
+        np.testing.assert_array_equal(dataset.end, whole.y_last)
 
 
 TORN = {
@@ -318,16 +318,16 @@ TORN = {
 
 
 @KINDS
-@pytest.mark.parametrize("how", TORN)
+@pytest.mark.parametrize("damage", TORN)
 @pytest.mark.parametrize("what", ["y_last", "status", "gamma", "y0", "progress/hashes"])
-def test_torn_metadata_is_told(what: str, how: str, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_torn_metadata_is_told(what: str, damage: str, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Before any work; nothing is written, so that what is whole can still be read."""
     path = tmp_path / f"a.{ending}"
     interrupted(path, 2, monkeypatch)
     store = path if ending == "zarr" else path.with_name(f"{path.name}.unfinished")
     file = store / what / "zarr.json"
     whole = file.read_bytes()
-    torn = TORN[how](whole)
+    torn = TORN[damage](whole)
     file.write_bytes(torn)
     with pytest.raises(ArgumentError, match=rf"^store: .* the metadata of {what} is torn \(.*remove it, or give another path"):
         small(store=path, outcomes="last")

@@ -36,15 +36,15 @@ OUTCOMES = (
 
 def adaptive(**options: Any) -> Any:
     """A sweep of 45 members with every outcome that goes with a tolerance."""
-    given: dict[str, Any] = {"v": 0.0, "tolerance": 1e-8, "at": AT, "outcomes": OUTCOMES} | options
-    axes, method = given.pop("axes", AXES), given.pop("method", "dop853")
-    return sw.sweep(partial(duffing, delta=0.2), axes, method, **given)
+    arguments: dict[str, Any] = {"v": 0.0, "tolerance": 1e-8, "at": AT, "outcomes": OUTCOMES} | options
+    axes, method = arguments.pop("axes", AXES), arguments.pop("method", "dop853")
+    return sw.sweep(partial(duffing, delta=0.2), axes, method, **arguments)
 
 
 def alike(method: str = "dop853", **options: Any) -> sw.Run:
     """The same members by ``integrate``."""
-    given: dict[str, Any] = {"v": 0.0, "y": Y0, "tolerance": 1e-8, "at": AT} | options
-    return sw.integrate(duffing(delta=0.2, gamma=GAMMA[:, None]), method, **given)
+    arguments: dict[str, Any] = {"v": 0.0, "y": Y0, "tolerance": 1e-8, "at": AT} | options
+    return sw.integrate(duffing(delta=0.2, gamma=GAMMA[:, None]), method, **arguments)
 
 
 # ---- the bits of integrate
@@ -52,18 +52,18 @@ def alike(method: str = "dop853", **options: Any) -> sw.Run:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_members_are_those_of_integrate(method: str) -> None:
-    found, run = adaptive(method=method, outcomes=["last", "history", "evaluations"], chunk=7, memory=20_000.0), alike(method)
+    dataset, run = adaptive(method=method, outcomes=["last", "history", "evaluations"], chunk=7, memory=20_000.0), alike(method)
     assert run.paces is not None
-    np.testing.assert_array_equal(found.y, np.moveaxis(run.y, 0, -1))
-    np.testing.assert_array_equal(found.v, np.moveaxis(run.v, 0, -1))
-    np.testing.assert_array_equal(found.y_last, run.y[-1])
-    np.testing.assert_array_equal(found.v_last, run.v[-1])
-    np.testing.assert_array_equal(found.t, AT)
-    np.testing.assert_array_equal(found.evaluations, run.paces.evaluations)
-    np.testing.assert_array_equal(found.accepted_steps, run.paces.accepted)
-    np.testing.assert_array_equal(found.rejected_steps, run.paces.rejected)
-    assert found.evaluations.dtype.kind == "i"
-    assert len(np.unique(found.evaluations)) > 1  # members have steps of their own
+    np.testing.assert_array_equal(dataset.y, np.moveaxis(run.y, 0, -1))
+    np.testing.assert_array_equal(dataset.v, np.moveaxis(run.v, 0, -1))
+    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
+    np.testing.assert_array_equal(dataset.v_last, run.v[-1])
+    np.testing.assert_array_equal(dataset.t, AT)
+    np.testing.assert_array_equal(dataset.evaluations, run.paces.evaluations)
+    np.testing.assert_array_equal(dataset.accepted_steps, run.paces.accepted)
+    np.testing.assert_array_equal(dataset.rejected_steps, run.paces.rejected)
+    assert dataset.evaluations.dtype.kind == "i"
+    assert len(np.unique(dataset.evaluations)) > 1  # members have steps of their own
 
 
 @pytest.mark.parametrize(
@@ -80,61 +80,61 @@ def test_members_are_those_of_integrate(method: str) -> None:
     ids=lambda options: next(iter(options)),
 )
 def test_arguments_are_those_of_integrate(options: dict[str, Any]) -> None:
-    found, run = adaptive(outcomes=["last", "evaluations"], chunk=10, memory=20_000.0, **options), alike(**options)
+    dataset, run = adaptive(outcomes=["last", "evaluations"], chunk=10, memory=20_000.0, **options), alike(**options)
     assert run.paces is not None
-    np.testing.assert_array_equal(found.y_last, run.y[-1])
-    np.testing.assert_array_equal(found.evaluations, run.paces.evaluations)
+    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
+    np.testing.assert_array_equal(dataset.evaluations, run.paces.evaluations)
 
 
 @pytest.mark.parametrize("method", ["dop853", "taylor"])
 def test_a_tolerance_as_an_axis(method: str) -> None:
     relative = np.array([1.1e-8, 1.2e-8, 1.5e-8]) if method == "taylor" else np.array([1e-4, 1e-8, 1e-12])
     axes = {"y": ("y0", Y0), "tolerance": ("tolerance", relative)}
-    found = sw.sweep(
+    dataset = sw.sweep(
         partial(duffing, delta=0.2), axes, method, v=0.0, at=6.0, outcomes=["last", "evaluations"], chunk=4, threads=2
     )
     run = sw.integrate(duffing(delta=0.2), method, v=0.0, y=Y0[:, None], tolerance=relative, at=[6.0])
     assert run.paces is not None
-    np.testing.assert_array_equal(found.y_last, run.y[-1])
-    np.testing.assert_array_equal(found.evaluations, run.paces.evaluations)
-    np.testing.assert_array_equal(found.tolerance, relative)
-    assert "tolerance" not in found.attrs
+    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
+    np.testing.assert_array_equal(dataset.evaluations, run.paces.evaluations)
+    np.testing.assert_array_equal(dataset.tolerance, relative)
+    assert "tolerance" not in dataset.attrs
 
 
 def test_blocks_with_axes_of_their_own() -> None:
     scene = sw.scenes.figure_eight()
     factor = np.array([0.98, 1.0, 1.02, 1.04])
     axes = {"v": ("speed", scene.v[..., None] * factor)}
-    found = sw.sweep(scene.system, axes, "dop853", y=scene.y, tolerance=1e-10, at=[1.0, 2.0], outcomes="history", chunk=3)
+    dataset = sw.sweep(scene.system, axes, "dop853", y=scene.y, tolerance=1e-10, at=[1.0, 2.0], outcomes="history", chunk=3)
     run = sw.integrate(
         scene.system, "dop853", v=scene.v[..., None] * factor, y=scene.y[..., None], tolerance=1e-10, at=[1.0, 2.0]
     )
-    np.testing.assert_array_equal(found.y, np.moveaxis(run.y, -1, 0))
+    np.testing.assert_array_equal(dataset.y, np.moveaxis(run.y, -1, 0))
 
 
 # ---- what reductions see
 
 
 def test_reductions_see_the_states_at_the_times() -> None:
-    found, run = adaptive(chunk=7, memory=40_000.0), alike()
+    dataset, run = adaptive(chunk=7, memory=40_000.0), alike()
     for name, values in {"v": run.v, "y": run.y, "energy": run.quantity("energy")}.items():
-        np.testing.assert_array_equal(found[f"{name}_min"], values.min(axis=0))
-        np.testing.assert_array_equal(found[f"{name}_max"], values.max(axis=0))
+        np.testing.assert_array_equal(dataset[f"{name}_min"], values.min(axis=0))
+        np.testing.assert_array_equal(dataset[f"{name}_max"], values.max(axis=0))
     for name, values in {"y": run.y, "power": run.v * run.y}.items():
         lengths = np.diff(AT)[:, None, None]
         mean = (lengths / 2 * (values[1:] + values[:-1])).sum(axis=0) / (AT[-1] - AT[0])
         # As many additions as times, of numbers of that size, on both sides.
-        np.testing.assert_allclose(found[f"{name}_mean"], mean, atol=2 * AT.size * 2**-53 * abs(values).max())
-    np.testing.assert_array_equal(found.twice, 2.0 * run.y[-1])
+        np.testing.assert_allclose(dataset[f"{name}_mean"], mean, atol=2 * AT.size * 2**-53 * abs(values).max())
+    np.testing.assert_array_equal(dataset.twice, 2.0 * run.y[-1])
 
 
 def test_unequal_times() -> None:
     """The mean of cos over [0, 2π/3]: each interval errs by its length cubed, times the largest |cos|, over 12."""
     at = np.concatenate([np.linspace(0.0, 1.0, 101), np.linspace(1.0, 2.0 * np.pi / 3.0, 301)[1:]])
-    found = sw.sweep(sw.Oscillator, {"omega": [1.0, 1.0]}, "dop853", v=0.0, y=1.0, tolerance=1e-12, at=at, outcomes="mean")
+    dataset = sw.sweep(sw.Oscillator, {"omega": [1.0, 1.0]}, "dop853", v=0.0, y=1.0, tolerance=1e-12, at=at, outcomes="mean")
     end = 2.0 * np.pi / 3.0
     bound = (np.diff(at) ** 3 / 12.0).sum() / end
-    off = abs(found.y_mean.values - np.sin(end) / end)
+    off = abs(dataset.y_mean.values - np.sin(end) / end)
     assert (off < bound + 1e-11).all()
     # As if all intervals were as long as the first: far outside.
     weights = np.full(at.size, 0.01)
@@ -145,13 +145,13 @@ def test_crossings_and_periods_are_those_of_the_exact_motion() -> None:
     """By a cubic through both states and their rates: (interval·ω)⁴/384 over the speed; the states err by far less."""
     omega, h = np.array([1.0, 1.3, 1.7]), 0.1
     at = h * np.arange(300)
-    found = sw.sweep(
+    dataset = sw.sweep(
         sw.Oscillator, {"omega": omega}, "dop853", v=0.0, y=1.0, tolerance=1e-12, at=at, outcomes=["crossing", "period"], chunk=2
     )
     bound = 1.1 * (omega * h) ** 4 / 384 / omega + 1e-9
-    assert (abs(found.y_crossing.values - 1.5 * np.pi / omega) < bound).all()
-    n = found.y_passages.values - 1
-    assert (abs(found.y_period.values - 2 * np.pi / omega) < 2 * bound / n).all()
+    assert (abs(dataset.y_crossing.values - 1.5 * np.pi / omega) < bound).all()
+    n = dataset.y_passages.values - 1
+    assert (abs(dataset.y_period.values - 2 * np.pi / omega) < 2 * bound / n).all()
 
 
 # ---- the same bits everywhere
@@ -168,9 +168,9 @@ def whole() -> Any:
     ids=str,
 )
 def test_every_division_gives_the_same_bits(whole: Any, division: dict[str, Any]) -> None:
-    found = adaptive(**division)
-    assert unlike(whole, found) == []
-    assert whole.attrs == found.attrs
+    dataset = adaptive(**division)
+    assert unlike(whole, dataset) == []
+    assert whole.attrs == dataset.attrs
 
 
 def in_pieces(monkeypatch: pytest.MonkeyPatch, times: int) -> None:
@@ -204,8 +204,8 @@ def test_little_memory_is_more_pieces() -> None:
 def test_pieces_that_begin_anew_would_be_noticed(whole: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A piece that goes on from the last saved state, and not from where the members are, has other steps."""
 
-    def anew(given: dict[str, Any], run: sw.Run) -> dict[str, Any]:
-        return given | {"v": run.v[-1], "y": run.y[-1], "t0": float(run.t[-1])}
+    def anew(arguments: dict[str, Any], run: sw.Run) -> dict[str, Any]:
+        return arguments | {"v": run.v[-1], "y": run.y[-1], "t0": float(run.t[-1])}
 
     in_pieces(monkeypatch, 4)
     monkeypatch.setattr(task, "_going_on", anew)
@@ -224,23 +224,23 @@ def test_every_engine_gives_the_same_bits(whole: Any) -> None:
         distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
-        found = adaptive(engine=client, chunk=10)
-        assert unlike(whole, found) == []
-        assert found.attrs["bits"] == whole.attrs["bits"]
+        dataset = adaptive(engine=client, chunk=10)
+        assert unlike(whole, dataset) == []
+        assert dataset.attrs["bits"] == whole.attrs["bits"]
 
 
 @pytest.mark.parametrize("ending", ["zarr", "nc"])
 def test_a_store_goes_on_and_refuses_another_tolerance(whole: Any, ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"a.{ending}"
     for _ in range(2):
-        with adaptive(store=path, chunk=10) as found:
-            assert unlike(whole, found) == []
-            assert (found.attrs["tolerance"], found.attrs["end"]) == (1e-8, 6.0)
+        with adaptive(store=path, chunk=10) as dataset:
+            assert unlike(whole, dataset) == []
+            assert (dataset.attrs["tolerance"], dataset.attrs["end"]) == (1e-8, 6.0)
     for other in ({"tolerance": 1e-9}, {"tolerance": (1e-8, 1e-12)}, {"at": AT[1:]}, {"max_steps": 77}):
         with pytest.raises(ArgumentError, match="store: "):
             adaptive(store=path, chunk=10, **other)
-    with adaptive(store=tmp_path / f"b.{ending}", tolerance=(1e-8, 1e-12)) as found:
-        assert found.attrs["tolerance"] == "(1e-08, 1e-12)"
+    with adaptive(store=tmp_path / f"b.{ending}", tolerance=(1e-8, 1e-12)) as dataset:
+        assert dataset.attrs["tolerance"] == "(1e-08, 1e-12)"
 
 
 # ---- members that stop
@@ -255,23 +255,28 @@ def explosion(t: Any, y: Any, *, rate: Any = 1.0) -> Any:
 def test_what_stops_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     rate = np.array([0.1, 0.8, 0.2, 2.0, 0.3])
     at = np.linspace(0.0, 3.0, 31)
-    given: dict[str, Any] = {"y": 1.0, "tolerance": 1e-9, "at": at}
+    arguments: dict[str, Any] = {"y": 1.0, "tolerance": 1e-9, "at": at}
     with pytest.warns(sw.ToleranceWarning):
-        run = sw.integrate(explosion(rate=rate), "dop853", **given)
+        run = sw.integrate(explosion(rate=rate), "dop853", **arguments)
     message = r"2 of 5 members stopped before t = 3, the first of them at rate = 0.8: (the step that|no step)"
     results = []
     for options, times in (({}, 31), ({"chunk": 2}, 31), ({"chunk": 3}, 4)):
         in_pieces(monkeypatch, times)
         with pytest.warns(sw.ToleranceWarning, match=message) as caught:
-            found = sw.sweep(
-                explosion, {"rate": rate}, "dop853", outcomes=["last", "history", "extremes", "evaluations"], **given, **options
+            dataset = sw.sweep(
+                explosion,
+                {"rate": rate},
+                "dop853",
+                outcomes=["last", "history", "extremes", "evaluations"],
+                **arguments,
+                **options,
             )
         assert len(caught) == 1
         assert caught[0].filename == __file__
-        np.testing.assert_array_equal(found.y, run.y.T)
-        np.testing.assert_array_equal(found.status, run.status)
-        np.testing.assert_array_equal(found.first_bad_step, run.first_bad_step)
-        results.append(found)
+        np.testing.assert_array_equal(dataset.y, run.y.T)
+        np.testing.assert_array_equal(dataset.status, run.status)
+        np.testing.assert_array_equal(dataset.first_bad_step, run.first_bad_step)
+        results.append(dataset)
     assert (results[0].status.values > 0).tolist() == [False, True, False, True, False]
     assert all(unlike(results[0], each) == [] for each in results[1:])
     assert np.isnan(results[0].y_max[1])
@@ -281,28 +286,28 @@ def test_what_stops_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_a_budget_is_that_of_the_whole_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """However many pieces there are."""
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-9, "at": np.linspace(0.0, 40.0, 41), "max_steps": 200}
+    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-9, "at": np.linspace(0.0, 40.0, 41), "max_steps": 200}
     omega = np.array([0.5, 1.0, 20.0])
     with pytest.warns(sw.ToleranceWarning):
-        run = sw.integrate(sw.Oscillator(omega), "dop853", **given)
+        run = sw.integrate(sw.Oscillator(omega), "dop853", **arguments)
     for times in (41, 3):
         in_pieces(monkeypatch, times)
         with pytest.warns(
             sw.ToleranceWarning, match="1 of 3 members stopped before t = 40, that at omega = 20: out of max_steps"
         ):
-            found = sw.sweep(sw.Oscillator, {"omega": omega}, "dop853", outcomes=["history", "last"], **given)
-        np.testing.assert_array_equal(found.status, run.status)
-        np.testing.assert_array_equal(found.y, run.y.T)
+            dataset = sw.sweep(sw.Oscillator, {"omega": omega}, "dop853", outcomes=["history", "last"], **arguments)
+        np.testing.assert_array_equal(dataset.status, run.status)
+        np.testing.assert_array_equal(dataset.y, run.y.T)
     assert run.status[-1] == sw.Status.BUDGET
 
 
 def test_motion_that_is_lost_in_an_absolute_tolerance_is_told() -> None:
-    given: dict[str, Any] = {"v": 0.0, "tolerance": (1e-9, 1e-3), "at": [1.0]}
+    arguments: dict[str, Any] = {"v": 0.0, "tolerance": (1e-9, 1e-3), "at": [1.0]}
     with pytest.warns(sw.ToleranceWarning, match=r"tolerance: for 1 of 2 members the absolute part lets a step err"):
-        sw.sweep(sw.Oscillator(), {"y": [1.0, 1e-3]}, "dop853", **given)
+        sw.sweep(sw.Oscillator(), {"y": [1.0, 1e-3]}, "dop853", **arguments)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        sw.sweep(sw.Oscillator(), {"y": [1.0, 2.0]}, "dop853", **given)
+        sw.sweep(sw.Oscillator(), {"y": [1.0, 2.0]}, "dop853", **arguments)
 
 
 # ---- what is refused
@@ -374,7 +379,7 @@ def test_what_is_refused(what: str) -> None:
 def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
     """Each member to its own tolerance."""
     omega, tolerance, at = np.array([1.0, 2.0, 3.0]), np.array([1e-6, 1e-10]), np.linspace(1.0, 12.0, 12)
-    found = sw.sweep(
+    dataset = sw.sweep(
         sw.Pendulum,
         {"omega": omega, "tolerance": tolerance},
         "dop853",
@@ -387,7 +392,7 @@ def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
         truth = sw.lyapunov(
             sw.Pendulum(omega[i]), "dop853", v=0.0, y=1.0, tolerance=tolerance[k], at=at, transient=4, exponents="all"
         )
-        np.testing.assert_array_equal(found.lyapunov[i, k], truth.exponents)
+        np.testing.assert_array_equal(dataset.lyapunov[i, k], truth.exponents)
 
 
 def test_a_history_needs_no_interval() -> None:
@@ -399,12 +404,12 @@ def test_memory_is_bounded() -> None:
     import tracemalloc
 
     members, memory = 500, 2 * 2**20
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6, "outcomes": ["extremes", "mean"], "threads": 1}
+    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6, "outcomes": ["extremes", "mean"], "threads": 1}
     axes, at = {"omega": np.linspace(0.5, 2.0, members)}, np.linspace(0.0, 20.0, 4000)
-    sw.sweep(sw.Oscillator, axes, "dop853", at=at[:2], **given)  # imports
+    sw.sweep(sw.Oscillator, axes, "dop853", at=at[:2], **arguments)  # imports
     tracemalloc.start()
     try:
-        sw.sweep(sw.Oscillator, axes, "dop853", at=at, memory=memory, **given)
+        sw.sweep(sw.Oscillator, axes, "dop853", at=at, memory=memory, **arguments)
         # Results are 8 numbers a member, axes, times and coordinates a few more; some hundred kilobytes are Python's own.
         assert tracemalloc.get_traced_memory()[1] < memory + 8 * 30 * (members + at.size) + 2**19
     finally:

@@ -181,8 +181,8 @@ def test_an_excitable_cell_is_pulsed_at_its_equilibrium(method: str) -> None:
 
     rest = np.array([-1.1994080352440346, -0.6242600440550432])
     run = sw.integrate(cell(), method, y=rest, tolerance=1e-6, at=[66.0, 80.0])
-    asked = sw.integrate(cell(), method, y=rest, tolerance=1e-6, at=[66.0, 80.0], jumps=[60.0, 66.0])
-    assert np.array_equal(run.y, asked.y)
+    with_jumps = sw.integrate(cell(), method, y=rest, tolerance=1e-6, at=[66.0, 80.0], jumps=[60.0, 66.0])
+    assert np.array_equal(run.y, with_jumps.y)
     assert run.y[0, 0] > -0.9
 
 

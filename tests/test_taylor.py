@@ -87,13 +87,13 @@ def assert_known(name: str) -> None:
     One of order k is a sum of products of lower ones. With the polynomial's |cⱼ| ≤ ½·ρ⁻ʲ and functions that are analytic where
     |t| < ρ, roundings grow as ρ⁻ᵏ: they are allowed 40 units of the largest of the coefficients so far for each order.
     """
-    found = [float(y) for _, y in coefficients(of_time(name), 13, np.zeros(0), 0.0)]
+    computed = [float(y) for _, y in coefficients(of_time(name), 13, np.zeros(0), 0.0)]
     with mpmath.workdps(60):
         true = [float(mpmath.re(c)) for c in mpmath.taylor(lambda t: FUNCTIONS[name][1](polynomial(t)), 0, 12)]
     size = 1.0
     for k in range(13):
         size = max(size, abs(true[k]))
-        assert abs(found[k] * (k + 1) - true[k]) <= 40 * (k + 1) * EPS * size, (name, k)
+        assert abs(computed[k] * (k + 1) - true[k]) <= 40 * (k + 1) * EPS * size, (name, k)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -123,8 +123,8 @@ def test_numbers_one_by_one_are_those_of_the_tape(system: sw.System, v: Any, y: 
     v, y = np.array(v).reshape(system.v_shape), np.array(y).reshape(system.y_shape)
     by_numbers = TAYLOR.steps.step(plan.scaled(), 0.3, 0.1, v, y)
     run = sw.integrate(system, "taylor", v=v, y=y, dt=0.1, t0=0.3, steps=1, backend="numpy")
-    for found, expected in zip(by_numbers, (run.v[-1], run.y[-1]), strict=True):
-        np.testing.assert_array_equal(found, expected)
+    for value, expected in zip(by_numbers, (run.v[-1], run.y[-1]), strict=True):
+        np.testing.assert_array_equal(value, expected)
 
 
 def _wrong_product(a: Any, b: Any, k: int) -> Any:
@@ -218,8 +218,8 @@ def test_a_wrong_order_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TAYLOR.steps, "ORDER", 7)
     assert _cleaned_slopes(lambda steps: _forced(steps, "numpy")) != pytest.approx([8.0, 8.0], abs=0.1)
     monkeypatch.undo()
-    held = series.coefficients
-    monkeypatch.setattr(TAYLOR.steps, "coefficients", lambda s, order, t, h, v, y: held(s, order, t, 0.0 * h, v, y))
+    original = series.coefficients
+    monkeypatch.setattr(TAYLOR.steps, "coefficients", lambda s, order, t, h, v, y: original(s, order, t, 0.0 * h, v, y))
     assert _cleaned_slopes(lambda steps: _forced(steps, "numpy")) != pytest.approx([8.0, 8.0], abs=0.1)
 
 

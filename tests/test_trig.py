@@ -37,8 +37,8 @@ def test_the_polynomial_misses_the_sine_by_less_than_a_quarter_of_1e_18() -> Non
     for k in range(1, 301):
         r = PI / 2 * k / 300
         z = r * r
-        made = r + r * z * sum(Decimal(c) * z**i for i, c in enumerate(trig.CONSTANTS.double.sin))
-        worst = max(worst, abs(made - true_sin(r)))
+        value = r + r * z * sum(Decimal(c) * z**i for i, c in enumerate(trig.CONSTANTS.double.sin))
+        worst = max(worst, abs(value - true_sin(r)))
     assert 1e-19 < float(worst) < 2.5e-19  # what is known of the best polynomial of this degree: 1.95e-19
 
 
@@ -55,9 +55,9 @@ def test_within_an_ulp_of_one(function: object) -> None:
     rng = np.random.default_rng(3)
     near = (2 * rng.integers(-300_000, 300_000, 300) + 1) * (math.pi / 2) + rng.uniform(-0.2, 0.2, 300)
     x = np.concatenate([rng.uniform(-2.0, 2.0, 200), rng.uniform(-1e6, 1e6, 200), near])
-    found = function(x)  # type: ignore[operator]
+    values = function(x)  # type: ignore[operator]
     shift = PI / 2 if function is trig.cos else Decimal(0)
-    worst = max(abs(Decimal(float(s)) - true_sin(Decimal(float(a)) + shift)) for s, a in zip(found, x, strict=True))
+    worst = max(abs(Decimal(float(s)) - true_sin(Decimal(float(a)) + shift)) for s, a in zip(values, x, strict=True))
     assert worst <= Decimal(2) ** -52
 
 
@@ -65,8 +65,8 @@ def test_near_a_multiple_of_pi_the_error_is_far_below_an_ulp_of_one() -> None:
     """n times the second part of π rounds: n·1.2e-10·2⁻⁵³, and the part itself is as far from the rest of π."""
     n = np.arange(1, 300_000, 997)
     x = n * math.pi
-    found = trig.sin(x)
-    for s, a, k in zip(found.tolist(), x.tolist(), n.tolist(), strict=True):
+    values = trig.sin(x)
+    for s, a, k in zip(values.tolist(), x.tolist(), n.tolist(), strict=True):
         allowed = 2 * k * Decimal(trig.CONSTANTS.double.pi[1]) / 2**53 + Decimal(abs(s)) / 2**52
         assert abs(Decimal(s) - true_sin(Decimal(a))) <= allowed
 

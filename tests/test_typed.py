@@ -61,16 +61,16 @@ def test_mypy_finds_what_is_written_wrongly(tmp_path: Path) -> None:
     # A package that is not installed is found there; mypy finds an installed one by itself, and refuses to be told.
     env = {"PATH": ""} if package.name == "site-packages" else {"PATH": "", "MYPYPATH": str(package)}
     words = ["-m", "mypy", "--strict", "--no-error-summary", "--cache-dir", str(tmp_path / "cache"), str(path)]
-    found = subprocess.run([sys.executable, *words], capture_output=True, text=True, env=env, cwd=tmp_path)
+    run = subprocess.run([sys.executable, *words], capture_output=True, text=True, env=env, cwd=tmp_path)
     first = text[: text.index("def wrong")].count("\n") + 2
-    told: dict[int, list[str]] = {}
-    for line in found.stdout.splitlines():
+    errors: dict[int, list[str]] = {}
+    for line in run.stdout.splitlines():
         if (match := re.match(r"calls\.py:(\d+): error: (.*)", line)) is not None:
-            told.setdefault(int(match[1]), []).append(match[2])
-    assert "calls.py" in found.stdout, found.stdout + found.stderr
+            errors.setdefault(int(match[1]), []).append(match[2])
+    assert "calls.py" in run.stdout, run.stdout + run.stderr
     for number, (call, message) in enumerate(WRONG.items(), first):
-        assert any(message in each for each in told.pop(number, [])), f"{call}: {found.stdout}"
-    assert told == {}, "an error in a right call"
+        assert any(message in each for each in errors.pop(number, [])), f"{call}: {run.stdout}"
+    assert errors == {}, "an error in a right call"
 
 
 @pytest.mark.parametrize(

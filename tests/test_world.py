@@ -123,16 +123,16 @@ COPIES = {
 }
 
 
-@pytest.mark.parametrize("how", COPIES)
+@pytest.mark.parametrize("copying", COPIES)
 @pytest.mark.parametrize("steps", [0, 7])
 @pytest.mark.parametrize("members", [3, 500])
 @pytest.mark.parametrize("method", [m.name for m in sw.methods()])
-def test_a_copy_goes_on_by_itself(method: str, members: int, steps: int, how: str) -> None:
+def test_a_copy_goes_on_by_itself(method: str, members: int, steps: int, copying: str) -> None:
     """To the bit, also of what is carried; and neither sees what becomes of the other."""
     y = np.linspace(0.5, 1.5, members)
     w = sw.World(sw.Pendulum(), method, v=np.full(members, 0.1), y=y, dt=0.1, t0=0.3, start_step=4)
     w.step(steps)
-    again = COPIES[how](w)
+    again = COPIES[copying](w)
     before = w.v.copy(), w.y.copy()
     again.step(20)
     np.testing.assert_array_equal((w.v, w.y), before)

@@ -47,7 +47,7 @@ class TookLongError(Exception):
     """A call was accepted and works."""
 
 
-def wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, make: Callable[[], Any]) -> str | None:
+def wrong(call: Callable[..., Any], options: dict[str, Any], argument: str, make: Callable[[], Any]) -> str | None:
     """What is wrong with how a call treats something strange, or None."""
 
     def enough(_: int, frame: Any) -> None:
@@ -67,7 +67,7 @@ def wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, make: 
             warnings.simplefilter("error")
             for kind in (sw.DivergenceWarning, sw.ToleranceWarning, sw.ControlWarning, sw.AccuracyWarning):
                 warnings.simplefilter("ignore", kind)
-            call(**given | {argument: value})
+            call(**options | {argument: value})
     except TookLongError:
         return None
     except sw.StepwellError as error:
@@ -76,7 +76,7 @@ def wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, make: 
             return f"refused after {took:.1f} s: {text[:200]}"
         if len(text) > 1500:
             return f"a message of {len(text)} characters: {text[:200]}"
-        names = [argument, *given, "method", "scene", "peers", "not installed"]
+        names = [argument, *options, "method", "scene", "peers", "not installed"]
         return None if any(name in text for name in names) else f"names no argument: {text[:200]}"
     except BaseException as error:  # a panic of the core is no Exception
         return f"{type(error).__name__}: {str(error)[:200]}"
@@ -96,24 +96,26 @@ SHARE = 7
 def calls() -> list[Any]:
     """Calls with one strange argument, and the values that it gets."""
     share = 1 if families.LONG else SHARE
-    arguments = [(name, call, given, argument) for name, (call, given) in CALLS.items() for argument in given]
+    arguments = [(name, call, options, argument) for name, (call, options) in CALLS.items() for argument in options]
     return [
         pytest.param(
             call,
-            given,
+            options,
             argument,
             [each for each in list(JUNK)[i % share :: share] if (name, argument, each) not in KNOWN],
             id=f"{name}: {argument}",
             marks=[pytest.mark.long] * families.LONG,
         )
-        for i, (name, call, given, argument) in enumerate(arguments)
+        for i, (name, call, options, argument) in enumerate(arguments)
     ]
 
 
 @timer
-@pytest.mark.parametrize(("call", "given", "argument", "junk"), calls())
-def test_calls_work_or_say_what_is_wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, junk: list[str]) -> None:
-    bad = {name: text for name in junk if (text := wrong(call, given, argument, JUNK[name])) is not None}
+@pytest.mark.parametrize(("call", "options", "argument", "junk"), calls())
+def test_calls_work_or_say_what_is_wrong(
+    call: Callable[..., Any], options: dict[str, Any], argument: str, junk: list[str]
+) -> None:
+    bad = {name: text for name in junk if (text := wrong(call, options, argument, JUNK[name])) is not None}
     assert not bad, "\n" + "\n".join(f"{argument} = {name}: {text}" for name, text in bad.items())
 
 
@@ -123,30 +125,30 @@ def test_several_strange_arguments_at_once() -> None:
     draw = random.Random(1)
     names = [name for name in CALLS if name.startswith("integrate")]
     for _ in range(2000):
-        call, given = CALLS[name := draw.choice(names)]
-        chosen = {argument: draw.choice(list(JUNK)) for argument in draw.sample(list(given), draw.randint(2, 4))}
+        call, options = CALLS[name := draw.choice(names)]
+        chosen = {argument: draw.choice(list(JUNK)) for argument in draw.sample(list(options), draw.randint(2, 4))}
         (last, junk), *others = chosen.items()
-        text = wrong(call, given | {argument: JUNK[each]() for argument, each in others}, last, JUNK[junk])
+        text = wrong(call, options | {argument: JUNK[each]() for argument, each in others}, last, JUNK[junk])
         assert text is None, f"{name} with {chosen}: {text}"
 
 
 def test_right_calls_are_right() -> None:
     """Else what is strange would hide behind what is wrong anyway; peers are not installed everywhere."""
-    for name, (call, given) in CALLS.items():
+    for name, (call, options) in CALLS.items():
         if not name.startswith("charts.peers."):
-            call(**given)
+            call(**options)
 
 
 def test_every_public_function_is_here() -> None:
     """And every class that users make, which is what has no base beside ``Exception`` and is not returned by a function."""
     modules = (sw, charts, stability, charts.peers, sw.scenes)
     every = {name: getattr(module, name) for module in modules for name in dir(module) if not name.startswith("_")}
-    made = (sw.System, sw.Sinusoid, sw.Sampled, sw.EnergyControl, sw.Projection, charts.Peer, sw.Scene)
+    classes = (sw.System, sw.Sinusoid, sw.Sampled, sw.EnergyControl, sw.Projection, charts.Peer, sw.Scene)
     wanted = {
         name
         for name, each in every.items()
         if getattr(each, "__module__", "").startswith("stepwell.")
-        and (inspect.isfunction(each) or (isinstance(each, type) and issubclass(each, made)))
+        and (inspect.isfunction(each) or (isinstance(each, type) and issubclass(each, classes)))
         and inspect.signature(each).parameters
     }
     here = {call for call, _ in CALLS.values()}

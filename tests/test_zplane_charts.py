@@ -457,12 +457,12 @@ def test_a_picture_for_each_method_and_one_of_all(figures, tmp_path):
         check_page(figure, path)
         texts = [text.get_text() for text in figure.texts]
         assert f"{samples.method.title} ({samples.method.section}): y(t)" in texts
-        said = next(text for text in texts if text.startswith("r₁² − 1 = "))
+        sentence = next(text for text in texts if text.startswith("r₁² − 1 = "))
         change, turn = samples.r1_squared - 1, 100 * (samples.ratio - 1)
         change = "0" if abs(change) < 1e-13 else f"{change:+.3g}"
-        assert said.startswith(f"r₁² − 1 = {change}, Ψ/Φ − 1 = {turn:+.3g} %: {samples.kind}".replace("-", "−"))
+        assert sentence.startswith(f"r₁² − 1 = {change}, Ψ/Φ − 1 = {turn:+.3g} %: {samples.kind}".replace("-", "−"))
         # What grows does not look as if it stayed: Fehlberg's 8e-5 a step.
-        assert ("unstable" in said) == change.startswith("+")
+        assert ("unstable" in sentence) == change.startswith("+")
 
 
 def test_both_curves_are_in_a_figure_and_what_grows_is_told(figures):
@@ -473,8 +473,8 @@ def test_both_curves_are_in_a_figure_and_what_grows_is_told(figures):
         assert np.array_equal(dots[0].get_xydata(), np.stack([samples.t / (2 * math.pi), samples.y], axis=1))
         assert any(np.allclose(line[:, 1], np.cos(2 * math.pi * line[:, 0])) for line in lines(axes) if len(line) > 100)
         assert axes.get_ylim() == (-2.2, 2.2)
-        told = [text.get_text() for text in axes.texts]
-        assert told == ([f"|y| up to {np.abs(samples.y).max():.3g}"] if np.abs(samples.y).max() > 2.2 else [])
+        labels = [text.get_text() for text in axes.texts]
+        assert labels == ([f"|y| up to {np.abs(samples.y).max():.3g}"] if np.abs(samples.y).max() > 2.2 else [])
 
 
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
@@ -488,8 +488,8 @@ def test_a_figure_of_what_leaves_the_finite_numbers_is_still_drawn(tmp_path):
 def test_a_double_eigenvalue_has_room_in_the_titles(tmp_path):
     figures = sw.charts.figures(phi=2.0)
     check_page(figures.plot(tmp_path / "overview.png"), tmp_path / "overview.png")
-    said = figures.plot(method="false_euler").texts[2].get_text()
-    assert "unstable oscillation (double eigenvalue -1)" in said
+    text = figures.plot(method="false_euler").texts[2].get_text()
+    assert "unstable oscillation (double eigenvalue -1)" in text
 
 
 def test_a_method_without_a_section_comes_last(figures):
