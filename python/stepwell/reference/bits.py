@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import operator
 import struct
+from math import ldexp
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -40,9 +41,9 @@ class Precision:
         self.upper_half = self.all_bits & -(1 << (fraction_bits + 2) // 2)
         self._formats = formats
         bias = (1 << size - fraction_bits - 2) - 1
-        self.bias, self.least_normal = float(bias), 2.0 ** (1 - bias)
+        self.bias, self.least_normal = float(bias), ldexp(1.0, 1 - bias)
         self.lowest_bit = self.constant(1)
-        self.first_whole = 2.0**fraction_bits
+        self.first_whole = ldexp(1.0, fraction_bits)
         self.magic = 1.5 * self.first_whole
 
     def bits_of(self, x: Any) -> Any:

@@ -7,6 +7,7 @@ x is reduced by n·ln 2 to r in [−ln 2/2, ln 2/2], where eʳ = 1 + r + r²/2 +
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import ldexp
 from typing import Any, NamedTuple
 
 from ..bits import PRECISIONS, PerPrecision, clamp, either_bits, is_single, shift_up, sign_of, where
@@ -139,7 +140,7 @@ def scaled(x: Any, n: Any, turn: Any, low: Any) -> Any:
     """
     if is_single(x):
         turn = n + magic(x, low)
-    return (x * shift_up(turn, PRECISIONS.of(x).fraction_bits)) * where(low, 2.0 ** -RAISED.of(x), 2.0)
+    return (x * shift_up(turn, PRECISIONS.of(x).fraction_bits)) * where(low, ldexp(1.0, -RAISED.of(x)), 2.0)
 
 
 def reduced(x: Any, below: float | None = None) -> Reduced:

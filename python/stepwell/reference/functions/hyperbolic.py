@@ -6,6 +6,7 @@ which are short polynomials; ``docs/coefficients.py`` finds their coefficients.
 
 from __future__ import annotations
 
+from math import ldexp
 from typing import Any, NamedTuple
 
 from ..bits import PerPrecision, either_bits, is_single, magnitude, sign_of, where
@@ -72,7 +73,7 @@ def _half(x: Any) -> tuple[Any, Any]:
     x = where(x > constants.overflow_from, constants.overflow_from, x)
     n, _, upper, lower, r, z = exponential(x)
     growing = power_of_two(n - 2.0)
-    falling = power_of_two(constants.least_exponent - n) * 2.0 ** -(constants.least_exponent + 2.0)
+    falling = power_of_two(constants.least_exponent - n) * ldexp(1.0, -int(constants.least_exponent) - 2)
     first, second = halves(upper)  # a product with the first half is exact where exactness is needed
     rest_of_sinh = (second - lower) + (z * r) * polynomial(z, constants.sinh)
     rest_of_cosh = z * (0.5 + z * polynomial(z, constants.cosh))

@@ -88,7 +88,7 @@ class Row:
 
     @property
     def margin(self) -> float:
-        """The stability limit, exact or else observed, divided by the step: the factor by which the step may be longer.
+        """By which factor the step may be longer up to the stability limit, the exact one or else the observed one.
 
         It is infinite for adaptive steps, which are shortened instead.
         """
