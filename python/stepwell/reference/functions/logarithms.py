@@ -6,6 +6,7 @@ in fdlibm. ``docs/coefficients.py`` finds the coefficients of R.
 
 from __future__ import annotations
 
+from math import ldexp
 from typing import Any, NamedTuple
 
 from ..bits import (
@@ -77,7 +78,7 @@ def exponent_and_rest(x: Any, *, normal: bool = False) -> tuple[Any, Any]:
     offset: Any = precision.first_whole + precision.bias
     if not normal:
         tiny = x < precision.least_normal
-        x, offset = where(tiny, x * 2.0 ** (places + 2), x), where(tiny, offset + (places + 2.0), offset)
+        x, offset = where(tiny, x * ldexp(1.0, places + 2), x), where(tiny, offset + (places + 2.0), offset)
     u = add_bits(x, precision.pattern(1.0) - half_root)
     k = or_bits(shift_down(u, places), precision.pattern(precision.first_whole)) - offset
     return k, add_bits(and_bits(u, (1 << places) - 1), half_root)
