@@ -64,7 +64,7 @@ CASES = {scene.name: TOLERANCES if scene.name in QUICK else SLOW.get(scene.name,
 
 
 @pytest.mark.usefixtures("unmeasured")
-@pytest.mark.parametrize(("name", "tolerance"), tried(CASES, ["figure_eight", "pythagorean"]))
+@pytest.mark.parametrize(("name", "tolerance"), tried(CASES, ["figure_eight", "pythagorean", "rope_bridge"]))
 def test_the_advice_is_true_and_near_the_cheapest(name: str, tolerance: float) -> None:
     brute = brute_of(name)
     advice = sw.advise(brute.given, frame=None, tolerance=tolerance, cost="evaluations")

@@ -73,7 +73,7 @@ def test_float64_in_the_place_of_float32_would_be_noticed(monkeypatch: pytest.Mo
     assert all(row.error == row.float64_error for row in advice.ranked)
 
 
-@pytest.mark.parametrize("name", ["oscillator", "figure_eight"])
+@pytest.mark.parametrize("name", ["oscillator", pytest.param("figure_eight", marks=pytest.mark.long)])
 def test_float32_is_not_advised_where_its_rounding_is_more_than_what_is_wanted(name: str) -> None:
     """Half a unit in the last place of float32 is 6e-8 of a number, so no run of these is right to 1e-9."""
     advice = sw.advise(name, None, 1e-9, methods=METHODS, dtype="both")

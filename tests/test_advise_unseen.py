@@ -102,6 +102,7 @@ UNSEEN = {name: (LONG[name],) if name in LONG else (5e-2, 2e-3, 3e-5) for name i
 
 #: Of these there is another of the same kind, which is quicker.
 FURTHER = (
+    "stiff chain",
     "resonant",
     "chain of 3",
     "chain of 15",
