@@ -275,7 +275,7 @@ def test_a_ball_that_a_step_might_pass_needs_a_longest_step() -> None:
 def test_what_does_not_go_together_is_refused() -> None:
     ball = sw.Particles(floor=sw.Floor())
     paced: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0]}
-    with pytest.raises(UnsupportedError, match="tolerance: a bounce is an instant within a step"):
+    with pytest.raises(UnsupportedError, match="tolerance: the estimated error of a step does not include a bounce"):
         sw.integrate(ball, "dop853", **paced)
     sprung = sw.Particles(floor=sw.Floor(way="spring", omega=9.0))
     with pytest.raises(UnsupportedError, match="tolerance: a series does not see that a point meets a surface within a step"):
