@@ -102,7 +102,7 @@ class MarkedReplay(Replay):
             return super().__call__(state, numbers, t)
         batch = np.broadcast_shapes(*(np.shape(each) for each in (t, *numbers, *state)))
         values = np.empty((len(self.places), *batch), dtype=object)
-        groups = [[np.broadcast_to(_objects(each), batch) for each in group] for group in ((t,), numbers, state)]
+        groups = [[np.broadcast_to(np.asarray(each, dtype=object), batch) for each in group] for group in ((t,), numbers, state)]
         for member in np.ndindex(batch):
             values[(slice(None), *member)] = self._of_series(*([each[member] for each in group] for group in groups))
         return list(values)
@@ -132,15 +132,6 @@ class MarkedReplay(Replay):
             arguments = [on_tape[each] if isinstance(each, Line) else each for each in function.arguments]
             mark(function.name, on_tape[line], *arguments, function=function.function)
         return on_tape
-
-
-def _objects(x: Any) -> Any:
-    """An array of objects, without axes if x is no array."""
-    if isinstance(x, np.ndarray):
-        return x.astype(object)
-    array = np.empty((), dtype=object)
-    array[()] = x
-    return array
 
 
 class Rates:
