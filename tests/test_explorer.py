@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.views import cli
+from stepwell.views.explorer import data as of_page
 from stepwell.views.explorer import sliders
 from stepwell.views.explorer.data import of_scene
 from stepwell.views.explorer.page import MODULES, WEB, script
@@ -181,20 +182,38 @@ def test_saving_showing_and_notebooks(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_wrong_calls_say_what_is_wrong(tmp_path: Path) -> None:
-    big = sw.scenes.scene("cloth")
     twice = [sw.Scene(sw.Oscillator(), v=0.0, y=1.0, horizon=1.0)] * 2
     for call, error, text in (
         (lambda: sw.explore("clowder"), sw.errors.UnknownNameError, "clowder"),
         (lambda: sw.explore([]), sw.errors.ArgumentError, "scenes: expected at least one"),
         (lambda: sw.explore(3), sw.errors.StepwellError, "scenes: "),
         (lambda: sw.explore(twice), sw.errors.ArgumentError, "scenes: .* different names, got 'unnamed' twice"),
-        (lambda: sw.explore(big), sw.errors.UnsupportedError, "scenes: no method steps cloth in a page: "),
         (lambda: sw.explore("clover", methods=["rk5"]), sw.errors.UnknownNameError, "rk5"),
         (lambda: page().save(tmp_path / "x.txt"), sw.errors.ArgumentError, "path: expected a file ending in .html or .htm"),
         (lambda: twice[0].explore(show=1), sw.errors.DTypeError, "show: expected True or False"),  # type: ignore[arg-type]
     ):
         with pytest.raises(error, match=text):
             call()
+
+
+def test_a_large_scene_is_refused_before_any_step_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse_to_export(*args: object, **options: object) -> None:
+        raise AssertionError("a step was exported")
+
+    monkeypatch.setattr(of_page, "export", refuse_to_export)
+    with pytest.raises(sw.errors.UnsupportedError, match=r"^scenes: no method steps cloth in a page: a step of about 99054 "):
+        sw.explore("cloth")
+    with pytest.raises(AssertionError, match="a step was exported"):
+        sw.explore("kepler")
+
+
+def test_a_long_step_is_left_out_of_a_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the length of its text; the truth is made by the first method that fits."""
+    monkeypatch.setattr(of_page, "MAX_SOURCE", 5000)
+    record = of_scene(scene_of("kepler"), [sw.method("false_euler"), sw.method("dop853")])
+    assert set(record["steps"]) == {"false_euler", "truth"}
+    assert record["truth_by"] == "rk4"
+    assert re.fullmatch(r"a step of \d+ characters is too long for a page; at most 5000 fit", record["refused"]["dop853"])
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -155,9 +155,9 @@ class Traced:
         self.plan = plan
         model = engine.model(plan)
         _core.check(model)
-        parts = _core.in_parts(engine.model(plan._replace(fused=False)), 1)
-        if parts is not None and parts[1] > 4 * MAX_IN_LOOPS:  # an estimate, too high for short methods
-            raise too_long(plan, f"about {parts[1]}")
+        count = about(plan)
+        if count > 4 * MAX_IN_LOOPS:
+            raise too_long(plan, f"about {count}")
         names, tables = parameters(plan)
         self.operations = Operations()
         self.operations.first_of_force = None if plan.force is None else len(names)
@@ -207,6 +207,12 @@ class Traced:
             if plan.system.control is not None:
                 inputs, results = [*inputs, TALLY], [*results, f"{TALLY}'"]
         return Part(tape, names, self.operations.add(operations, roots), inputs, results), tracer
+
+
+def about(plan: engine.Plan) -> int:
+    """Approximately how many operations a step has, known before it is traced; too many for short methods, 0 for a short step."""
+    parts = _core.in_parts(engine.model(plan._replace(fused=False)), 1)
+    return 0 if parts is None else parts[1]
 
 
 #: The sum that a control or a projection accumulates.

@@ -14,12 +14,17 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...errors import StepwellError, UnsupportedError
+from ...model.controls import AnyControl
 from ...model.methods import Method
+from ...model.methods import method as find_method
 from ...runs.integration import quietly
+from ...runs.options import Options
+from ...runs.request import Request
 from ...scenes import Scene
 from ...scenes import scene as find_scene
 from ...scenes.taylor import Orbit
 from ...source.exports import export
+from ...source.exports.tapes import about
 from ..charts.style import look
 from . import sliders, systems
 
@@ -33,8 +38,8 @@ CLASS = "step"
 #: side that pictures leave out.
 SAMPLES, MAX_SIZE_STEPS, SHARE_LEFT_OUT = 1000, 20_000, 0.005
 
-#: The longest step that goes into a page, in characters.
-MAX_SOURCE = 400_000
+#: The longest step that goes into a page, in characters; and in operations, which are counted before a step is written.
+MAX_SOURCE, MAX_OPERATIONS = 400_000, 80_000
 
 
 def of_method(method: Method) -> dict[str, Any]:
@@ -96,15 +101,11 @@ def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[s
     sources: list[str] = []
     places: dict[str, int] = {}
     refused: dict[str, str] = {}
-    state: dict[str, Any] = {"dt": scene.dt, "v": scene.v, "y": scene.y, "name": CLASS}
     for method in methods:
         try:
-            source = export(scene.system, method, "javascript", control=scene.control, **state).source
+            source = _source(scene, method, scene.control)
         except StepwellError as error:
             refused[method.name] = str(error)
-            continue
-        if len(source) > MAX_SOURCE:
-            refused[method.name] = f"a step of {len(source)} characters is too long for a page"
             continue
         places[method.name] = len(sources)
         sources.append(source)
@@ -117,14 +118,25 @@ def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[s
             truth_by, places["truth"] = name, places[name]
             break
         try:
-            source = export(scene.system, name, "javascript", **state).source
+            source = _source(scene, find_method(name), None)
         except StepwellError:
             continue
-        if len(source) <= MAX_SOURCE:
-            truth_by, places["truth"] = name, len(sources)
-            sources.append(source)
-            break
+        truth_by, places["truth"] = name, len(sources)
+        sources.append(source)
+        break
     return sources, places, refused, truth_by
+
+
+def _source(scene: Scene, method: Method, control: AnyControl | None) -> str:
+    """A step as JavaScript."""
+    options: dict[str, Any] = {"dt": scene.dt, "v": scene.v, "y": scene.y, "control": control}
+    count = about(Request.one_step(scene.system, method, Options(**options)).plan)
+    if count > MAX_OPERATIONS:
+        raise UnsupportedError(f"a step of about {count} operations is too long for a page; at most {MAX_OPERATIONS} fit")
+    source = export(scene.system, method, "javascript", **options, name=CLASS).source
+    if len(source) > MAX_SOURCE:
+        raise UnsupportedError(f"a step of {len(source)} characters is too long for a page; at most {MAX_SOURCE} fit")
+    return source
 
 
 PARAMETER = re.compile(r"^    this\.(\w+) = (.*?);", re.MULTILINE | re.DOTALL)
