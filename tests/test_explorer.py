@@ -212,7 +212,7 @@ def test_a_long_step_is_left_out_of_a_page(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(of_page, "MAX_SOURCE", 5000)
     record = of_scene(scene_of("kepler"), [sw.method("false_euler"), sw.method("dop853")])
     assert set(record["steps"]) == {"false_euler", "truth"}
-    assert record["truth_by"] == "rk4"
+    assert record["truth_by"] == "standard_heun"
     assert re.fullmatch(r"a step of \d+ characters is too long for a page; at most 5000 fit", record["refused"]["dop853"])
 
 
