@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell.analysis.stability import limit
 from support.cases import Case
 
 
@@ -43,6 +44,25 @@ def test_growth_past_the_limit_is_told_once(system: sw.System, method: str, argu
     assert len(caught) == 1
     assert np.isfinite(run.y).all()
     assert np.abs(run.y[-1]).max() > 1e5
+
+
+def test_the_limit_of_a_system_is_sought_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes longer than most runs; the next run of an equal system has its own step in the same words."""
+    sought = []
+    limit_of = limit.limit_of
+    monkeypatch.setattr(limit, "limit_of", lambda *arguments: sought.append(arguments) or limit_of(*arguments))
+    for dt in (0.7, 0.8):
+        with pytest.warns(sw.AccuracyWarning, match=f"each step of {dt} by false_euler .* its stability limit is 0.645161"):
+            sw.integrate(sw.Oscillator(3.1), "false_euler", v=0.0, y=1.0, dt=dt, steps=200)
+    assert len(sought) == 1
+
+
+def test_a_system_stays_as_it_was() -> None:
+    """Also one without inputs, of which no copy is needed to leave them out."""
+    chain = sw.Chain(3)
+    with pytest.warns(sw.AccuracyWarning, match="its stability limit is "):
+        sw.integrate(chain, "false_euler", v=np.zeros(3), y=np.ones(3), dt=2.5, steps=100)
+    assert chain == sw.Chain(3)
 
 
 def frames(world: sw.World, number: int, steps: int) -> None:

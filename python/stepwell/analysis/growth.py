@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -145,9 +146,9 @@ class _Factors:
     def __init__(self, system: System, method: Method, dt: float, t: Any, start: tuple[Array, Array], batch: Shape) -> None:
         from .stability.some_members import Batch
 
-        self._system, self._method, self._dt = system, method, dt
+        self._system, self._method, self._dt = system.without_inputs() if system.linear else system, method, dt
         v, y = (None, None) if system.linear else start
-        self._batch = Batch(system.without_inputs() if system.linear else system, method, v, y, batch)
+        self._batch = Batch(self._system, method, v, y, batch)
         self._t = np.broadcast_to(t, batch).reshape(-1) if np.ndim(t) else t
 
     def _own(self, members: Whole) -> tuple[System, Any, Array | None, Array | None]:
@@ -168,17 +169,31 @@ class _Factors:
     def limit(self, member: int) -> str:
         """What to do about a member, with its stability limit where that is quickly computed."""
         from .stability import maps
-        from .stability.limit import limit_of
 
         if sum(maps.size(self._system)) > SMALL_SYSTEM:
             return "use a shorter step; stability_limit says how short"
         if self._dt < 0.0:
             return "use a shorter step"
         own, t, v, y = self._own(np.array([member]))
-        limit = float(np.max(limit_of(own, self._method, v, y, t).stable))
+        if v is None and not self._system.batch:
+            limit = _limit_of_linear(self._system, self._method)
+        else:
+            limit = _limit(own, self._method, v, y, t)
         if limit == 0.0:
             return f"{self._method.name} is stable with no step here, use another method"
         return f"its stability limit is {limit:.6g}" if limit < self._dt else "use a shorter step"
+
+
+def _limit(system: System, method: Method, v: Array | None, y: Array | None, t: Any) -> float:
+    from .stability.limit import limit_of
+
+    return float(np.max(limit_of(system, method, v, y, t).stable))
+
+
+@lru_cache(maxsize=64)
+def _limit_of_linear(system: System, method: Method) -> float:
+    """Kept, since it takes longer to find than most runs, and often one system runs with one step after another."""
+    return _limit(system, method, None, None, 0.0)
 
 
 def _square(block: Array) -> float:

@@ -31,7 +31,8 @@ class Batch:
         """The system and the state of the members with these indices."""
         system = self._system if self._every is None else self._every.plan(index).system
         if self._blocks is None:
-            complete(system, without_inputs=partial(changed, system))  # it has none
-            return system, None, None
+            own = changed(system)  # the given one stays as it is
+            complete(own, without_inputs=partial(changed, own))  # it has none
+            return own, None, None
         v, y = (block[..., index] for block in self._blocks)
         return system, v, y

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...analysis.stability import Mode, analyse, maps
-from ...analysis.stability.limit import limit_of
 from ...errors import UnsupportedError
 from ...model.methods import Method
 from ...scenes import Scene
@@ -103,7 +102,7 @@ def limit(trials: Trials, method: Method, fastest: float | None) -> Limit:
     """The limit of a method on a scene; ``fastest`` is the result of ``fastest_oscillation`` for a nonlinear one."""
     scene = trials.scene
     if scene.system.linear and scene.control is None:
-        limits = limit_of(scene.system, method)
+        limits = trials.stability_limit(method)
         mode: Mode | None = limits.mode
         if mode is None:
             return Limit(limits.stable, "linear", None, None)
@@ -122,7 +121,7 @@ def longest_step(trials: Trials, method: Method) -> float:
     scene = trials.scene
     if not scene.system.linear or scene.control is not None:
         return math.inf
-    return limit_of(scene.system, method).stable / MARGIN or math.inf
+    return trials.stability_limit(method).stable / MARGIN or math.inf
 
 
 def keeps_margin(trials: Trials, method: Method, dt: float) -> bool:

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...analysis.stability import StabilityLimit
+from ...analysis.stability.limit import limit_of
 from ...model.methods import Method
 from ...runs import engine
 from ...runs.integration import quietly
@@ -77,6 +79,7 @@ class Trials:
         self._done: dict[tuple[str, int, float], Trial] = {}
         self._dense: dict[tuple[str, int, float], Trial] = {}
         self._evaluations: dict[str, int] = {}
+        self._limits: dict[str, StabilityLimit] = {}
         #: The last run, since ``confirm`` often follows ``look``.
         self._last: tuple[tuple[str, int, float], Run] | None = None
         #: The number of runs, and of all their rate evaluations.
@@ -87,6 +90,12 @@ class Trials:
         if method.name not in self._evaluations:
             self._evaluations[method.name] = engine.evaluations(method, self.scene.system)
         return self._evaluations[method.name]
+
+    def stability_limit(self, method: Method) -> StabilityLimit:
+        """The stability limit of a method on a linear system, which takes longer to find than most runs."""
+        if method.name not in self._limits:
+            self._limits[method.name] = limit_of(self.scene.system, method)
+        return self._limits[method.name]
 
     def look(self, method: Method, dt: float, steps: int) -> Trial:
         """The run, with some two thousand states compared with the true ones."""
