@@ -192,10 +192,10 @@ class Request(NamedTuple):
         plan = engine.Plan(
             system, method, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused, single=single
         )
-        # What the core does not record is computed from the saved states, with some of them in between.
-        recorded = 0
-        for name in record:
-            recorded += prod(system.quantities[name]) if name in system.quantities else 3 * rows
+        # In float32, in the matrix forms and between events quantities are computed from the saved states, in float64, with some
+        # of them in between.
+        by_core = tuple(record) if form == "direct" and not single and watched is None else ()
+        recorded = sum(prod(system.quantities[name]) for name in record) + (3 * rows if len(by_core) < len(record) else 0)
         checks.fits(
             "the saved states",
             plan.save_count * (rows + recorded) + NUMBERS_PER_STATE * (rows + 1),
@@ -221,8 +221,6 @@ class Request(NamedTuple):
         if force is not None:
             plan = plan._replace(force=spread(force, system.v_shape, batch))
         if record or stepped is not plan.system:
-            # In float32 they are computed from the saved states, in float64.
-            by_core = () if single else tuple(name for name in record if name in system.quantities)
             plan = plan._replace(system=stepped, record=by_core)
         started = method.starts[choice] if method.starts else None
         return cls(plan, system, v, y, carried, bad, record, watched, started, checks.flag("progress", progress))

@@ -15,6 +15,7 @@ from ...base.immutable import Immutable, ValueEquality, changed
 from ...base.reprs import MAX_LINE, facts, shortened
 from ...errors import ArgumentError, DTypeError, UnsupportedError
 from ...reference.around import ORDER, Bound, wrapped
+from ...reference.quantities import Quantity
 from ..around import FORCE, Force, Part
 from ..inputs import Sampled
 from ..parameters import CoreParameters, flat, of_shape
@@ -248,8 +249,9 @@ class System(Immutable, ValueEquality, ABC):
 
     @property
     def quantities(self) -> dict[str, Shape]:
-        """The quantities that the core can record beside the states, with the shape of each."""
-        return {}
+        """The quantities that the core can record beside the states, with the shape of each; the reference defines them."""
+        recorded: dict[str, Quantity] = getattr(self.reference, "quantities", {})
+        return {name: each.shape(self.y_shape[-1] if self.y_shape else 1) for name, each in recorded.items()}
 
     def energy(self, v: Array, y: Array) -> Array:
         """The energy of states with the blocks' axes first and axes of the batch last.
@@ -257,13 +259,21 @@ class System(Immutable, ValueEquality, ABC):
         Raises:
             UnsupportedError: if the system has none of its own.
         """
-        raise UnsupportedError(f"energy: {self!r} has no energy of its own; compute what you mean by it from v and y")
+        if "energy" not in self.quantities:
+            raise UnsupportedError(f"energy: {self!r} has no energy of its own; compute what you mean by it from v and y")
+        v, y = (each if hasattr(each, "shape") else np.asarray(each) for each in (v, y))
+        batch = np.broadcast_shapes(v.shape[len(self.v_shape) :], y.shape[len(self.y_shape) :])
+        with np.errstate(all="ignore"):
+            return self.recordable("energy", v, y, 1.0, batch)
 
-    def recordable(self, name: str, v: Array, y: Array, dt: float) -> Array:
-        """A quantity, computed from the states of a run with that step to the bits that recording it gives."""
-        if name not in self.quantities:
-            return self.energy(v, y)
-        return np.asarray(self.reference_at_step(dt, y.shape[len(self.y_shape) :]).record(name, v, y))
+    def recordable(self, name: str, v: Array, y: Array, dt: float, batch: Shape | None = None) -> Array:
+        """A quantity, computed from the states of a run with that step to the bits that recording it gives.
+
+        ``batch`` is the shape of the batch, by default that of y.
+        """
+        batch = y.shape[len(self.y_shape) :] if batch is None else batch
+        quantity: Array = self.reference_at_step(dt, batch).record(name, v, y)
+        return quantity
 
     def auxiliary(self, t: float, v: Array, y: Array) -> Array:
         """The auxiliary outputs z (§3) of states at time t, shape (outputs, *batch).

@@ -17,6 +17,8 @@ from .base import System
 class Chain(System):
     """n masses between two walls, joined by n + 1 springs. Blocks have shape (n,); y[i] is the displacement of mass i from rest.
 
+    Its energy is ½·Σ m·v² + ½·Σ k·(difference of neighbours)², the walls at 0.
+
     Args:
         n: number of masses, one or more.
         stiffness: stiffness of the springs: one number, or an array with the n + 1 springs (or 1, for all) along its first axis
@@ -54,13 +56,6 @@ class Chain(System):
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The stiffnesses and masses."""
         return {"stiffness": aligned(self.stiffness, 1, batch), "mass": aligned(self.mass, 1, batch)}
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """½·Σ m·v² + ½·Σ k·(difference of neighbours)², the walls at 0."""
-        k, m = self.own_parameters(y.shape[1:]).values()
-        wall = np.zeros_like(y[:1])
-        stretch = np.diff(np.concatenate([wall, y, wall]), axis=0)
-        return np.asarray(0.5 * (m * v * v).sum(axis=0) + 0.5 * (k * stretch * stretch).sum(axis=0))
 
 
 def _per_row(argument: str, array: Array, rows: int, what: str) -> Array:

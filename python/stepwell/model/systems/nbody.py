@@ -30,6 +30,8 @@ class NBody(System):
     | ``"newton"`` | G·m·m/r² | −G·m·m/r |
     | ``"printed"`` | G·m·m/r | −G·m·m/r, the document's potential, which belongs to Newton's force instead |
 
+    Their energy is ½·Σ m·v² and the potential of every pair.
+
     Args:
         masses: one for each body, shape (bodies,) or (bodies, *batch), zero or more. A body without mass is attracted but does
             not attract.
@@ -148,15 +150,3 @@ class NBody(System):
     def named(self, name: str, index: Shape) -> str:
         """The parameter of G·m is called Gm."""
         return super().named("Gm" if name == "strength" else name, index)
-
-    @property
-    def quantities(self) -> dict[str, Shape]:
-        """The quantities that can be recorded, with the shape of each; the reference defines them."""
-        return {name: each.shape(self.y_shape[1]) for name, each in reference.QUANTITIES.items()}
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """½·Σ m·v² and the potential of every pair; see the table above."""
-        batch = np.broadcast_shapes(v.shape[2:], y.shape[2:])
-        with np.errstate(all="ignore"):
-            energy: Array = self.reference_at_step(1.0, batch).energies(v, y)[2]
-        return energy

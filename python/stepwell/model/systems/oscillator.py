@@ -26,6 +26,9 @@ class Oscillator(System):
     **v is ẏ/ω₀ unless ``form="physical"``**: that is the document's canonical form, whose phase diagram is a circle. There a
     start with the velocity u is ``v=u / omega``.
 
+    Its energy is that of spring and motion per unit of mass, ½ẏ² + ½ω₀²y²; in canonical form divided by ω₀², ½(v² + y²). What
+    damping, friction and inputs do to it is not in it.
+
     Args:
         omega: ω₀ in radians per unit of time, above zero; broadcasts over the batch. In physical form it may be zero: a block
             on a plane, without a spring.
@@ -117,12 +120,6 @@ class Oscillator(System):
         """The form, the parameters and the inputs."""
         inputs = {"x": signal(self.x), "a": signal(self.a)}
         return {"form": self.form, "omega": self.omega, "damping": self.damping, "drag": self.drag, **inputs}
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """Energy per unit of mass of spring and motion, ½ẏ² + ½ω₀²y²; in canonical form divided by ω₀², ½(v² + y²)."""
-        if self.form == "canonical":
-            return 0.5 * (v * v + y * y)
-        return 0.5 * (v * v + (self.omega * self.omega) * (y * y))
 
     def without_inputs(self) -> Oscillator:
         """The oscillator without inputs."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...base import checks
-from ...base.arrays import Array, Shape
+from ...base.arrays import Shape
 from ...base.immutable import changed
 from ...errors import ShapeError
 from ...reference.systems.particles import Particles as Reference
@@ -18,6 +18,8 @@ from .base import System, shown
 
 class Particles(System):
     """Points in a uniform field, v̇ = g − (d/m)·v, that may meet floors and spheres. Blocks have shape (points, dim).
+
+    Their energy is Σ m·(½v² − g·y), without the springs of floors.
 
     Args:
         masses: one for all, or one for each point, shape (points,) or (points, *batch), above zero.
@@ -110,9 +112,3 @@ class Particles(System):
             gravity[-1] = -self.gravity
             gravity = aligned(gravity, 1, batch)
         return {"dim": dim, "masses": aligned(masses, 1, batch), "gravity": gravity, "drag": self.drag}
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """Σ m·(½v² − g·y), without the springs of floors."""
-        parameters = self.own_parameters(y.shape[2:])
-        fall = (parameters["gravity"] * y).sum(axis=1)
-        return np.asarray((parameters["masses"] * (0.5 * (v * v).sum(axis=1) - fall)).sum(axis=0))

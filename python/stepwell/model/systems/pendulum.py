@@ -8,7 +8,6 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Shape
-from ...reference import trig
 from ...reference.systems.pendulum import Pendulum as Reference
 from ..inputs import LAST_ANGLE, LAST_SINGLE_ANGLE, Input, as_input, signal
 from .base import System, shown
@@ -21,6 +20,8 @@ class Pendulum(System):
         omega: ω₀ of small swings in radians per unit of time, above zero: √(g/l); broadcasts over the batch.
         damping: damping ratio D of small swings, without a unit; broadcasts. None leaves the term out.
         a: external angular acceleration: a number, an array over the batch, ``Sinusoid`` or ``Sampled``.
+
+    Its energy, per moment of inertia, is ½v² + ω₀²(1 − cos y), which is 0 at rest hanging down.
 
     The angle is not reduced to one turn. Its sine is accurate up to 2⁵⁰ rad and meaningless beyond;
     a run that saves such an angle gives an ``AccuracyWarning``.
@@ -70,8 +71,3 @@ class Pendulum(System):
             return None
         largest = np.abs(y[beyond]).max()
         return f"an angle grew to {largest:.3g} rad, and beyond {last:.3g} rad its sine means nothing", beyond.any(axis=0)
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """Energy per moment of inertia, ½v² + ω₀²(1 − cos y), which is 0 at rest hanging down."""
-        half = trig.sin(0.5 * np.asarray(y))
-        return np.asarray(0.5 * (v * v) + (2.0 * (self.omega * self.omega)) * (half * half))  # 1 − cos y loses digits near 0

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...base import checks
-from ...base.arrays import Array, Shape
+from ...base.arrays import Shape
 from ...errors import ArgumentError
 from ...reference.systems.pendulum_3d import Pendulum3D as Reference
 from ...reference.systems.rods import dot
@@ -22,7 +22,7 @@ class Pendulum3D(RodSystem):
     Blocks have shape (3,); the last coordinate is the height, so at rest the mass hangs at (0, 0, −length). The pull of the rod
     is the solution of C̈ = 0, with C = ½(y·y − length²), so the rod keeps its length but for the errors of the method.
     ``LengthControl`` returns it to its length, ``Projection("length")`` resets it after every step. ``Rods`` has any number of
-    rods.
+    rods. The energy per mass is ½v·v + g·height, which is zero at rest at the height of the fixed end.
 
     Args:
         length: of the rod, above zero; broadcasts over the batch.
@@ -71,8 +71,3 @@ class Pendulum3D(RodSystem):
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The length, gravity, and the control of the length."""
         return {"length": self.length, "gravity": self.gravity} | self.constraint_parameters()
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """Energy per mass, ½v·v + g·height, which is zero at rest at the height of the fixed end."""
-        with np.errstate(all="ignore"):
-            return np.asarray(0.5 * dot(v, v) + self.gravity * y[2])

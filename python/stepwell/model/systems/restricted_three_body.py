@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from ...base import checks
-from ...base.arrays import Array, Shape
+from ...base.arrays import Shape
 from ...errors import ArgumentError
 from ...reference.systems.restricted_three_body import RestrictedThreeBody as Reference
 from .base import System, shown
@@ -20,6 +18,8 @@ class RestrictedThreeBody(System):
     body, of mass 1 − μ, is at rest at (−μ, 0) and the light one, of mass μ, at (1 − μ, 0). Blocks have shape (2,).
 
     ẍ = x + 2ẏ − (1 − μ)(x + μ)/r₁³ − μ(x − 1 + μ)/r₂³, ÿ = y − 2ẋ − (1 − μ)y/r₁³ − μy/r₂³
+
+    Its energy is Jacobi's integral, ½|v|² − ½(x² + y²) − (1 − μ)/r₁ − μ/r₂, the only one that the motion conserves in this frame.
 
     Args:
         mu: μ, the light body's fraction of the mass, above 0 and below 1; broadcasts over the batch. By default the moon's
@@ -58,12 +58,3 @@ class RestrictedThreeBody(System):
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """μ."""
         return {"mu": self.mu}
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """Jacobi's integral, ½|v|² − ½(x² + y²) − (1 − μ)/r₁ − μ/r₂, the only energy that the motion conserves in this frame."""
-        with np.errstate(all="ignore"):
-            across = y[1] * y[1]
-            from_heavy, from_light = y[0] + self.mu, (y[0] - 1.0) + self.mu
-            pull = (1.0 - self.mu) / np.sqrt(from_heavy * from_heavy + across)
-            pull = pull + self.mu / np.sqrt(from_light * from_light + across)
-            return np.asarray(0.5 * (v[0] * v[0] + v[1] * v[1]) - 0.5 * (y[0] * y[0] + across) - pull)

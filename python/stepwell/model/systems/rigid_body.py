@@ -31,6 +31,8 @@ class RigidBody(System):
     by its length after every step. Without either the length drifts, and nothing else is wrong: the matrix of rotation is that
     of q/|q|, whatever the length.
 
+    Its energy is ½·ω·J·ω, and the height of ``centre`` above the fixed point times ``weight``.
+
     Args:
         inertia: the three principal moments of inertia, above zero and none above the sum of the others, shape (3,) or
             (3, *batch); for ``weight`` those about the fixed point. Products of inertia are not provided for: turn the body
@@ -44,7 +46,7 @@ class RigidBody(System):
         centre: where it acts, from the fixed point along body axes, shape (3,) or (3, *batch).
 
     Attributes:
-        quantities: ``"angular_momentum"``, along the axes of space, and ``"norm_error"``, q·q − 1, can be recorded.
+        quantities: ``"energy"``, ``"angular_momentum"``, along the axes of space, and ``"norm_error"``, q·q − 1, can be recorded.
 
     Raises:
         ArgumentError: what is wrong with which argument.
@@ -123,11 +125,6 @@ class RigidBody(System):
         return parameters | {"weight": self.weight, "centre": centre} | self.constraint_parameters()
 
     @property
-    def quantities(self) -> dict[str, Shape]:
-        """The quantities that can be recorded, with the shape of each; the reference defines them."""
-        return {name: shape for name, (shape, _) in reference.QUANTITIES.items()}
-
-    @property
     def torques_act(self) -> bool:
         """Whether torques or damping act, so that the energy may change; the energy of a weight is included in it."""
         return bool(self.given_inputs()) or (self.damping is not None and bool((self.damping != 0.0).any()))
@@ -136,20 +133,6 @@ class RigidBody(System):
         """A message if a quaternion is zero, which is no attitude."""
         zero = (y == 0.0).all(axis=1)
         return ("a quaternion is zero, which is no attitude", zero.any(axis=0)) if zero.any() else None
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """½·ω·J·ω, and the height of ``centre`` above the fixed point times ``weight``."""
-        batch = np.broadcast_shapes(v.shape[1:], y.shape[1:])
-        inertia = aligned(self.inertia, 1, batch)
-        with np.errstate(all="ignore"):
-            energy = 0.5 * ((inertia[0] * v[0] * v[0] + inertia[1] * v[1] * v[1]) + inertia[2] * v[2] * v[2])
-            if self.weight is not None and self.centre is not None:
-                centre = aligned(self.centre, 1, batch)
-                axes, square = reference.turned(y)
-                up = axes[2]
-                height = ((up[0] * centre[0] + up[1] * centre[1]) + up[2] * centre[2]) / square
-                energy = energy + self.weight * height
-        return np.asarray(energy)
 
 
 def _vector(argument: str, numbers: Array) -> Array:

@@ -45,11 +45,6 @@ class RodSystem(System):
         """The strength of a control is called c."""
         return super().named("c" if name == "strength" else name, index)
 
-    @property
-    def quantities(self) -> dict[str, Shape]:
-        """The quantities that can be recorded, with the shape of each."""
-        return {name: each.shape(self.y_shape[-1]) for name, each in reference.QUANTITIES.items()}
-
     def doubt(self, y: Array) -> tuple[str, Any] | None:
         """A message if a rod has another length in the first or last of these states."""
         y = y[[0, -1]]
@@ -100,6 +95,8 @@ class Rods(RodSystem):
     The last coordinate is the height. Every evaluation of the rates solves for the pulls of all rods, so a rod keeps its length
     but for the errors of the method. ``LengthControl`` returns it to its length, ``Projection("length")`` resets it after every
     step. A start with other lengths is not refused: without either the rods keep these, and the run warns.
+
+    Their energy is Σ m·(½v² + g·height), which is zero at rest at height 0.
 
     Args:
         masses: one for each point, shape (points,) or (points, *batch), above zero.
@@ -248,14 +245,6 @@ class Rods(RodSystem):
             | {"masses": masses, "lengths": lengths, "anchors": fixed, "gravity": self.gravity}
             | self.constraint_parameters()
         )
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """Σ ½m·v² + m·g·height, which is zero at rest at height 0."""
-        energy: Any = 0.0
-        with np.errstate(all="ignore"):
-            for mass, velocity, place in zip(aligned(self.masses, 1, v.shape[2:]), v, y, strict=True):
-                energy = energy + mass * (0.5 * reference.dot(velocity, velocity) + self.gravity * place[-1])
-        return np.asarray(energy)
 
 
 def _ends(rods: Any, points: int) -> tuple[tuple[End, End], ...]:

@@ -30,6 +30,8 @@ class Springs(System):
     k·(ℓ − ℓ₀) + c·((vⱼ − vᵢ)·n) along n, and j with the opposite one. A spring of no length has no direction, and no force.
     A fixed particle keeps its velocity: given v = 0 it stays where it is to the last bit, and given another it is led along.
 
+    Their energy is ½·Σ m·v² − Σ m·g·y of the particles that are not fixed, and ½·Σ k·(ℓ − ℓ₀)² of the springs.
+
     Args:
         pairs: the two particles of each spring, from 0 on, shape (springs, 2). No two springs join the same particles. The
             forces on a particle are summed in the order of the springs.
@@ -165,17 +167,6 @@ class Springs(System):
         numbers = getattr(self, name, None)  # None for a parameter of a part around the system
         alone = name != "gravity" and numbers is not None and numbers.shape[:1] == (1,)
         return super().named(name, () if alone else index)
-
-    @property
-    def quantities(self) -> dict[str, Shape]:
-        """The quantities that can be recorded, with the shape of each: energy, momentum, and the largest ℓ − ℓ₀ of a spring."""
-        return {name: each.shape(self.y_shape[1]) for name, each in reference.QUANTITIES.items()}
-
-    def energy(self, v: Array, y: Array) -> Array:
-        """½·Σ m·v² − Σ m·g·y of the particles that are not fixed, and ½·Σ k·(ℓ − ℓ₀)² of the springs."""
-        batch = np.broadcast_shapes(v.shape[2:], y.shape[2:])
-        with np.errstate(all="ignore"):
-            return np.asarray(self.reference_at_step(1.0, batch).energies(v, y)[2])
 
     def safe_step(self, method: str | Method) -> Any:
         """A step below which a method is stable, known before any run, for any number of springs.

@@ -1,13 +1,11 @@
 """Bodies that attract each other (Appendix C, D), each pair computed once."""
 
-from collections.abc import Callable
-from typing import NamedTuple
-
 import numpy as np
 
 from ...base.arrays import Array
 from .. import bits
 from ..log import log
+from ..quantities import Quantity, Recorded, of_spin
 
 #: Sums over bodies are kept in this many parts, body i in part i mod LANES; distances that are taken together are so far apart.
 LANES = 8
@@ -53,7 +51,7 @@ def square(d: Array) -> Array:
     return length
 
 
-class NBody:
+class NBody(Recorded):
     """v̇ᵢ = Σⱼ G·mⱼ·(yⱼ − yᵢ)·f(r² + ε²), ẏ = v, with f = 1/r² (``logarithmic``, ``printed``) or 1/r³ (``newton``).
 
     Blocks are of shape (bodies, dim, …), masses of shape (bodies, …).
@@ -130,10 +128,6 @@ class NBody:
         along_v, along_y = masses * v, -(masses * (dv / self.h))
         return along_v, along_y, total(square(along_v) + square(along_y))
 
-    def record(self, name: str, v: Array, y: Array) -> Array:
-        """A quantity of a state: a number for each member, or a vector along the first axis."""
-        return np.asarray(QUANTITIES[name].of(self, v, y))
-
 
 def energy(s: NBody, v: Array, y: Array) -> Array:
     """½·Σ m·v² and the potential of every pair."""
@@ -161,16 +155,9 @@ def closest(s: NBody, v: Array, y: Array) -> Array:
     return np.asarray(np.sqrt(least))
 
 
-class Quantity(NamedTuple):
-    """What can be recorded of a state: its shape in so many dimensions, and its formula."""
-
-    shape: Callable[[int], tuple[int, ...]]
-    of: Callable[[NBody, Array, Array], Array]
-
-
-QUANTITIES = {
-    "energy": Quantity(lambda dim: (), energy),
-    "momentum": Quantity(lambda dim: (dim,), momentum),
-    "angular_momentum": Quantity(lambda dim: () if dim == 2 else (3,), angular_momentum),
-    "closest": Quantity(lambda dim: (), closest),
+NBody.quantities = {
+    "energy": Quantity(energy),
+    "momentum": Quantity(momentum, lambda dim: (dim,)),
+    "angular_momentum": Quantity(angular_momentum, of_spin),
+    "closest": Quantity(closest),
 }

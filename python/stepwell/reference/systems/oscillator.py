@@ -3,9 +3,10 @@
 import numpy as np
 
 from ...base.arrays import Array, Signal
+from ..quantities import Quantity, Recorded
 
 
-class Oscillator:
+class Oscillator(Recorded):
     """Canonical: v̇ = −ω₀(y + 2Dv − x) + a/ω₀, ẏ = ω₀v. Physical: v̇ = −ω₀²y − 2Dω₀v + ω₀²x + a, ẏ = v.
 
     ``damping`` None means that there is no such term; a driven oscillator always has it. ``drag`` is 2Dω₀ in its place.
@@ -14,11 +15,12 @@ class Oscillator:
     def __init__(
         self, h: float, form: str, omega: Array, damping: Array | None, drag: Array | None, x: Signal | None, a: Signal | None
     ) -> None:
-        if form == "canonical":
+        self.square = None if form == "canonical" else omega * omega
+        if self.square is None:
             self.stiffness = self.speed = by_x = h * omega
             by_a = h / omega
         else:
-            self.stiffness = by_x = h * (omega * omega)
+            self.stiffness = by_x = h * self.square
             self.speed = by_a = np.asarray(h)
         inputs = [signal.scaled(by) for signal, by in ((x, by_x), (a, by_a)) if signal is not None]
         if damping is None and inputs:
@@ -47,3 +49,13 @@ class Oscillator:
     def velocity(self, d: Array) -> Array:
         """The v whose increment of y is d."""
         return d / self.speed
+
+
+def energy(s: Oscillator, v: Array, y: Array) -> Array:
+    """½ẏ² + ½ω₀²y² per mass, of spring and motion; in canonical form divided by ω₀²."""
+    spring = y * y if s.square is None else s.square * (y * y)
+    whole: Array = 0.5 * (v * v + spring)
+    return whole
+
+
+Oscillator.quantities = {"energy": Quantity(energy)}

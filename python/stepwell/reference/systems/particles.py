@@ -3,9 +3,11 @@
 import numpy as np
 
 from ...base.arrays import Array
+from ..quantities import Quantity, Recorded
+from .nbody import square, total
 
 
-class Particles:
+class Particles(Recorded):
     """Blocks are of shape (points, dim, …), masses of shape (points, …), gravity of shape (dim, …).
 
     ``drag`` None means that there is no such term.
@@ -13,6 +15,7 @@ class Particles:
 
     def __init__(self, h: float, dim: int, masses: Array, gravity: Array, drag: Array | None) -> None:
         self.h = h
+        self.masses, self.gravity = masses, gravity
         self.kick = h * gravity
         self.drag = None if drag is None else (h * drag) / masses
 
@@ -28,3 +31,14 @@ class Particles:
     def velocity(self, d: Array) -> Array:
         """The v whose increment of y is d."""
         return d / self.h
+
+
+def energy(s: Particles, v: Array, y: Array) -> Array:
+    """Σ m·(½v² − g·y), without the springs of surfaces."""
+    along = s.gravity[0] * y[:, 0]
+    for c in range(1, y.shape[1]):
+        along = along + s.gravity[c] * y[:, c]
+    return total(s.masses * (0.5 * square(v) - along))
+
+
+Particles.quantities = {"energy": Quantity(energy)}

@@ -4,9 +4,10 @@ import numpy as np
 
 from ...base.arrays import Array, Signal
 from .. import trig
+from ..quantities import Quantity, Recorded
 
 
-class Pendulum:
+class Pendulum(Recorded):
     """y is the angle from below and v its velocity.
 
     ``damping`` None means that there is no such term; a driven pendulum always has it.
@@ -14,7 +15,8 @@ class Pendulum:
 
     def __init__(self, h: float, omega: Array, damping: Array | None, a: Signal | None) -> None:
         self.h = np.asarray(h)
-        self.stiffness = h * (omega * omega)
+        self.square = omega * omega
+        self.stiffness = h * self.square
         self.input = None if a is None else a.scaled(self.h)
         if damping is None and a is not None:
             damping = np.zeros(())
@@ -37,3 +39,13 @@ class Pendulum:
         """The v whose increment of y is d."""
         velocity: Array = d / self.h
         return velocity
+
+
+def energy(s: Pendulum, v: Array, y: Array) -> Array:
+    """½v² + ω₀²(1 − cos y) per moment of inertia, which is 0 at rest hanging down."""
+    half = trig.sin(0.5 * y)
+    whole: Array = 0.5 * (v * v) + (2.0 * s.square) * (half * half)  # 1 − cos y loses digits near 0
+    return whole
+
+
+Pendulum.quantities = {"energy": Quantity(energy)}

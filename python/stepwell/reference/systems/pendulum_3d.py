@@ -6,10 +6,11 @@ import numpy as np
 
 from ...base.arrays import Array, Blocks
 from .. import rod_contact
+from ..quantities import Quantity, Recorded, of_spin
 from .rods import Rods, dot, largest, spin
 
 
-class Pendulum3D:
+class Pendulum3D(Recorded):
     """The pull is that for which C̈ = 0, with C = ½(y·y − l²); under control C̈ + 2αĊ + α²C = 0, α = c/h.
 
     Blocks are of shape (3, …).
@@ -57,8 +58,25 @@ class Pendulum3D:
         rod = Rods(self.h, 3, [[1, 0]], one, np.asarray(self.length)[np.newaxis], anchor, self.gravity, None, None)
         return rod_contact.RodContacts(h, rod, 1, surfaces)
 
-    def record(self, name: str, v: Array, y: Array) -> Array:
-        """A quantity of a state: ``length_error``, |length/l − 1|, or ``angular_momentum``, y × v per mass."""
-        if name == "length_error":
-            return largest([np.sqrt(dot(y, y)) / self.length - 1.0])
-        return np.stack(spin(y, v, [(1, 2), (2, 0), (0, 1)]))
+
+def energy(s: Pendulum3D, v: Array, y: Array) -> Array:
+    """½v·v + g·height per mass, which is zero at rest at the height of the fixed end."""
+    whole: Array = 0.5 * dot(v, v) + s.gravity * y[2]
+    return whole
+
+
+def length_error(s: Pendulum3D, v: Array, y: Array) -> Array:
+    """|length/l − 1|."""
+    return largest([np.sqrt(dot(y, y)) / s.length - 1.0])
+
+
+def angular_momentum(s: Pendulum3D, v: Array, y: Array) -> Array:
+    """The spin y × v per mass."""
+    return np.stack(spin(y, v, [(1, 2), (2, 0), (0, 1)]))
+
+
+Pendulum3D.quantities = {
+    "energy": Quantity(energy),
+    "length_error": Quantity(length_error),
+    "angular_momentum": Quantity(angular_momentum, of_spin),
+}

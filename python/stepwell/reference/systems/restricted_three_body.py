@@ -3,9 +3,10 @@
 import numpy as np
 
 from ...base.arrays import Array
+from ..quantities import Quantity, Recorded
 
 
-class RestrictedThreeBody:
+class RestrictedThreeBody(Recorded):
     """ẍ = x + 2ẏ − (1 − μ)(x + μ)/r₁³ − μ(x − 1 + μ)/r₂³, ÿ = y − 2ẋ − (1 − μ)y/r₁³ − μy/r₂³; blocks are of shape (2, …)."""
 
     def __init__(self, h: float, mu: Array) -> None:
@@ -35,3 +36,16 @@ class RestrictedThreeBody:
     def velocity(self, d: Array) -> Array:
         """The v whose increment of y is d."""
         return d / self.h
+
+
+def energy(s: RestrictedThreeBody, v: Array, y: Array) -> Array:
+    """Jacobi's integral, ½|v|² − ½(x² + y²) − (1 − μ)/r₁ − μ/r₂, the only energy that the motion conserves in this frame."""
+    across = y[1] * y[1]
+    from_heavy, from_light = y[0] + s.mu, (y[0] - 1.0) + s.mu
+    pull = (1.0 - s.mu) / np.sqrt(from_heavy * from_heavy + across)
+    pull = pull + s.mu / np.sqrt(from_light * from_light + across)
+    whole: Array = 0.5 * (v[0] * v[0] + v[1] * v[1]) - 0.5 * (y[0] * y[0] + across) - pull
+    return whole
+
+
+RestrictedThreeBody.quantities = {"energy": Quantity(energy)}

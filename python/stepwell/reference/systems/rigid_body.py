@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.arrays import Array, Blocks, Signal
+from ..quantities import Quantity, Recorded, of_spin
 
 Vector = tuple[Array, Array, Array]
 
 
-class RigidBody:
+class RigidBody(Recorded):
     """v is ω in body axes, shape (3, …); y is q, which turns body axes into those of space, scalar first, shape (4, …).
 
     J is diagonal. ``torque`` is along body axes and ``space_torque`` along those of space, a signal or None for each axis;
@@ -38,7 +39,8 @@ class RigidBody:
         components = [None] * 3 if torque is None else torque
         self.torque = [None if each is None else each.scaled(by) for each, by in zip(components, self.by_inertia, strict=True)]
         self.space_torque = space_torque
-        self.moment = None if weight is None or centre is None else [weight * each for each in centre]
+        self.weight = None if weight is None or centre is None else (weight, centre)
+        self.moment = None if self.weight is None else [self.weight[0] * each for each in self.weight[1]]
         self.gain = None if keeps != "control" or strength is None else h * strength
         self.projects = keeps == "projection"
 
@@ -92,10 +94,6 @@ class RigidBody:
         """The state after a step, q divided by its length if the system projects."""
         return (v, y / np.sqrt(square(y))) if self.projects else (v, y)
 
-    def record(self, name: str, v: Array, y: Array) -> Array:
-        """A quantity of a state."""
-        return QUANTITIES[name][1](self, v, y)
-
 
 def plus(total: Array | None, more: Array) -> Array:
     """A sum that may have no terms yet."""
@@ -122,6 +120,18 @@ def turned(q: Array) -> tuple[tuple[Vector, Vector, Vector], Array]:
     return (x, y, z), square(q)
 
 
+def energy(s: RigidBody, v: Array, y: Array) -> Array:
+    """½·ω·J·ω, and the height of ``centre`` above the fixed point times ``weight``."""
+    whole: Array = 0.5 * ((s.inertia[0] * v[0] * v[0] + s.inertia[1] * v[1] * v[1]) + s.inertia[2] * v[2] * v[2])
+    if s.weight is None:
+        return whole
+    (weight, centre), (axes, length) = s.weight, turned(y)
+    up = axes[2]
+    height = ((up[0] * centre[0] + up[1] * centre[1]) + up[2] * centre[2]) / length
+    whole = whole + weight * height
+    return whole
+
+
 def angular_momentum(s: RigidBody, v: Array, y: Array) -> Array:
     """R(q)·J·ω, along the axes of space."""
     own = s.inertia * v
@@ -134,5 +144,8 @@ def norm_error(s: RigidBody, v: Array, y: Array) -> Array:
     return square(y) - 1.0
 
 
-#: What can be recorded of a state: its shape and its formula.
-QUANTITIES = {"angular_momentum": ((3,), angular_momentum), "norm_error": ((), norm_error)}
+RigidBody.quantities = {
+    "energy": Quantity(energy),
+    "angular_momentum": Quantity(angular_momentum, of_spin),
+    "norm_error": Quantity(norm_error),
+}

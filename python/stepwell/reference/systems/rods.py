@@ -1,13 +1,13 @@
 """Points joined by rods: the rods' pulls are found from equations that they share, one for each rod."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...base.arrays import Array, Blocks
 from .. import bits, rod_contact
 from ..elimination import factored, solved
+from ..quantities import Quantity, Recorded, of_spin
 
 #: Newton's corrections of the points in a projection. Each squares the relative error of the lengths, over 2: 2 % becomes
 #: 2·10⁻⁴, 2·10⁻⁸ and 2·10⁻¹⁶, which is rounding.
@@ -36,7 +36,7 @@ def spin(y: Array, v: Array, axes: list[tuple[int, int]]) -> list[Array]:
     return [y[a] * v[b] - y[b] * v[a] for a, b in axes]
 
 
-class Rods:
+class Rods(Recorded):
     """v̇ᵢ = −(Σ ±pullₖ·dₖ)/mᵢ − g, where d points from the first end of a rod to its second.
 
     The pulls are those for which C̈ = 0, with C = ½(d·d − l²); under control C̈ + 2αĊ + α²C = 0, α = c/h. Ends of rods are
@@ -155,9 +155,14 @@ class Rods:
         """How its points meet surfaces in a step h."""
         return rod_contact.RodContacts(h, self, 2, surfaces)
 
-    def record(self, name: str, v: Array, y: Array) -> Array:
-        """A quantity of a state."""
-        return np.asarray(QUANTITIES[name].of(self, v, y))
+
+def energy(s: Rods, v: Array, y: Array) -> Array:
+    """Σ m·(½v² + g·height), which is zero at rest at height 0."""
+    whole: Any = None
+    for mass, velocity, place in zip(s.masses, v, y, strict=True):
+        each = mass * (0.5 * dot(velocity, velocity) + s.gravity * place[-1])
+        whole = each if whole is None else whole + each
+    return np.asarray(whole)
 
 
 def length_error(s: Rods, v: Array, y: Array) -> Array:
@@ -174,14 +179,8 @@ def angular_momentum(s: Rods, v: Array, y: Array) -> Array:
     return whole[0] if len(whole) == 1 else np.stack(whole)
 
 
-class Quantity(NamedTuple):
-    """What can be recorded of a state: its shape in so many dimensions, and its formula."""
-
-    shape: Callable[[int], tuple[int, ...]]
-    of: Callable[[Rods, Array, Array], Array]
-
-
-QUANTITIES = {
-    "length_error": Quantity(lambda dim: (), length_error),
-    "angular_momentum": Quantity(lambda dim: () if dim == 2 else (3,), angular_momentum),
+Rods.quantities = {
+    "energy": Quantity(energy),
+    "length_error": Quantity(length_error),
+    "angular_momentum": Quantity(angular_momentum, of_spin),
 }

@@ -1,12 +1,12 @@
 """Particles joined by springs, in one to three dimensions."""
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...base.arrays import Array
 from .. import bits
+from ..quantities import Quantity, Recorded
 from .nbody import square, total
 
 
@@ -39,7 +39,7 @@ def in_order(pairs: Any, fixed: Any) -> list[Ends]:
     return rounds
 
 
-class Springs:
+class Springs(Recorded):
     """A spring of length ℓ = |d|, d = yⱼ − yᵢ, pulls i with f·d and j with −f·d, f = k − (k·ℓ₀ − c·((vⱼ − vᵢ)·d)/ℓ)/ℓ.
 
     v̇ = Σ f·d/m + g − (drag/m)·v, ẏ = v. Written so, f stays finite where the square of ℓ is too large for a number. A spring of
@@ -151,10 +151,6 @@ class Springs:
         along_v[self.free], along_y[self.free] = of_v, of_y
         return along_v, along_y, total(square(of_v) + square(of_y))
 
-    def record(self, name: str, v: Array, y: Array) -> Array:
-        """A quantity of a state: a number for each member, or a vector along the first axis."""
-        return np.asarray(QUANTITIES[name].of(self, v, y))
-
 
 def energy(s: Springs, v: Array, y: Array) -> Array:
     """½·Σ m·v² − Σ m·g·y of what moves, and ½·Σ k·(ℓ − ℓ₀)²."""
@@ -175,15 +171,8 @@ def stretch(s: Springs, v: Array, y: Array) -> Array:
     return np.asarray(most)
 
 
-class Quantity(NamedTuple):
-    """What can be recorded of a state: its shape in so many dimensions, and its formula."""
-
-    shape: Callable[[int], tuple[int, ...]]
-    of: Callable[[Springs, Array, Array], Array]
-
-
-QUANTITIES = {
-    "energy": Quantity(lambda dim: (), energy),
-    "momentum": Quantity(lambda dim: (dim,), momentum),
-    "stretch": Quantity(lambda dim: (), stretch),
+Springs.quantities = {
+    "energy": Quantity(energy),
+    "momentum": Quantity(momentum, lambda dim: (dim,)),
+    "stretch": Quantity(stretch),
 }

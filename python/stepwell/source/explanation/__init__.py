@@ -93,7 +93,7 @@ def explain(
     own = prod(system.batch)
     names = [record] if isinstance(record, str) else [] if record is None else checks.several("record", record, "quantities")
     if names and not system.quantities:
-        raise UnsupportedError(f"record: the core records nothing of {system!r}; its energy is NumPy's, from the saved states")
+        raise UnsupportedError(f"record: nothing can be recorded of {system!r}; it has no energy of its own")
     if names and checks.is_single(dtype):
         raise UnsupportedError("record: float32 runs compute it of the saved states, in float64; explain it without dtype=")
     quantities = list(dict.fromkeys(checks.known("record", name, list(system.quantities)) for name in names))

@@ -3,21 +3,22 @@
 use super::rates::{RateTraits, Rates, RatesRequest};
 use crate::{
     isa::{Level, Task, with_isa},
-    model::spec::Spec,
+    model::{spec::Spec, systems::chain::energy},
 };
 
 struct Chain {
     level: Level,
     h: f64,
     stiffness: Vec<f64>,
+    mass: Vec<f64>,
     by_mass: Vec<f64>,
 }
 
 /// The rates of a chain.
 pub(crate) fn make(asked: &RatesRequest) -> Box<dyn Rates> {
     let n = asked.shape.y;
-    let (stiffness, by_mass) = (vec![0.0; n + 1], vec![0.0; n]);
-    Box::new(Chain { level: asked.machine.level, h: asked.h, stiffness, by_mass })
+    let (stiffness, mass, by_mass) = (vec![0.0; n + 1], vec![0.0; n], vec![0.0; n]);
+    Box::new(Chain { level: asked.machine.level, h: asked.h, stiffness, mass, by_mass })
 }
 
 struct Pull<'a> {
@@ -55,11 +56,17 @@ impl Rates for Chain {
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
         let row = |name: &str, i: usize| spec.signature.place(name).map_or(f64::NAN, |place| spec.rows[place + i].at(first));
         self.stiffness.iter_mut().enumerate().for_each(|(i, k)| *k = row("stiffness", i));
-        self.by_mass.iter_mut().enumerate().for_each(|(i, by_mass)| *by_mass = self.h / row("mass", i));
+        self.mass.iter_mut().enumerate().for_each(|(i, mass)| *mass = row("mass", i));
+        self.by_mass.iter_mut().zip(&self.mass).for_each(|(by_mass, mass)| *by_mass = self.h / mass);
     }
 
     fn dv(&mut self, _t: f64, _v: &[f64], y: &[f64], out: &mut [f64]) {
         let Chain { level, stiffness, by_mass, .. } = self;
         with_isa!(*level, |isa| isa.run(Pull { stiffness, by_mass, y, out }));
+    }
+
+    /// Its energy, the only quantity.
+    fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
+        rows.fill(energy([&self.stiffness, &self.mass], v, y));
     }
 }

@@ -111,8 +111,10 @@ pub struct Kind {
     pub shape: fn(&Signature) -> Result<Shape, Error>,
     /// The term that depends on the velocity, if there is one: methods that need an acceleration refuse it.
     pub velocity_term: fn(&Signature) -> Option<&'static str>,
-    /// Quantities that can be recorded, and how many numbers each has. The `energy` is among them if it can be controlled.
+    /// Quantities that can be recorded, and how many numbers each has.
     pub quantities: fn(&Signature) -> Vec<(String, usize)>,
+    /// Whether [`System::energies`] are known, so that its energy can be controlled.
+    pub controllable: bool,
     /// Approximate number of operations of both rates: with many, a step is not a single tape.
     pub operations: fn(&Signature) -> usize,
     /// The system over symbols.

@@ -25,6 +25,7 @@ pub const KIND: Kind = Kind {
     shape,
     velocity_term: |signature| signature.equations.as_ref().filter(|e| e.reads_v()).map(|_| "a force that depends on v"),
     quantities,
+    controllable: false,
     operations: |signature| signature.equations.as_ref().map_or(0, |e| e.operations()),
     make,
 };

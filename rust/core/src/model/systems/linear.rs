@@ -19,6 +19,7 @@ pub const KIND: Kind = Kind {
     shape,
     velocity_term: |signature| (signature.word("kind") != "acceleration").then_some("rates of another kind"),
     quantities: |_| Vec::new(),
+    controllable: false,
     operations: |signature| 2 * signature.count("rows"),
     make,
 };

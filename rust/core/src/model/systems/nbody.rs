@@ -29,6 +29,7 @@ pub const KIND: Kind = Kind {
     shape,
     velocity_term: |_| None,
     quantities,
+    controllable: true,
     operations: |signature| 11 * signature.count("masses").pow(2),
     make,
 };

@@ -20,7 +20,8 @@ pub const KIND: Kind = Kind {
     name: "oscillator",
     shape,
     velocity_term: |signature| ["damping", "drag"].into_iter().find(|term| signature.has(term)),
-    quantities: |_| Vec::new(),
+    quantities: |_| vec![("energy".to_owned(), 1)],
+    controllable: false,
     operations: |_| 40,
     make,
 };
@@ -36,6 +37,8 @@ fn shape(signature: &Signature) -> Result<Shape, Error> {
 struct Oscillator<N: Number> {
     stiffness: N,
     speed: N,
+    /// ω₀² in physical form.
+    square: Option<N>,
     drag: Option<N>,
     inputs: Vec<Signal<N>>,
 }
@@ -43,14 +46,15 @@ struct Oscillator<N: Number> {
 pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let (h, omega) = (p.h, p.number("omega"));
     let canonical = p.signature.word("form") == "canonical";
-    let stiffness = if canonical { h * omega } else { h * (omega * omega) };
+    let square = (!canonical).then(|| omega * omega);
+    let stiffness = h * square.unwrap_or(omega);
     let (speed, by_a) = if canonical { (stiffness, h / omega) } else { (h, h) };
     let inputs: Vec<_> =
         [(p.signal("x"), stiffness), (p.signal("a"), by_a)].into_iter().filter_map(|(x, by)| Some(x?.scaled(by))).collect();
     // A driven oscillator always has its damping term.
     let damping = p.maybe("damping").or((!inputs.is_empty()).then(|| N::of(0.0)));
     let drag = p.maybe("drag").map(|drag| h * drag).or(damping.map(|damping| (N::of(2.0) * damping) * (h * omega)));
-    Box::new(Oscillator { stiffness, speed, drag, inputs })
+    Box::new(Oscillator { stiffness, speed, square, drag, inputs })
 }
 
 impl<N: Number> System<N> for Oscillator<N> {
@@ -72,5 +76,12 @@ impl<N: Number> System<N> for Oscillator<N> {
 
     fn velocity(&self, d: &Block<N>) -> Block<N> {
         d.map(|d| d / self.speed)
+    }
+
+    /// ½ẏ² + ½ω₀²y²; in canonical form divided by ω₀².
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        let square = y[0] * y[0];
+        let spring = self.square.map_or(square, |by| by * square);
+        (quantity == "energy").then(|| vec![N::of(0.5) * (v[0] * v[0] + spring)])
     }
 }

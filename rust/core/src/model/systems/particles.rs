@@ -1,5 +1,9 @@
 //! Free points in a uniform field, with viscous drag: v̇ = g − (d/m)·v, ẏ = v.
 
+use super::{
+    nbody::{square, total},
+    rods::dot,
+};
 use crate::{
     error::Error,
     model::{
@@ -14,7 +18,8 @@ pub const KIND: Kind = Kind {
     name: "particles",
     shape,
     velocity_term: |signature| signature.has("drag").then_some("drag"),
-    quantities: |_| Vec::new(),
+    quantities: |_| vec![("energy".to_owned(), 1)],
+    controllable: false,
     operations: |signature| 3 * signature.count("masses") * signature.whole("dim"),
     make,
 };
@@ -28,6 +33,8 @@ fn shape(signature: &Signature) -> Result<Shape, Error> {
 
 struct Particles<N: Number> {
     h: N,
+    masses: Vec<N>,
+    gravity: Vec<N>,
     /// h·g
     kick: Vec<N>,
     /// h·d/m of each point.
@@ -35,9 +42,10 @@ struct Particles<N: Number> {
 }
 
 pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
-    let kick = p.numbers("gravity").iter().map(|g| p.h * *g).collect();
-    let drag = p.maybe("drag").map(|drag| p.numbers("masses").iter().map(|mass| (p.h * drag) / *mass).collect());
-    Box::new(Particles { h: p.h, kick, drag })
+    let [masses, gravity] = ["masses", "gravity"].map(|name| p.numbers(name).to_vec());
+    let kick = gravity.iter().map(|g| p.h * *g).collect();
+    let drag = p.maybe("drag").map(|drag| masses.iter().map(|mass| (p.h * drag) / *mass).collect());
+    Box::new(Particles { h: p.h, masses, gravity, kick, drag })
 }
 
 impl<N: Number> System<N> for Particles<N> {
@@ -55,5 +63,13 @@ impl<N: Number> System<N> for Particles<N> {
 
     fn velocity(&self, d: &Block<N>) -> Block<N> {
         d.map(|d| d / self.h)
+    }
+
+    /// Σ m·(½v² − g·y).
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        let dim = self.gravity.len();
+        let points = self.masses.iter().zip(v.as_slice().chunks(dim).zip(y.as_slice().chunks(dim)));
+        let of_point = |(mass, (v, y)): (&N, (&[N], &[N]))| *mass * (N::of(0.5) * square(v) - dot(&self.gravity, y));
+        (quantity == "energy").then(|| vec![total(points.map(of_point))])
     }
 }

@@ -16,7 +16,8 @@ pub const KIND: Kind = Kind {
     name: "pendulum",
     shape,
     velocity_term: |signature| signature.has("damping").then_some("damping"),
-    quantities: |_| Vec::new(),
+    quantities: |_| vec![("energy".to_owned(), 1)],
+    controllable: false,
     operations: |_| 60,
     make,
 };
@@ -28,6 +29,8 @@ fn shape(signature: &Signature) -> Result<Shape, Error> {
 
 struct Pendulum<N: Number> {
     h: N,
+    /// ω₀²
+    square: N,
     stiffness: N,
     drag: Option<N>,
     input: Option<Signal<N>>,
@@ -39,7 +42,8 @@ pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     // A driven pendulum always has its damping term.
     let damping = p.maybe("damping").or(input.is_some().then(|| N::of(0.0)));
     let drag = damping.map(|damping| (N::of(2.0) * damping) * (h * omega));
-    Box::new(Pendulum { h, stiffness: h * (omega * omega), drag, input })
+    let square = omega * omega;
+    Box::new(Pendulum { h, square, stiffness: h * square, drag, input })
 }
 
 impl<N: Number> System<N> for Pendulum<N> {
@@ -60,5 +64,11 @@ impl<N: Number> System<N> for Pendulum<N> {
 
     fn velocity(&self, d: &Block<N>) -> Block<N> {
         d.map(|d| d / self.h)
+    }
+
+    /// ½v² + ω₀²(1 − cos y), by the sine of half the angle: 1 − cos y would lose digits near 0.
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        let half = sin(N::of(0.5) * y[0]);
+        (quantity == "energy").then(|| vec![N::of(0.5) * (v[0] * v[0]) + (N::of(2.0) * self.square) * (half * half)])
     }
 }

@@ -15,7 +15,8 @@ pub const KIND: Kind = Kind {
     name: "pendulum_3d",
     shape,
     velocity_term: |_| Some("the pull of its rod"),
-    quantities: |_| vec![("length_error".to_owned(), 1), ("angular_momentum".to_owned(), 3)],
+    quantities: |_| [("energy", 1), ("length_error", 1), ("angular_momentum", 3)].map(|(name, n)| (name.to_owned(), n)).to_vec(),
+    controllable: false,
     operations: |_| 25,
     make,
 };
@@ -32,13 +33,14 @@ struct Pendulum3D<N: Number> {
     h: N,
     length: N,
     square: N,
+    gravity: N,
     fall: N,
     keeps: Keeps<N>,
 }
 
 pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
-    let (h, length) = (p.h, p.number("length"));
-    Box::new(Pendulum3D { h, length, square: length * length, fall: h * p.number("gravity"), keeps: Keeps::new(p) })
+    let (h, length, gravity) = (p.h, p.number("length"), p.number("gravity"));
+    Box::new(Pendulum3D { h, length, square: length * length, gravity, fall: h * gravity, keeps: Keeps::new(p) })
 }
 
 impl<N: Number> System<N> for Pendulum3D<N> {
@@ -76,6 +78,7 @@ impl<N: Number> System<N> for Pendulum3D<N> {
     fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
         let (v, y) = (v.as_slice(), y.as_slice());
         match quantity {
+            "energy" => Some(vec![N::of(0.5) * dot(v, v) + self.gravity * y[2]]),
             "length_error" => Some(vec![largest([dot(y, y).sqrt() / self.length - N::of(1.0)])]),
             "angular_momentum" => Some(cross(y, v)),
             _ => None,

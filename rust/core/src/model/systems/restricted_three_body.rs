@@ -17,7 +17,8 @@ pub const KIND: Kind = Kind {
     name: "restricted_three_body",
     shape,
     velocity_term: |_| Some("the Coriolis force"),
-    quantities: |_| Vec::new(),
+    quantities: |_| vec![("energy".to_owned(), 1)],
+    controllable: false,
     operations: |_| 40,
     make,
 };
@@ -61,5 +62,17 @@ impl<N: Number> System<N> for RestrictedThreeBody<N> {
 
     fn velocity(&self, d: &Block<N>) -> Block<N> {
         d.map(|d| d / self.h)
+    }
+
+    /// Jacobi's integral: ½|v|² − ½(x² + y²) − (1 − μ)/r₁ − μ/r₂.
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        let (half, one) = (N::of(0.5), N::of(1.0));
+        let from_heavy = y[0] + self.mu;
+        let from_light = (y[0] - one) + self.mu;
+        let across = y[1] * y[1];
+        let pull = (one - self.mu) / (from_heavy * from_heavy + across).sqrt();
+        let pull = pull + self.mu / (from_light * from_light + across).sqrt();
+        let energy = half * (v[0] * v[0] + v[1] * v[1]) - half * (y[0] * y[0] + across) - pull;
+        (quantity == "energy").then(|| vec![energy])
     }
 }

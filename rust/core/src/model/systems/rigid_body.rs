@@ -19,7 +19,8 @@ pub const KIND: Kind = Kind {
     name: "rigid_body",
     shape,
     velocity_term: |_| Some("the gyroscopic torque"),
-    quantities: |_| vec![("angular_momentum".to_owned(), 3), ("norm_error".to_owned(), 1)],
+    quantities: |_| [("energy", 1), ("angular_momentum", 3), ("norm_error", 1)].map(|(name, n)| (name.to_owned(), n)).to_vec(),
+    controllable: false,
     operations: |signature| if signature.has("weight") || signature.whole("space_torque") > 0 { 130 } else { 50 },
     make,
 };
@@ -54,6 +55,8 @@ struct RigidBody<N: Number> {
     space_torque: [Option<Signal<N>>; 3],
     /// The weight times the place of the centre of mass in the body.
     moment: Option<Vector<N>>,
+    /// The weight, and where it acts.
+    weight: Option<(N, Vector<N>)>,
     gain: Option<N>,
     projects: bool,
 }
@@ -74,12 +77,13 @@ pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let input = |name: &str, i: usize| p.signal(&format!("{name}[{i}]"));
     let torque = std::array::from_fn(|i| input("torque", i).map(|torque| torque.scaled(by_inertia[i])));
     let space_torque = std::array::from_fn(|i| input("space_torque", i));
-    let moment = p.maybe("weight").zip(along(p, "centre")).map(|(weight, centre)| centre.map(|centre| weight * centre));
+    let weight = p.maybe("weight").zip(along(p, "centre"));
+    let moment = weight.map(|(weight, centre)| centre.map(|centre| weight * centre));
     let keeps = p.signature.word("keeps");
     let gain = p.maybe("strength").filter(|_| keeps == "control").map(|strength| h * strength);
     let projects = keeps == "projection";
     let half = N::of(0.5) * h;
-    Box::new(RigidBody { half, inertia, by_inertia, gyration, drag, torque, space_torque, moment, gain, projects })
+    Box::new(RigidBody { half, inertia, by_inertia, gyration, drag, torque, space_torque, moment, weight, gain, projects })
 }
 
 /// q·q
@@ -162,6 +166,14 @@ impl<N: Number> System<N> for RigidBody<N> {
 
     fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
         match quantity {
+            "energy" => {
+                let [a, b, c]: Vector<N> = std::array::from_fn(|i| (self.inertia[i] * v[i]) * v[i]);
+                let turning = N::of(0.5) * ((a + b) + c);
+                let Some((weight, centre)) = self.weight else { return Some(vec![turning]) };
+                let ([_, _, up], square) = turned(y);
+                let height = ((up[0] * centre[0] + up[1] * centre[1]) + up[2] * centre[2]) / square;
+                Some(vec![turning + weight * height])
+            }
             "angular_momentum" => {
                 let own: Vector<N> = std::array::from_fn(|i| self.inertia[i] * v[i]);
                 let (axes, square) = turned(y);

@@ -22,8 +22,9 @@ pub const KIND: Kind = Kind {
     velocity_term: |_| Some("the pull of its rods"),
     quantities: |signature| {
         let spin = if signature.whole("dim") == 2 { 1 } else { 3 };
-        vec![("length_error".to_owned(), 1), ("angular_momentum".to_owned(), spin)]
+        [("energy", 1), ("length_error", 1), ("angular_momentum", spin)].map(|(name, n)| (name.to_owned(), n)).to_vec()
     },
+    controllable: false,
     operations,
     make,
 };
@@ -128,16 +129,18 @@ struct Rods<N: Number> {
     h: N,
     links: Links<N>,
     squares: Vec<N>,
+    gravity: N,
     fall: N,
     keeps: Keeps<N>,
 }
 
 pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
-    let links = Links::new(p);
+    let (links, gravity) = (Links::new(p), p.number("gravity"));
     Box::new(Rods {
         h: p.h,
         squares: links.lengths.iter().map(|l| *l * *l).collect(),
-        fall: p.h * p.number("gravity"),
+        gravity,
+        fall: p.h * gravity,
         keeps: Keeps::new(p),
         links,
     })
@@ -305,6 +308,13 @@ impl<N: Number> System<N> for Rods<N> {
 
     fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
         match quantity {
+            "energy" => {
+                let energy = |(i, mass): (usize, &N)| {
+                    let (v, y) = (self.links.at(v.as_slice(), i), self.links.at(y.as_slice(), i));
+                    *mass * (N::of(0.5) * dot(v, v) + self.gravity * y[self.links.dim - 1])
+                };
+                self.links.masses.iter().enumerate().map(energy).reduce(|sum, each| sum + each).map(|sum| vec![sum])
+            }
             "length_error" => {
                 let (d, one) = (self.links.spans(y.as_slice()), N::of(1.0));
                 Some(vec![largest(d.iter().zip(&self.links.lengths).map(|(d, length)| dot(d, d).sqrt() / *length - one))])

@@ -67,9 +67,8 @@ fn check(kind: &Kind, signature: &Signature, _: Shape) -> Result<(), Error> {
         "projection" => "control.way",
         _ => return Err(signature.unknown("control")),
     };
-    let has_energy = (kind.quantities)(signature).iter().any(|(quantity, _)| quantity == "energy");
     let has_gradient = signature.equations.as_ref().is_some_and(|equations| equations.has_gradient());
-    if !has_energy && !has_gradient {
+    if !kind.controllable && !has_gradient {
         return Err(signature.unknown("control"));
     }
     if !matches!(signature.word("control.when"), "" | "between") {

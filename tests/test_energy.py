@@ -1,0 +1,214 @@
+"""The energy of every system: recorded by the core in every kind of run, it has the bits of the reference's formula."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _core
+from stepwell.errors import UnsupportedError
+from stepwell.reference.traced import Tracer
+from support.cases import SYSTEMS, drawn, fits
+from support.graphs import assert_one_graph, model
+from support.tracing import METHODS, made
+
+pytestmark = pytest.mark.filterwarnings("ignore::stepwell.AccuracyWarning", "ignore::stepwell.DivergenceWarning")
+
+#: Cases of systems with an energy, and the kinds without one of their own.
+ENERGETIC = [name for name in SYSTEMS if "energy" in made(name)[0].quantities]
+WITHOUT = {"LinearSystem", "OwnSystem"}
+#: Kinds whose energy is that of a step, divided by its length: at another length it may differ in its last bit.
+OF_A_STEP = ("nbody", "springs")
+
+
+def of_state(system: sw.System, run: sw.Run) -> Any:
+    """The energies of the saved states by the system's own function, one after the other."""
+    states = zip(np.asarray(run.v, np.float64), np.asarray(run.y, np.float64), strict=True)
+    return np.stack([system.energy(v, y) for v, y in states])
+
+
+def assert_energy(system: sw.System, run: sw.Run, plain: sw.Run) -> None:
+    """What was recorded is the energy of the saved states: as asked for later, and by the system."""
+    recorded = run.recorded["energy"]
+    assert recorded.dtype == np.float64
+    assert recorded.shape == run.t.shape[:1] + run.status.shape
+    np.testing.assert_array_equal(recorded, plain.energy)
+    if system.kernel in OF_A_STEP:
+        np.testing.assert_allclose(recorded, of_state(system, run), rtol=1e-13, atol=1e-13)
+    else:
+        np.testing.assert_array_equal(recorded, of_state(system, run))
+
+
+def test_every_kind_of_system_has_an_energy_or_is_known_to_have_none() -> None:
+    assert {type(made(name)[0]).__name__ for name in SYSTEMS if name not in ENERGETIC} == WITHOUT
+    for name in SYSTEMS:
+        system, v, y = made(name)
+        if name not in ENERGETIC:
+            with pytest.raises(UnsupportedError, match=r"^energy: .* has no (energy of its own|invariant of that name)"):
+                system.energy(v, y)
+
+
+@pytest.mark.parametrize("name", ENERGETIC)
+def test_fixed_steps(name: str) -> None:
+    system, v, y = made(name)
+    for method in drawn([each for each in METHODS if fits(system, each)], 2, "energy", name):
+        options: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 7, "every": 3}
+        core, reference = (
+            sw.integrate(system, method, record="energy", backend=backend, **options) for backend in ("rust", "numpy")
+        )
+        np.testing.assert_array_equal(core.recorded["energy"], reference.recorded["energy"])
+        assert_energy(system, core, sw.integrate(system, method, **options))
+
+
+@pytest.mark.parametrize("every", [None, 1])
+@pytest.mark.parametrize("name", ENERGETIC)
+def test_adaptive_steps(name: str, every: int | None) -> None:
+    system, v, y = made(name)
+    options: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-5, "at": [0.05, 0.1] if every is None else 0.1, "every": every}
+    if every is not None:
+        options["at"] = [0.1]
+    try:
+        plain = sw.integrate(system, "merson", **options)
+    except UnsupportedError:
+        pytest.skip("not with adaptive steps")
+    core, reference = (
+        sw.integrate(system, "merson", record="energy", backend=backend, **options) for backend in ("rust", "numpy")
+    )
+    np.testing.assert_array_equal(core.recorded["energy"], reference.recorded["energy"])
+    np.testing.assert_array_equal(core.recorded["energy"], plain.energy)
+
+
+@pytest.mark.parametrize("tolerance", [None, 1e-3])
+@pytest.mark.parametrize("name", ENERGETIC)
+def test_float32(name: str, tolerance: float | None) -> None:
+    """It is the energy of the states as they were saved, in float64."""
+    system, v, y = made(name)
+    options: dict[str, Any] = {"v": v, "y": y, "dtype": "float32"}
+    options |= {"dt": 0.01, "steps": 4, "every": 2} if tolerance is None else {"tolerance": tolerance, "at": [0.05]}
+    try:
+        plain = sw.integrate(system, "merson", **options)
+    except (UnsupportedError, sw.errors.ArgumentError):
+        pytest.skip("not in float32")
+    run = sw.integrate(system, "merson", record="energy", **options)
+    reference = sw.integrate(system, "merson", record="energy", backend="numpy", **options)
+    np.testing.assert_array_equal(run.recorded["energy"], reference.recorded["energy"])
+    np.testing.assert_array_equal(run.recorded["energy"], plain.energy)
+    if system.kernel not in OF_A_STEP:
+        np.testing.assert_array_equal(run.recorded["energy"], of_state(system, run))
+
+
+@pytest.mark.parametrize("form", ["matrix", "power"])
+@pytest.mark.parametrize("name", ["free", "damped, physical", "chain of nineteen"])
+def test_matrix_forms(name: str, form: Any) -> None:
+    system, v, y = made(name)
+    options: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 40, "every": 20, "form": form}
+    run = sw.integrate(system, "rk4", record="energy", **options)
+    assert_energy(system, run, sw.integrate(system, "rk4", **options))
+
+
+LARGE = {
+    "chain": lambda batch: sw.Chain(2000, stiffness=np.linspace(1.0, 2.0, 2001).reshape(2001, *batch)),
+    "chain of members": lambda batch: sw.Chain(1500, mass=np.linspace(1.0, 2.0, 7500).reshape(1500, 5)),
+    "particles": lambda batch: sw.Particles(np.linspace(1.0, 2.0, 3000), drag=0.1, gravity=(0.1, -1.0)),
+}
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("name", LARGE)
+def test_systems_whose_step_is_too_long_for_a_tape(name: str, threads: int) -> None:
+    system = LARGE[name](())
+    rng = np.random.default_rng(3)
+    v, y = (rng.normal(size=(*shape, *system.batch)) for shape in (system.v_shape, system.y_shape))
+    options: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 4, "every": 2, "threads": threads}
+    core, reference = (sw.integrate(system, "rk4", record="energy", backend=backend, **options) for backend in ("rust", "numpy"))
+    np.testing.assert_array_equal(core.recorded["energy"], reference.recorded["energy"])
+    plain = sw.integrate(system, "rk4", **options)
+    assert_energy(system, core, plain)
+    np.testing.assert_array_equal(core.y, plain.y)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_members_of_many_groups(threads: int) -> None:
+    """More members than a tile has, a number that fills none, over several threads."""
+    rng = np.random.default_rng(5)
+    system = sw.Oscillator(rng.uniform(0.5, 2.0, (7, 1501)), form="physical")
+    options: dict[str, Any] = {"v": rng.normal(size=(7, 1501)), "y": 1.0, "dt": 0.01, "steps": 300, "every": 150}
+    core = sw.integrate(system, "verlet", record="energy", threads=threads, **options)
+    reference = sw.integrate(system, "verlet", record="energy", backend="numpy", **options)
+    np.testing.assert_array_equal(core.recorded["energy"], reference.recorded["energy"])
+    assert_energy(system, core, sw.integrate(system, "verlet", **options))
+
+
+def test_runs_with_events_and_pieces() -> None:
+    pendulum = sw.Pendulum([1.0, 1.5])
+    options: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.01, "steps": 400, "every": 50}
+    whole = sw.integrate(pendulum, "rk4", record="energy", **options)
+    seen = sw.integrate(pendulum, "rk4", record="energy", events=lambda t, v, y: y, **options)
+    first = sw.integrate(pendulum, "rk4", record="energy", **(options | {"steps": 200}))
+    rest = sw.integrate(pendulum, "rk4", record="energy", resume=first, steps=200, every=50, dt=0.01)
+    np.testing.assert_array_equal(whole.recorded["energy"], seen.recorded["energy"])
+    np.testing.assert_array_equal(whole.recorded["energy"][4:], rest.recorded["energy"])
+
+
+def test_sweeps_reduce_the_same_energies() -> None:
+    mu = np.array([0.1, 0.2, 0.3])
+    options: dict[str, Any] = {"v": np.array([0.0, 0.5]), "y": np.array([0.5, 0.0]), "dt": 0.01, "steps": 50}
+    reduced = [sw.sweeps.Extremes("energy")]
+    swept = sw.sweep(sw.RestrictedThreeBody, {"mu": mu}, "rk4", outcomes=reduced, observe=10, **options)
+    options |= {name: np.repeat(options[name][:, np.newaxis], 3, axis=1) for name in "vy"}
+    run = sw.integrate(sw.RestrictedThreeBody(mu), "rk4", record="energy", every=10, **options)
+    np.testing.assert_array_equal(swept["energy_max"], run.recorded["energy"].max(axis=0))
+    np.testing.assert_array_equal(swept["energy_min"], run.recorded["energy"].min(axis=0))
+
+
+#: kernel, case, what to replace in the reference's formula, and by what: another order of operations, or another formula.
+MUTANTS = [
+    ("oscillator", "free", "v * v + spring", "v * v - spring"),
+    ("oscillator", "free, physical", "s.square * (y * y)", "(s.square * y) * y"),
+    ("pendulum", "pendulum", "(2.0 * s.square) * (half * half)", "2.0 * (s.square * (half * half))"),
+    ("pendulum", "pendulum", "0.5 * y", "y"),
+    ("chain", "chain of nineteen", "s.stiffness * stretches * stretches", "stretches * stretches"),
+    ("chain", "chain of nineteen", "total(s.mass * v * v)", "(s.mass * v * v).sum(axis=0)"),
+    ("pendulum_3d", "pendulum in space", "s.gravity * y[2]", "s.gravity * y[1]"),
+    ("restricted_three_body", "restricted three bodies", "(y[0] - 1.0) + s.mu", "y[0] - (1.0 - s.mu)"),
+    ("restricted_three_body", "restricted three bodies", "- pull\n", "+ pull\n"),
+    ("particles", "particles", "0.5 * square(v) - along", "0.5 * square(v) + along"),
+    ("rods", "rods, two hanging", "s.gravity * place[-1]", "s.gravity * place[0]"),
+    ("rigid_body", "top, free", "0.5 * (", "("),
+    ("rigid_body", "top, heavy", "whole + weight * height", "whole - weight * height"),
+    ("nbody", "three bodies", "[2] / s.h", "[1] / s.h"),
+    ("springs", "springs: a triangle", "[2] / s.h", "[1] / s.h"),
+]
+
+
+@pytest.mark.mutant
+@pytest.mark.parametrize(("kernel", "case", "old", "new"), MUTANTS)
+def test_another_formula_is_noticed(kernel: str, case: str, old: str, new: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    module: Any = importlib.import_module(f"stepwell.reference.systems.{kernel}")
+    system, _, _ = made(case)
+    assert system.kernel == kernel
+    source = inspect.getsource(module.energy)
+    assert source.count(old) == 1
+    scope = dict(vars(module))
+    exec(compile(source.replace(old, new), module.__file__, "exec"), scope)
+
+    def compared() -> None:
+        tape = _core.Tape()
+        core = tape.trace(model(system, sw.method("false_euler")), "record energy")
+        numbers = int(np.prod(system.v_shape)) + int(np.prod(system.y_shape))
+        assert_one_graph(tape, core[numbers:], Tracer(system, tape).record(["energy"]))
+
+    compared()
+    quantities = system.reference.quantities
+    monkeypatch.setitem(quantities, "energy", quantities["energy"]._replace(of=scope["energy"]))
+    with pytest.raises(pytest.fail.Exception, match=r"the core has .* where the reference has"):
+        compared()
+
+
+def test_every_kind_with_an_energy_has_a_mutant() -> None:
+    kernels = {made(name)[0].kernel for name in ENERGETIC} - {"equations"}
+    assert {kernel for kernel, *_ in MUTANTS} == kernels
