@@ -260,6 +260,11 @@ def adapt(model: ModelSpec, plan: Plan, pacing: CorePacing, arrays: AdaptiveArra
     False if nothing was done, since the start is to be found and an attempt is too long for one tape.
     """
 
+def recorded(
+    model: ModelSpec, dt: float, own: int, v: NDArray[np.float64], y: NDArray[np.float64], rows: NDArray[np.float64]
+) -> None:
+    """Fill rows with the recorded quantities of states, from the rows of v and y. The parameters of ``own`` members repeat."""
+
 def times(plan: Plan, t: NDArray[np.float64]) -> None:
     """Fill the times of the saved states. Of the plan it reads what ``run`` does."""
 

@@ -67,8 +67,8 @@ def adaptive_run(request: Request) -> Run:
         force=plan.force,
         work=None if control is None else out.paces[engine.WORK] / engine.pushes(control, method.attempt_evaluations),
     )
-    for name in request.record:
-        run.recorded[name] = run.quantity(name)
+    if request.record:
+        run.recorded = engine.recorded(run.system, request.record, run.dt, run.v, run.y, plan.backend)
     if stopped:
         run.stopped_at = np.where(out.status == 0, np.nan, sign * out.paces[engine.TIME])
     if with_events is not None:

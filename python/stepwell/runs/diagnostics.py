@@ -15,7 +15,6 @@ from ..base.arrays import Array, Shape, Whole
 from ..base.reprs import first_of, in_words, of_member, share
 from ..errors import AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning
 from ..model.controls import EnergyControl
-from ..model.methods import method
 from ..model.parameters import aligned
 from ..model.systems import NBody, System
 from . import encounters, engine, known_energy
@@ -359,10 +358,8 @@ def _energies(run: Run, bodies: NBody, v: Array, y: Array) -> Array:
     """The energies of a state, with the same bits by the core and by NumPy."""
     if len(y) < MIN_BODIES_BY_CORE:
         return bodies.energy(v, y)
-    step = engine.Plan(bodies, method("false_euler"), run.status.shape, 1.0, every=1, threads=1, record=("energy",))
-    recorded = engine.advance(step, v, y).recorded
-    assert recorded is not None
-    energies: Array = recorded["energy"][0]
+    v, y = np.broadcast_to(v, run.v.shape[1:]), np.broadcast_to(y, run.y.shape[1:])
+    energies: Array = engine.recorded(bodies, ("energy",), 1.0, v[np.newaxis], y[np.newaxis])["energy"][0]
     return energies
 
 

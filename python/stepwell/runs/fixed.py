@@ -62,9 +62,8 @@ def fixed_run(request: Request) -> Run:
     )
     if with_events is not None:
         with_events.write_to(run)
-    for name in request.record:
-        if name not in run.recorded:
-            run.recorded[name] = run.quantity(name)
+    if later := [name for name in request.record if name not in run.recorded]:
+        run.recorded |= engine.recorded(run.system, later, run.dt, run.v, run.y, plan.backend)
     return run
 
 

@@ -192,10 +192,9 @@ class Request(NamedTuple):
         plan = engine.Plan(
             system, method, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused, single=single
         )
-        # In float32, in the matrix forms and between events quantities are computed from the saved states, in float64, with some
-        # of them in between.
-        by_core = tuple(record) if form == "direct" and not single and watched is None else ()
-        recorded = sum(prod(system.quantities[name]) for name in record) + (3 * rows if len(by_core) < len(record) else 0)
+        # In float32, in the matrix forms and with events quantities are computed from the saved states.
+        while_stepping = tuple(record) if form == "direct" and not single and watched is None else ()
+        recorded = sum(prod(system.quantities[name]) for name in record)
         checks.fits(
             "the saved states",
             plan.save_count * (rows + recorded) + NUMBERS_PER_STATE * (rows + 1),
@@ -221,7 +220,7 @@ class Request(NamedTuple):
         if force is not None:
             plan = plan._replace(force=spread(force, system.v_shape, batch))
         if record or stepped is not plan.system:
-            plan = plan._replace(system=stepped, record=by_core)
+            plan = plan._replace(system=stepped, record=while_stepping)
         started = method.starts[choice] if method.starts else None
         return cls(plan, system, v, y, carried, bad, record, watched, started, checks.flag("progress", progress))
 

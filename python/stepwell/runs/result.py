@@ -16,6 +16,7 @@ from ..base.reprs import MAX_LINE, counted, facts, shortened
 from ..errors import UnsupportedError
 from ..model.methods import Method
 from ..model.systems import System
+from . import engine
 from .encounters import Collision, Encounter
 from .findings import Finding
 
@@ -239,16 +240,14 @@ class Run(ValueEquality):
         Raises:
             UnknownNameError: if the system has none of that name.
         """
-        states = ((np.asarray(self.v, np.float64), self.system.v_shape), (np.asarray(self.y, np.float64), self.system.y_shape))
-        v, y = (np.moveaxis(a, 0, len(s)) for a, s in states)
         name = checks.known("name", name, ("energy", *self.system.quantities))
-        with np.errstate(all="ignore"):
-            values = self.system.recordable(name, v, y, self.dt)
-        return np.moveaxis(values, values.ndim - (v.ndim - len(self.system.v_shape)), 0)
+        if name not in self.system.quantities:
+            self.system.energy(self.v[-1], self.y[-1])  # raises, since there is none
+        return engine.recorded(self.system, (name,), self.dt, self.v, self.y)[name]
 
     @property
     def energy(self) -> Array:
-        """Energy of every saved state, shape (saved, *batch): what was recorded, or computed now by the system's ``energy``."""
+        """Energy of every saved state, shape (saved, *batch): what was recorded, or computed now, with the same bits."""
         if "energy" in self.recorded:
             return self.recorded["energy"]
         return self.quantity("energy")

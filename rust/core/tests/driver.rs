@@ -32,7 +32,19 @@ fn machine(threads: usize) -> Machine {
 
 fn plan(model: Model<'_>, h: f64, steps: i64, members: usize, threads: usize) -> FixedRun<'_> {
     let (v, y) = (vec![Row(&[0.0])], vec![Row(&[1.0])]);
-    FixedRun { model, clock: clock(h), machine: machine(threads), first: 0, steps, every: None, v, y, members, carried: false }
+    FixedRun {
+        model,
+        clock: clock(h),
+        machine: machine(threads),
+        first: 0,
+        steps,
+        every: None,
+        v,
+        y,
+        members,
+        carried: false,
+        own: members,
+    }
 }
 
 type Last<T = f64> = (Vec<T>, Vec<T>, Vec<i64>);

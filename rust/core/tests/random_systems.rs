@@ -222,6 +222,7 @@ impl Case {
             v: from.map_or_else(|| self.part(&self.v, &of), |(carry, _, _)| self.part(carry, &of)),
             y: from.map_or_else(|| self.part(&self.y, &of), |(_, y, _)| self.part(y, &of)),
             members: b,
+            own: b,
             carried: from.is_some(),
         };
         let arrays = Arrays {

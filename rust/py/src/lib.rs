@@ -150,6 +150,7 @@ fn run_with<T: Steppable + Element>(
         v: by_row(&v)?,
         y: by_row(&y)?,
         members: arrays.first_bad.as_array().len(),
+        own: arrays.first_bad.as_array().len(),
         carried: arrays.carried,
     };
     let to_fill = Arrays {
@@ -162,6 +163,44 @@ fn run_with<T: Steppable + Element>(
     };
     interruptible(py, plan.progress, |monitor| fixed::run(&run, to_fill, monitor))?;
     Ok(!all(arrays.first_bad.as_slice()?, |step| step < 0))
+}
+
+/// Fills rows with the recorded quantities of states, from the rows of their `v` and `y`; parameters of fewer members repeat.
+#[pyfunction]
+fn recorded(
+    py: Python<'_>,
+    model: &ModelSpec,
+    dt: f64,
+    own: usize,
+    v: PyReadonlyArray2<'_, f64>,
+    y: PyReadonlyArray2<'_, f64>,
+    mut rows: PyReadwriteArray2<'_, f64>,
+) -> PyResult<()> {
+    let (parameters, tables) = (model.rows(py)?, model.tables(py)?);
+    let members = rows.as_array().ncols();
+    let mut first_bad = vec![-1; members];
+    let run = FixedRun {
+        model: model.model(model.started(0), &parameters, &tables)?,
+        clock: Clock { t0: 0.0, h: dt },
+        machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: 1 },
+        first: 0,
+        steps: 0,
+        every: Some(1),
+        v: by_row(&v)?,
+        y: by_row(&y)?,
+        members,
+        carried: false,
+        own,
+    };
+    let to_fill = Arrays {
+        saved_v: &mut [],
+        saved_y: &mut [],
+        recorded: rows.as_slice_mut()?,
+        tally: &mut [],
+        carry: &mut [],
+        first_bad: &mut first_bad,
+    };
+    interruptible(py, None, |monitor| fixed::run(&run, to_fill, monitor))
 }
 
 /// The numbers of an array; none if there is no array.
@@ -496,6 +535,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(ask, m)?)?;
     m.add_function(wrap_pyfunction!(listen, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
+    m.add_function(wrap_pyfunction!(recorded, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
     m.add_function(wrap_pyfunction!(times, m)?)?;
     m.add_function(wrap_pyfunction!(check, m)?)?;

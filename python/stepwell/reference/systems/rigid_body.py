@@ -127,9 +127,8 @@ def energy(s: RigidBody, v: Array, y: Array) -> Array:
         return whole
     (weight, centre), (axes, length) = s.weight, turned(y)
     up = axes[2]
-    height = ((up[0] * centre[0] + up[1] * centre[1]) + up[2] * centre[2]) / length
-    whole = whole + weight * height
-    return whole
+    height: Array = ((up[0] * centre[0] + up[1] * centre[1]) + up[2] * centre[2]) / length
+    return whole + weight * height
 
 
 def angular_momentum(s: RigidBody, v: Array, y: Array) -> Array:

@@ -50,6 +50,7 @@ from .adaptive import (
 from .direct import to_slot
 from .forms import advance
 from .plan import Arrays, Outcome, Plan, Watched, model, pushes
+from .recorded import recorded
 
 __all__ = [
     "ABSOLUTE",
@@ -94,6 +95,7 @@ __all__ = [
     "paces",
     "pacing_of_core",
     "pushes",
+    "recorded",
     "to_slot",
 ]
 

@@ -7,7 +7,7 @@ use crate::{
     tape::{equations::Equations, number::Number, real::Real},
 };
 
-/// The numbers of one parameter or input, for every member.
+/// The numbers of one parameter or input, for every member; those of fewer members repeat.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a>(pub &'a [f64]);
 
@@ -21,7 +21,7 @@ impl Row<'_> {
     pub fn at(&self, member: usize) -> f64 {
         match self.0 {
             [one] => *one,
-            many => many.get(member).copied().unwrap_or(f64::NAN),
+            many => many.get(member % many.len().max(1)).copied().unwrap_or(f64::NAN),
         }
     }
 
@@ -31,8 +31,12 @@ impl Row<'_> {
         match self.0 {
             [one] => lanes.fill(T::of(*one)),
             many => {
-                lanes.iter_mut().zip(&many[first..first + count]).for_each(|(lane, x)| *lane = T::of(*x));
-                lanes[count..].fill(T::of(many[first + count - 1]));
+                let own = if first < many.len() { first } else { first % many.len() }; // a division takes longer than a copy
+                match many.get(own..own + count) {
+                    Some(row) => lanes.iter_mut().zip(row).for_each(|(lane, x)| *lane = T::of(*x)),
+                    None => lanes[..count].iter_mut().zip(many.iter().cycle().skip(own)).for_each(|(lane, x)| *lane = T::of(*x)),
+                }
+                lanes[count..].fill(T::of(self.at(first + count - 1)));
             }
         }
     }

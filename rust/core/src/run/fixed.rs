@@ -28,6 +28,7 @@ pub struct FixedRun<'a> {
     /// Number of the first step.
     pub first: i64,
     /// How many steps.
+    /// None where only quantities of the states are recorded.
     pub steps: i64,
     /// Keep every so many steps, the first state and the last; or the last alone.
     pub every: Option<i64>,
@@ -39,6 +40,8 @@ pub struct FixedRun<'a> {
     pub members: usize,
     /// The v slot holds what the method carries already: do not start.
     pub carried: bool,
+    /// How many members have parameters of their own; those of further members repeat them.
+    pub own: usize,
 }
 
 impl FixedRun<'_> {
@@ -155,8 +158,10 @@ pub fn run<T: Steppable>(plan: &FixedRun, arrays: Arrays<T>, monitor: &mut dyn F
     let kept = kept(plan.steps, plan.every);
     expect("v", p, plan.v.len())?;
     expect("y", q, plan.y.len())?;
-    expect("saved_v", kept * p * b, arrays.saved_v.len())?;
-    expect("saved_y", kept * q * b, arrays.saved_y.len())?;
+    if plan.steps > 0 {
+        expect("saved_v", kept * p * b, arrays.saved_v.len())?;
+        expect("saved_y", kept * q * b, arrays.saved_y.len())?;
+    }
     expect("recorded", kept * traced.recorded * b, arrays.recorded.len())?;
     if !arrays.tally.is_empty() {
         expect("tally", traced.tally * b, arrays.tally.len())?;
@@ -165,10 +170,11 @@ pub fn run<T: Steppable>(plan: &FixedRun, arrays: Arrays<T>, monitor: &mut dyn F
         expect("carry", p * b, arrays.carry.len())?;
     }
     expect("first_bad", b, arrays.first_bad.len())?;
-    for (what, rows) in [("a parameter", &plan.model.spec.rows), ("a row of v", &plan.v), ("a row of y", &plan.y)] {
+    let rows = [("a parameter", plan.own, &plan.model.spec.rows), ("a row of v", b, &plan.v), ("a row of y", b, &plan.y)];
+    for (what, members, rows) in rows {
         for row in rows {
             if row.0.len() != 1 {
-                expect(what, b, row.0.len())?;
+                expect(what, members, row.0.len())?;
             }
         }
     }
