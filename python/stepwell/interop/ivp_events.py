@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..base import checks
 from ..base.arrays import Array
 from ..errors import DTypeError
-from ..reference.events import REACH, Parts, parted
+from ..reference.events import REACH, Parts, located_alone, parted
 from .ivp_function import takes
 
 #: A zero is located to four roundings of its time, or of the time since the start of its step, whichever are more.
-ROOT_TOLERANCE = 4.0 * np.finfo(float).eps
-
-#: Shorter brackets have no roundings of their own.
-LEAST = float(np.finfo(float).tiny)
+EPS = float(np.finfo(float).eps)
+ROOT_TOLERANCE = 4.0 * EPS
 
 #: The fraction of a step over which the slope of an event function is taken: rounding then takes half of its digits.
 SHORT = 2.0**-26
-
-#: The most values of an event function for one zero; bisection alone needs fewer than this many for any interval of floats.
-MAX_VALUES = 2200
 
 
 class Event:
@@ -65,60 +60,57 @@ class Event:
         return (grows and self.direction >= 0.0) or (falls and self.direction <= 0.0)
 
 
-def root(g: Callable[[float], float], a: float, b: float, g_a: float, g_b: float) -> float:
-    """A zero of g between a and b, at which it has values of different signs or zero (Brent 1973).
+class Part(NamedTuple):
+    """A part of a step in which an event function has at most one zero.
 
-    The zero is bracketed to ``ROOT_TOLERANCE``; the step begins at a. If g is continuous, the end of the bracket with the smaller
-    value is returned.
+    Attributes:
+        low: the share of the step where it begins.
+        high: and where it ends.
+        g_low: the value of the function there.
+        g_high: likewise.
     """
-    begin = a
-    if g_a == 0.0:
-        return a
-    if g_b == 0.0:
-        return b
-    # b is the best estimate, c the other end of the bracket, a the estimate before.
-    c, g_c, step, before = a, g_a, b - a, b - a
-    for _ in range(MAX_VALUES):
-        if abs(g_c) < abs(g_b):
-            a, b, c, g_a, g_b, g_c = b, c, b, g_b, g_c, g_b
-        least = max(0.5 * ROOT_TOLERANCE * max(abs(b), abs(b - begin)), LEAST)
-        half = 0.5 * (c - b)
-        if abs(half) <= least or g_b == 0.0:
-            break
-        if abs(before) < least or abs(g_a) <= abs(g_b):
-            step = before = half
-        else:
-            s = g_b / g_a
-            if a == c:  # a secant
-                p, q = 2.0 * half * s, 1.0 - s
-            else:  # an inverse parabola
-                r, q = g_b / g_c, g_a / g_c
-                p = s * (2.0 * half * q * (q - r) - (b - a) * (r - 1.0))
-                q = (q - 1.0) * (r - 1.0) * (s - 1.0)
-            p, q = (p, -q) if p > 0.0 else (-p, q)
-            if 2.0 * p < min(3.0 * half * q - abs(least * q), abs(before * q)):
-                step, before = p / q, step
-            else:
-                step = before = half
-        a, g_a = b, g_b
-        b += step if abs(step) > least else (least if half > 0.0 else -least)
-        g_b = g(b)
-        if (g_b > 0.0) == (g_c > 0.0):
-            c, g_c, step, before = a, g_a, b - a, b - a
-    return b
+
+    low: float
+    high: float
+    g_low: float
+    g_high: float
 
 
-def _parts(
-    g: Callable[[float], float], span: tuple[float, float], before: float, g_a: float, g_b: float
-) -> list[tuple[float, float, float, float]]:
-    """The parts of a step in which an event function has at most one zero: the times and the values at both ends of each.
+def time_of(span: tuple[float, float], share: float) -> float:
+    """The time at a share of a step."""
+    begin, end = span
+    time = end if share == 1.0 else begin + share * (end - begin)
+    return min(max(time, min(span)), max(span))
+
+
+def zero(g: Callable[[float], float], span: tuple[float, float], part: Part) -> float:
+    """The time of a zero of g in a part of a step, at whose ends it has values of different signs or zero.
+
+    The zero is bracketed to a quarter of ``ROOT_TOLERANCE``, one rounding. If g is continuous, the end of the bracket with the
+    smaller value is returned.
+    """
+    if part.g_low == 0.0 or part.g_high == 0.0:
+        return time_of(span, part.low if part.g_low == 0.0 else part.high)
+    begin, h = span[0], span[1] - span[0]
+    values = {part.low: part.g_low, part.high: part.g_high}
+
+    def trial(share: float) -> float:
+        values[share] = g(time_of(span, share))
+        return values[share]
+
+    low, high = located_alone(trial, *part, lambda share: EPS * max(share, abs(begin / h + share)))
+    return time_of(span, min((high, low), key=lambda share: abs(values[share])))
+
+
+def _parts(g: Callable[[float], float], span: tuple[float, float], before: float, g_a: float, g_b: float) -> list[Part]:
+    """The parts of a step in which an event function has at most one zero.
 
     The whole step is the only part, unless the function bends so much, compared with the step before, that it may have more
     zeros.
     """
     begin, end = span
     h = end - begin
-    whole = [(begin, end, g_a, g_b)]
+    whole = [Part(0.0, 1.0, g_a, g_b)]
     if g_a == 0.0 or g_b == 0.0 or min(abs(g_a), abs(g_b)) > REACH * abs((g_b - g_a) - (g_a - before)):
         return whole
 
@@ -135,8 +127,7 @@ def _parts(
     parts, _ = parted(look, Parts(np.zeros(1, dtype=np.int64), *ends))
     if len(parts.of) < 2:
         return whole
-    times = (begin + parts.low * h).tolist(), (begin + parts.high * h).tolist()
-    return list(zip(*times, parts.g_low.tolist(), parts.g_high.tolist(), strict=True))
+    return [Part(*each) for each in np.stack([parts.low, parts.high, parts.g_low, parts.g_high], axis=1).tolist()]
 
 
 def note_zeros(
@@ -149,19 +140,26 @@ def note_zeros(
     """
     begin, end = span
     zeros = []
+    states: dict[float, Array] = {}  # each takes a step of the method
+
+    def known(at: float) -> Array:
+        if at not in states:
+            states[at] = state(at)
+        return states[at].copy()  # which the function may write to
+
     for event, before, g_a, g_b in zip(events, *values, strict=True):
 
         def g(at: float, event: Event = event) -> float:
-            return event.value(at, state(at))
+            return event.value(at, known(at))
 
-        for low, high, g_low, g_high in _parts(g, span, before, g_a, g_b):
-            if event.occurs(g_low, g_high):
-                zeros.append((root(g, low, high, g_low, g_high), event))
+        for part in _parts(g, span, before, g_a, g_b):
+            if event.occurs(part.g_low, part.g_high):
+                zeros.append((zero(g, span, part), event))
     zeros.sort(key=lambda each: each[0] if end > begin else -each[0])
     for t, event in zeros:
         event.count += 1
         event.times.append(t)
-        event.states.append(state(t))
+        event.states.append(known(t))
         if event.count >= event.terminal:
             return t
     return None

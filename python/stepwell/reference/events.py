@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -205,8 +207,8 @@ def located(trial: Trial, low: Array, high: Array, g_low: Array, g_high: Array, 
         again = live[(width[live] <= within[live]) | (left[live] == 0)]
         within[again], unit[again] = SPACING * high[again], width[again]
         left[again] = np.frexp(width[again])[1] - np.frexp(within[again])[1] + 2
-        ends = low[live], high[live], g_low[live], g_high[live]
-        share = _next(*ends, within[live], unit[live], left[live])
+        bracket = low[live], high[live], g_low[live], g_high[live]
+        share = next_trial(*bracket, SPACING * high[live], within[live], unit[live], left[live])
         left[live] -= 1
         g, v_there, y_there = trial(live, share)
         g = sign[live] * g
@@ -217,19 +219,68 @@ def located(trial: Trial, low: Array, high: Array, g_low: Array, g_high: Array, 
         v[..., after_it], y[..., after_it] = v_there[..., past], y_there[..., past]
 
 
-def _next(low: Array, high: Array, g_low: Array, g_high: Array, within: Array, unit: Array, left: Whole) -> Array:
+def located_alone(
+    g: Callable[[float], float],
+    low: float,
+    high: float,
+    g_low: float,
+    g_high: float,
+    roundings: Callable[[float], float] = lambda high: SPACING * high,
+) -> tuple[float, float]:
+    """The same of one step in Python's numbers, which take a tenth of the time: the bracket in which g changes its sign.
+
+    Args:
+        g: its value at a share of the step.
+        low: the share of the step behind which the change is.
+        high: the share before which it is, or at which.
+        g_low: g there.
+        g_high: g there, of the other sign or 0.
+        roundings: the width of a bracket that is narrow enough, by its higher end.
+    """
+    sign = 1.0 if g_low < 0.0 else -1.0
+    g_low, g_high = sign * g_low, sign * g_high
+    within, left, unit = SHARE, MOST_TRIALS, high - low
+    while (width := high - low) > max(roundings(high), LEAST_SHARE) and g_high != 0.0:
+        if width <= within or left == 0:
+            within, unit = roundings(high), width
+            left = math.frexp(width)[1] - math.frexp(within)[1] + 2
+        share = next_trial(low, high, g_low, g_high, roundings(high), within, unit, left, NUMBERS)
+        left -= 1
+        value = sign * g(share)
+        if value >= 0.0:
+            high, g_high = share, value
+        else:
+            low, g_low = share, value
+    return low, high
+
+
+class Arithmetic(NamedTuple):
+    """What NumPy's arrays and Python's numbers do by functions of other names."""
+
+    where: Callable[..., Any]
+    minimum: Callable[..., Any]
+    maximum: Callable[..., Any]
+    ldexp: Callable[..., Any]
+
+
+ARRAYS = Arithmetic(np.where, np.minimum, np.maximum, np.ldexp)
+NUMBERS = Arithmetic(lambda condition, yes, no: yes if condition else no, min, max, math.ldexp)
+
+
+def next_trial(
+    low: Any, high: Any, g_low: Any, g_high: Any, edge: Any, within: Any, unit: Any, left: Any, of: Arithmetic = ARRAYS
+) -> Any:
     """The next trial within brackets: the secant's, a little towards the middle, and not too far from the middle.
 
-    The brackets come down from ``unit`` to ``within`` in so many trials as are left.
+    The brackets come down from ``unit`` to ``within`` in so many trials as are left; ``edge`` is by how much an end must move.
     """
     width, middle = high - low, 0.5 * (low + high)
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore") if of is ARRAYS else nullcontext():
         secant = (g_high * low - g_low * high) / (g_high - g_low)
-        towards = np.where(secant <= middle, 1.0, -1.0)
+        towards = of.where(secant <= middle, 1.0, -1.0)
         moved = TRUNCATION * (width / unit) * width
-        near = np.where(moved <= np.abs(middle - secant), secant + towards * moved, middle)
-    edge = SPACING * high  # both ends must be able to move
-    near = np.minimum(np.maximum(near, low + edge), high - edge)
-    most = np.ldexp(0.5 * within, left) - 0.5 * width
-    share = np.where(np.abs(near - middle) <= most, near, middle - towards * most)
-    return np.where((low < share) & (share < high), share, middle)  # a trial at an end would change nothing
+        near = of.where(moved <= abs(middle - secant), secant + towards * moved, middle)
+    near = of.minimum(of.maximum(near, low + edge), high - edge)
+    most = of.ldexp(0.5 * within, left) - 0.5 * width
+    share = of.where(abs(near - middle) <= most, near, middle - towards * most)
+    return of.where((low < share) & (share < high), share, middle)  # a trial at an end would change nothing
