@@ -143,15 +143,16 @@ def test_a_member_alone_is_the_same_as_in_a_batch(method: str, dtype: str) -> No
                 np.testing.assert_array_equal(a, b)
 
 
-@DTYPES
-@pytest.mark.parametrize("method", ["rk4", "verlet"])
+@pytest.mark.parametrize(("method", "dtype"), [("rk4", "float32"), ("verlet", "float64")])
 def test_how_many_are_looked_at_together_does_not_matter(method: str, dtype: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = sweep(method=method, dtype=dtype)
-    for numbers, longest, located in ((1 << 8, 5, 1), (1 << 6, 1, 7), (1 << 20, 100_000, 1 << 20)):
+    few = slice(0, 40, 5)
+    run = sweep(few, method=method, dtype=dtype)
+    assert 2 <= (~np.isnan(run.stopped_at)).sum() <= 6
+    for numbers, longest, located in ((1 << 6, 5, 1), (1 << 4, 1, 7), (1 << 20, 100_000, 1 << 20)):
         monkeypatch.setattr(driver, "NUMBERS_AT_ONCE", numbers)
         monkeypatch.setattr(driver, "MOST_STEPS", longest)
         monkeypatch.setattr(collected, "LOCATED_AT_ONCE", located)
-        other = sweep(method=method, dtype=dtype)
+        other = sweep(few, method=method, dtype=dtype)
         assert_same(run, other)
         assert_same_events(run, other)
 

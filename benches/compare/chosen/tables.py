@@ -27,6 +27,8 @@ PATIENCE, SAMPLE = 3.0, 0.02
 REPEATS_TIME = 0.5
 #: Contestants take turns this often with some of the repeats; one whose solution takes longer than so many seconds comes once.
 TURNS, LONGEST_IN_TURNS = 3, 0.05
+#: A quick run has one tolerance in so many, takes one turn, and its least time of a sample is this part of the other.
+QUICK_STRIDE, QUICK_TURNS, QUICK_SAMPLE = 4, 1, 0.1
 
 READING = """\
 Microseconds an orbit for a median error at the end of so much, between the two tolerances that enclose it; the median
@@ -54,9 +56,11 @@ class Sample(NamedTuple):
 class Measured:
     """What is measured of a contestant: tolerance after tolerance, until the least error is undercut or patience ends."""
 
-    def __init__(self, contestant: Contestant, orbits: Orbits, least_error: float, lasts: float) -> None:
-        """Whatever it compiles is compiled here; a repeat ``lasts`` so many seconds."""
-        self.name, self.least_error, self.lasts = contestant.name, least_error, lasts
+    def __init__(self, contestant: Contestant, orbits: Orbits, least_error: float, quick: bool) -> None:
+        """Whatever it compiles is compiled here."""
+        self.name, self.least_error = contestant.name, least_error
+        self.lasts = QUICK_SAMPLE * SAMPLE if quick else SAMPLE
+        self.tolerances = TOLERANCES[:: QUICK_STRIDE if quick else 1]
         self.orbits = orbits.cut(contestant.some or orbits.members)
         self.solve, self.samples = contestant.make(self.orbits), dict[float, Sample]()
         self.solve(TOLERANCES[0])
@@ -64,7 +68,7 @@ class Measured:
     def turn(self, repeats: int) -> None:
         """So many repeats of each tolerance."""
         again = bool(self.samples)
-        for tolerance in list(self.samples) or TOLERANCES:
+        for tolerance in list(self.samples) or self.tolerances:
             begin = time.perf_counter()
             end = self.solve(tolerance)
             first = time.perf_counter() - begin
@@ -93,14 +97,15 @@ def at_error(samples: list[Sample], wanted: float) -> float:
     return math.nan
 
 
-def table(orbits: Orbits, repeats: int, errors: tuple[float, ...], lasts: float) -> Table:
+def table(orbits: Orbits, repeats: int, errors: tuple[float, ...], quick: bool) -> Table:
     """One table, the fastest at the error in the middle first."""
     rows = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sw.ToleranceWarning)
         warnings.simplefilter("ignore", sw.AccuracyWarning)
-        all_measured = [Measured(contestant, orbits, min(errors), lasts) for contestant in contestants()]
-        for _, each in itertools.product(range(TURNS), all_measured):
+        all_measured = [Measured(contestant, orbits, min(errors), quick) for contestant in contestants()]
+        turns = QUICK_TURNS if quick else TURNS
+        for _, each in itertools.product(range(turns), all_measured):
             each.turn(-(-repeats // TURNS))
     for each in all_measured:
         samples = list(each.samples.values())
@@ -117,9 +122,9 @@ def table(orbits: Orbits, repeats: int, errors: tuple[float, ...], lasts: float)
 
 def tables(repeats: int, quick: bool, members: int = 10_000) -> Iterator[Table]:
     """Single orbits and many. Along Arenstorf's orbit starts are known to 1e-9 at best: errors grow."""
-    members, errors, lasts = (16, ERRORS[:2], SAMPLE / 10) if quick else (members, ERRORS, SAMPLE)
-    yield table(kepler(1, 1 if quick else 10), repeats, errors, lasts)
-    yield table(arenstorf(1), repeats, errors, lasts)
-    yield table(kepler(members, 1 if quick else 10), repeats, errors, lasts)
-    yield table(arenstorf(members), repeats, errors[:2], lasts)
+    members, errors = (16, ERRORS[:2]) if quick else (members, ERRORS)
+    yield table(kepler(1, 1 if quick else 10), repeats, errors, quick)
+    yield table(arenstorf(1), repeats, errors, quick)
+    yield table(kepler(members, 1 if quick else 10), repeats, errors, quick)
+    yield table(arenstorf(members), repeats, errors[:2], quick)
     yield solar.table((100.0,) if quick else (1e3, 1e4, 1e5))
