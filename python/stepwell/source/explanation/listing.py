@@ -172,9 +172,12 @@ class Writer:
                 text = Formula(f"{self.tables[extra]}({parts[0].text.text})")
             else:
                 text = self.notation.formula(name, [each.text for each in parts], extra, [each.bits for each in parts])
-            count = sum((Counter(each.operations) for each in parts), Counter[str]())
+            count: dict[str, int] = {}
+            for each in parts:
+                for counted, n in each.operations.items():
+                    count[counted] = count.get(counted, 0) + n
             if name in OPERATIONS and (counted := OPERATIONS[name].counted):
-                count[counted] += 1
+                count[counted] = count.get(counted, 0) + 1
             return _Value(text, symbol, max(each.rank for each in parts), None, count, True)
 
         for place, (name, of, extra) in enumerate(operations):

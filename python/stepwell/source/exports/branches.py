@@ -22,6 +22,9 @@ CYCLES = {"sine": 20, "cosine": 20, "logarithm": 30, "constant": 0}
 #: Operations on bits that are operations on truths, too.
 ON_TRUTHS = ("and", "or", "exclusive or")
 
+#: Operations that may be a choice: ``p and q`` is q where p holds, else p.
+CHOICES = ("choose", "and", "or")
+
 #: The name, the operands and the extra argument of each operation.
 Operations = Sequence[tuple[str, tuple[int, ...], int]]
 
@@ -82,7 +85,7 @@ class Branched:
         self._split()
         self._simplify()
         self._split()
-        self.expensive = {line: expensive for line in self.order if any(expensive := self._are_dear(line))}
+        self.expensive = {line: expensive for line in self._choices() if any(expensive := self._are_dear(line))}
         self.same: dict[int, int] = {}
         #: Values without operands, which are read where they are needed.
         self._done = self._leaves | {line for line in self.order if not self.nodes[line].of}
@@ -129,7 +132,7 @@ class Branched:
                 for depth in range(1, len(path) + 1):
                     costs[path[:depth]] += _cycles(self.nodes[line].name)
             cheap = {path for path, cost in costs.items() if cost < WORTH}
-            both = {line for line in self.order if line not in self._joint and all(self._are_dear(line))}
+            both = {line for line in self._choices() if line not in self._joint and all(self._are_dear(line))}
             if not cheap and not both:
                 return
             self._cheap |= cheap
@@ -145,7 +148,11 @@ class Branched:
             if line not in paths:
                 continue  # nothing reads it
             path = self._paths[line] = paths[line]
-            for of, side in self._reads(line):
+            if (sides := self._sides(line)) is None:
+                for of in self.nodes[line].of:
+                    paths[of] = _common(paths[of], path) if of in paths else path
+                continue
+            for of, side in self._reads(line, sides):
                 longer = path
                 for each in side:
                     if (*longer, each) in self._cheap:
@@ -154,13 +161,15 @@ class Branched:
                 paths[of] = _common(paths[of], longer) if of in paths else longer
         self.order = [line for line in self.order if line in self._paths]
 
-    def _reads(self, line: int) -> list[tuple[int, Path]]:
-        """The operands of an operation, each with the sides of the conditions on which it reads them."""
-        if (sides := self._sides(line)) is None:
-            return [(each, ()) for each in self.nodes[line].of]
+    def _reads(self, line: int, sides: tuple[int, int | None, int | None]) -> list[tuple[int, Path]]:
+        """The operands of a choice, each with the sides of the conditions on which it reads them."""
         condition, *values = sides
         read = [(of, self._side(line, side)) for of, side in zip(values, (True, False), strict=True) if of is not None]
         return [(condition, ()), *read]
+
+    def _choices(self) -> list[int]:
+        """The choices among the operations."""
+        return [line for line in self.order if self.nodes[line].name in CHOICES and self._sides(line) is not None]
 
     def _side(self, line: int, side: bool) -> Path:
         """A side of a choice as a path: p and then q for the side where ``p and q`` holds, likewise where ``p or q`` does not."""
@@ -179,12 +188,10 @@ class Branched:
     def _sides(self, line: int) -> tuple[int, int | None, int | None] | None:
         """The condition of a choice, and its values if it holds and if not; None stands for the truth of the condition."""
         node = self.nodes[line]
-        if self.kind(line) not in ("truth", "number") or (node.name != "choose" and self.kind(line) != "truth"):
-            return None
         if node.name == "choose":
             condition, a, b = node.of
-            return condition, a, b
-        if node.name in ("and", "or") and all(self.constant(each) is None for each in node.of):
+            return (condition, a, b) if self.kind(line) in ("truth", "number") else None
+        if node.name in CHOICES and self.kind(line) == "truth" and all(self.constant(each) is None for each in node.of):
             p, q = sorted(node.of)
             return (p, q, None) if node.name == "and" else (p, None, q)
         return None
@@ -204,9 +211,9 @@ class Branched:
         """Replace each choice that a branch makes by choices within each other, each by a single condition."""
         while True:
             self._find_dear_paths()
-            order: list[int] = []
+            order, choices = list[int](), set(self._choices())
             for line in self.order:
-                expensive = self._are_dear(line)
+                expensive = self._are_dear(line) if line in choices else (False, False)
                 if any(expensive) and not (self.nodes[line].name == "choose" and len(self._side(line, expensive[0])) == 1):
                     order += self._in_parts(line, expensive[0])
                 order.append(line)
@@ -354,12 +361,12 @@ def kind_of(
 ) -> str:
     """The kind of an operation: "truth", "bits" or "number"; "any" for a constant that may be each."""
     name, of, extra = node
-    kinds = {kind(each) for each in of}
     if name == "constant":
         return "any" if extra in (0, all_bits) else "number"
     if name in COMPARISONS:
         return "truth"
     if name in ON_TRUTHS:
+        kinds = {kind(each) for each in of}
         is_magnitude = name == "and" and any(constant(each) == all_bits >> 1 for each in of)
         return "truth" if kinds <= {"truth", "any"} else "number" if is_magnitude and kinds == {"number"} else "bits"
     if name in ON_BITS:
@@ -373,6 +380,8 @@ def kind_of(
 
 
 def _common(a: Path, b: Path) -> Path:
+    if a == b:
+        return a
     n = 0
     while n < min(len(a), len(b)) and a[n] == b[n]:
         n += 1

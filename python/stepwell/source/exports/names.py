@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import NamedTuple
 
 from ...base import checks
@@ -72,6 +73,7 @@ class Names:
         return self._of[key]
 
 
+@lru_cache(maxsize=4096)
 def plain(name: str) -> str:
     """A name as English letters, digits and underscores."""
     if name.endswith("'") or "'[" in name:

@@ -275,7 +275,8 @@ class Skeleton(Language, ABC):
         """The helper functions that this text of a file needs, in order; each may need those before it."""
         needed: list[str] = []
         for name in reversed([*self.helpers, *FUNCTIONS]):
-            if re.search(rf"\b{self.helper(name)}\b", text):
+            word = self.helper(name)
+            if word in text and re.search(rf"\b{word}\b", text):  # the first is a hundred times as fast
                 function = self.helpers[name] if name in self.helpers else self._of_one_number(name)
                 needed.insert(0, function.replace("PREFIX", self.prefix))
                 text += needed[0]
