@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell import _core
+from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference import adaptive
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
@@ -114,14 +115,21 @@ def state(explained: sw.Explanation, plan: engine.Plan, known: dict[str, Any], m
     return [np.broadcast_to(known[name], MEMBERS) for name in naming.states(plan, explained.attempt, mark)]
 
 
-def assert_listing_is_a_step(system: sw.System, method: sw.Method, v: Any, y: Any, *, fused: bool) -> None:
-    explained = sw.explain(system, method, fused=fused)
-    plan = engine.Plan(system, method, (MEMBERS,), H, t0=T, fused=fused)
+def assert_listing_is_a_step(
+    system: sw.System, method: sw.Method, v: Any, y: Any, *, fused: bool, dtype: str = "float64"
+) -> None:
+    explained = sw.explain(system, method, fused=fused, dtype=dtype)  # type: ignore[arg-type]
+    number = np.dtype(dtype).type
+    plan = engine.Plan(system, method, (MEMBERS,), float(number(H)), t0=T, fused=fused, single=dtype == "float32")
     assert explained.parts is None
     known, tables = leaves(plan)
+    v, y = (block.astype(number).astype(float) for block in (v, y))
     rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), np.zeros(MEMBERS)]
     known |= dict(zip(naming.states(plan, False), rows, strict=False))
+    if plan.single:
+        known = {name: value if callable(value) else np.asarray(value, number) for name, value in known.items()}
     after = state(explained, plan, evaluate(explained, known, tables))
+    assert {each.dtype for each in after} == {np.dtype(number)}
     out = engine.advance(plan, v, y, carried=True)
     wanted = [out.slot, out.y[-1]]
     if system.control is not None:
@@ -138,14 +146,28 @@ def assert_counted(explained: sw.Explanation) -> None:
     assert all(len(line.formula) < 120 for section in explained.sections for line in section.lines)
 
 
+def refused_in_float32(system: sw.System, method: sw.Method) -> bool:
+    """Whether float32 does not go with them, in words that say so."""
+    try:
+        sw.explain(system, method, dtype="float32")
+    except (ArgumentError, UnsupportedError) as error:
+        if not re.search("dtype: |in float32 ", str(error)):
+            raise
+        return True
+    return False
+
+
 @SOME
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
 @pytest.mark.parametrize("name", [name for name in SYSTEMS if made(name)[1].size <= 30 * MEMBERS])  # whose steps are one tape
-def test_every_listing_is_a_step(name: str, fused: bool, some: int | None) -> None:
+def test_every_listing_is_a_step(name: str, fused: bool, dtype: str, some: int | None) -> None:
     system, v, y = made(name)
-    for method in drawn(METHODS, some and some // 2, name, fused):
-        if fits(system, method) and not _core.in_parts(engine.model(engine.Plan(system, method, (MEMBERS,), H)), MEMBERS):
-            assert_listing_is_a_step(system, method, v, y, fused=fused)
+    for method in drawn([each for each in METHODS if fits(system, each)], some and some // 2, name, fused, dtype):
+        if _core.in_parts(engine.model(engine.Plan(system, method, (MEMBERS,), H)), MEMBERS):
+            continue
+        if dtype == "float64" or not refused_in_float32(system, method):
+            assert_listing_is_a_step(system, method, v, y, fused=fused, dtype=dtype)
 
 
 @SOME

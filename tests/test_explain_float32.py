@@ -1,9 +1,7 @@
-"""What a step in float32 is said to be: its listing, evaluated in float32, and the kernel that is written of it."""
+"""What only a step in float32 is said to be: shorter numbers, wider kernels, and what it does not go with."""
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -11,79 +9,11 @@ import pytest
 import stepwell as sw
 from stepwell import _core
 from stepwell.errors import ArgumentError, UnsupportedError
-from stepwell.reference.bits import SINGLE
-from stepwell.reference.tape.fma import fma
-from stepwell.runs import engine
-from stepwell.source.explanation import naming
 from stepwell.source.explanation.formula import number
 from stepwell.views import cli
-from support import explain
-from support.cases import SYSTEMS, drawn, fits
-from support.explain import evaluate, leaves, lines
-from support.tracing import MEMBERS, METHODS, H, T, made
+from support.explain import lines
 
 F = np.float32
-
-
-def _as_bits(x: Any) -> Any:
-    if isinstance(x, int):
-        return np.uint32(x)
-    x = np.asarray(x)
-    return np.where(x, np.uint32(SINGLE.all_bits), np.uint32(0)) if x.dtype == bool else x.astype(F).view(np.uint32)
-
-
-def _on_bits(f: Any) -> Any:
-    return lambda *of: np.asarray(f(*map(_as_bits, of))).view(F)
-
-
-FUNCTIONS = explain.FUNCTIONS | {"fma": fma} | {name: _on_bits(f) for name, f in explain.ON_BITS.items()}
-
-
-@pytest.fixture(autouse=True)
-def _in_float32(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Listings are evaluated so."""
-    monkeypatch.setattr(explain, "NUMBER", F)
-    monkeypatch.setattr(explain, "FUNCTIONS", FUNCTIONS)
-
-
-def explained(system: sw.System, method: Any, **options: Any) -> sw.Explanation | None:
-    """The explanation, if float32 goes with both."""
-    try:
-        return sw.explain(system, method, dtype="float32", **options)
-    except (ArgumentError, UnsupportedError) as error:
-        if re.search("dtype: |in float32 ", str(error)):
-            return None
-        raise
-
-
-def after(step: sw.Explanation, plan: engine.Plan, v: Any, y: Any) -> list[Any]:
-    """The next state by the listing."""
-    known, tables = leaves(plan)
-    rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), np.zeros(MEMBERS)]
-    known |= dict(zip(naming.states(plan, False), rows, strict=False))
-    known = {name: value if callable(value) else np.asarray(value, F) for name, value in known.items()}
-    values = evaluate(step, known, tables)
-    return [np.broadcast_to(values[name], MEMBERS) for name in naming.states(plan, False, "'")]
-
-
-@pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
-@pytest.mark.parametrize("name", [name for name in SYSTEMS if made(name)[1].size <= 12 * MEMBERS])
-def test_every_listing_is_a_step(name: str, fused: bool) -> None:
-    system, v, y = made(name)
-    v, y = v.astype(F).astype(float), y.astype(F).astype(float)
-    for method in drawn([each for each in METHODS if fits(system, each)], 2, name, fused, "float32"):
-        step = explained(system, method, fused=fused)
-        if step is None:
-            continue
-        plan = engine.Plan(system, method, (MEMBERS,), float(F(H)), t0=T, fused=fused, single=True)
-        out = engine.advance(plan, v, y, carried=True)
-        wanted = [*out.slot.reshape(-1, MEMBERS), *out.y[-1].reshape(-1, MEMBERS)]
-        computed = after(step, plan, v, y)
-        for mine, theirs in zip(computed, wanted, strict=False):
-            assert mine.dtype == theirs.dtype == F
-            np.testing.assert_array_equal(mine, theirs)
-        total = sum((Counter(line.operations) for line in step.sections[-1].lines), Counter[str]())
-        assert total == +Counter(step.computed)
 
 
 def test_numbers_are_the_shortest_that_are_read_as_them() -> None:

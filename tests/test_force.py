@@ -409,11 +409,23 @@ def test_one_graph_of_an_attempt(name: str) -> None:
                 assert_one_graph(tape, tape.trace(engine.model(plan), what), traced)
 
 
-@pytest.mark.parametrize("fused", [False, True])
+#: Systems of small steps. The reference takes long for fused multiply-adds, so that by default it makes those of two of them.
+SMALL = {"pendulum, damped": True, "linear, masses": True, "free": False, "three bodies": False, "own: Duffing": False}
+
+
+@pytest.mark.parametrize(
+    ("fused", "names"),
+    [
+        (False, list(SMALL)),
+        (True, [name for name, is_quick in SMALL.items() if is_quick]),
+        pytest.param(True, [name for name, is_quick in SMALL.items() if not is_quick], marks=pytest.mark.long),
+    ],
+    ids=["plain", "fused", "fused, others"],
+)
 @pytest.mark.parametrize("method", ABLE)
-def test_adaptive_steps_equal_the_reference(method: str, fused: bool) -> None:
+def test_adaptive_steps_equal_the_reference(method: str, fused: bool, names: list[str]) -> None:
     """Under a force of each member, forward and backward, in pieces and in one."""
-    for name in ("free", "pendulum, damped", "three bodies", "own: Duffing", "linear, masses"):
+    for name in names:
         system, v, y, force = forced(name, 9)
         if not fits(system, sw.method(method)):
             continue
@@ -456,7 +468,7 @@ def test_adaptive_steps_under_control(bodies: int, control: Any) -> None:
     [
         sw.Chain(3000),
         sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80),
-        SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().for_state_shapes(None, np.zeros((300, 3))),  # type: ignore[attr-defined]
+        SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().for_state_shapes(None, np.zeros((100, 3))),  # type: ignore[attr-defined]
     ],
     ids=repr,
 )

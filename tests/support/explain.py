@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import stepwell as sw
 from stepwell import _core
+from stepwell.reference.bits import DOUBLE, SINGLE, Precision
 from stepwell.reference.tape.fma import fma
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
@@ -19,17 +20,6 @@ from support.tracing import MEMBERS, H, T
 
 def lines(explained: sw.Explanation) -> list[str]:
     return [line.strip() for line in explained.listing.splitlines()]
-
-
-def _as_bits(x: Any) -> Any:
-    if isinstance(x, int):
-        return np.uint64(x)
-    x = np.asarray(x)
-    return np.where(x, np.uint64(2**64 - 1), np.uint64(0)) if x.dtype == bool else x.astype(np.float64).view(np.uint64)
-
-
-def _on_bits(f: Any) -> Any:
-    return lambda *of: np.asarray(f(*map(_as_bits, of))).view(np.float64)
 
 
 #: What is done with bits.
@@ -43,11 +33,27 @@ ON_BITS = {
 }
 
 
-FUNCTIONS = {"sqrt": np.sqrt, "floor": np.floor, "fma": fma} | {name: _on_bits(f) for name, f in ON_BITS.items()}
+def functions(precision: Precision) -> dict[str, Any]:
+    """What a formula calls, for numbers of this precision."""
+    number, whole = (np.float32, np.uint32) if precision is SINGLE else (np.float64, np.uint64)
+
+    def as_bits(x: Any) -> Any:
+        if isinstance(x, int):
+            return whole(x)
+        x = np.asarray(x)
+        return np.where(x, whole(precision.all_bits), whole(0)) if x.dtype == bool else x.astype(number).view(whole)
+
+    def on_bits(f: Any) -> Any:
+        return lambda *of: np.asarray(f(*map(as_bits, of))).view(number)
+
+    return {"sqrt": np.sqrt, "floor": np.floor, "fma": fma} | {name: on_bits(f) for name, f in ON_BITS.items()}
 
 
-#: The type of constants; the tests of float32 take another, and other functions.
-NUMBER: Any = np.float64
+#: By dtype the type of constants, and what formulas call.
+ARITHMETIC: dict[str, tuple[Any, dict[str, Any]]] = {
+    "float64": (np.float64, functions(DOUBLE)),
+    "float32": (np.float32, functions(SINGLE)),
+}
 
 
 COMPARED = {ast.Lt: np.less, ast.LtE: np.less_equal, ast.Eq: np.equal}
@@ -56,12 +62,13 @@ COMPARED = {ast.Lt: np.less, ast.LtE: np.less_equal, ast.Eq: np.equal}
 DONE = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
 
 
-def _value(node: Any, known: dict[str, Any]) -> Any:
+def _value(node: Any, known: dict[str, Any], dtype: str) -> Any:
     """Of Python's grammar, but that a choice takes one of two arrays number by number."""
-    of = lambda each: _value(each, known)  # noqa: E731
+    of = lambda each: _value(each, known, dtype)  # noqa: E731
+    number, called = ARITHMETIC[dtype]
     match node:
         case ast.Constant():
-            return NUMBER(node.value)
+            return number(node.value)
         case ast.Name():
             return known[node.id]
         case ast.UnaryOp(op=ast.USub()):
@@ -79,9 +86,9 @@ def _value(node: Any, known: dict[str, Any]) -> Any:
         case ast.IfExp():
             return np.where(of(node.test), of(node.body), of(node.orelse))
         case ast.Call() if node.func.id.endswith("_bits") or node.func.id.startswith("shift"):  # whose constants are bits
-            return FUNCTIONS[node.func.id](*(each.value if isinstance(each, ast.Constant) else of(each) for each in node.args))
+            return called[node.func.id](*(each.value if isinstance(each, ast.Constant) else of(each) for each in node.args))
         case ast.Call():
-            return known.get(node.func.id, FUNCTIONS.get(node.func.id))(*map(of, node.args))
+            return known.get(node.func.id, called.get(node.func.id))(*map(of, node.args))
     raise AssertionError(ast.dump(node))
 
 
@@ -113,7 +120,9 @@ def evaluate(explained: sw.Explanation, known: dict[str, Any], tables: dict[str,
                     text = text.replace(sign, python)
                 assert line.name not in places, f"{line.name} twice"
                 places[line.name] = f"name_{len(places)}"
-                out[line.name] = numbered[places[line.name]] = _value(ast.parse(text, mode="eval").body, numbered)
+                out[line.name] = numbered[places[line.name]] = _value(
+                    ast.parse(text, mode="eval").body, numbered, explained.dtype
+                )
     return out
 
 
