@@ -17,13 +17,12 @@ from stepwell import _core
 from stepwell.reference import bits, log, trig
 from stepwell.reference.tape.evaluate import Evaluation
 from stepwell.reference.traced import Tracer
-from stepwell.source.exports import written
 from stepwell.source.exports.functions import FUNCTIONS, argument
 from stepwell.source.exports.head import STEPS
-from stepwell.source.exports.tapes import MAX_OPERATIONS
 from support.abroad import Journey, run, same
 from support.cases import SYSTEMS, fits, number
-from support.export import LANGUAGES, MEMBER, assert_same, journey, journeys, languages, other_journeys, shown
+from support.export import LANGUAGES, assert_same, journey, journeys, languages, other_journeys, shown
+from support.export_float32 import fused_singles, singles
 from support.tracing import CONTROLS, METHODS
 
 WRONG: Any = "yes"
@@ -78,7 +77,8 @@ def test_every_bit_is_that_of_integrate(language: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sw.DivergenceWarning)
         warnings.simplefilter("ignore", sw.ControlWarning)
-        every = [*journeys(language), *controlled(language), *diverging(), *changed()]
+        warnings.simplefilter("ignore", sw.AccuracyWarning)
+        every = [*journeys(language), *controlled(language), *diverging(), *changed(), *singles()]
     assert {each.method for each in every} == {method.name for method in METHODS}
     assert len({repr(each.system) for each in every}) > 40
     assert any(math.isnan(x) for each in every for x in each.expected)
@@ -108,7 +108,9 @@ def test_every_bit_of_fused_steps(language: str, tmp_path: Path) -> None:
         name = next(each for each in names[i % 8 :] + names if fits(SYSTEMS[each](np.random.default_rng(1), 1), method))
         every += [replace(journey(name, method, start, fused=True), steps=20) for start in method.starts or (None,)]
     every.append(replace(journey("two bodies", sw.method("rk4"), control=CONTROLS["limited"], fused=True), steps=20))
-    plain = [Journey(e.system, e.method, e.v, e.y, 20, member=MEMBER, options=e.options | {"fused": False}) for e in every]
+    every += fused_singles() if language != "python" else []
+    plain = [replace(each, options=each.options | {"fused": False}) for each in every]
+    assert all(a.expected != b.expected for a, b in zip(every, plain, strict=True) if a.single)
     assert sum(a.expected != b.expected for a, b in zip(every, plain, strict=True)) > len(every) // 2
     assert_same(every, run(language, every, tmp_path))
 
@@ -465,42 +467,3 @@ def test_a_wrong_operation_is_noticed_in_every_language(language: str, tmp_path:
     for mutant in changed:
         (numbers,) = run(language, [each], tmp_path, [mutant])
         assert not all(map(same, numbers, each.expected))
-
-
-# ---- loops
-
-
-def net(n: int) -> tuple[sw.Springs, Any]:
-    """n by n particles in space, hung from two corners, with springs along the sides and diagonals of its meshes."""
-    at = np.array([[i, j, 0.0] for i in range(n) for j in range(n)], float)
-    pairs = [(n * i + j, n * (i + a) + j + b) for a, b in ((1, 0), (0, 1), (1, 1)) for i in range(n - a) for j in range(n - b)]
-    return sw.Springs(pairs, stiffness=50.0, damping=0.1, gravity=[0.0, 0.0, -9.81], layout=at, fixed=[0, n - 1]), at
-
-
-@languages
-def test_every_bit_of_long_steps(language: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Springs, chains, particles that meet surfaces and bodies, with more operations than are written one by one.
-
-    In Python with as many as that takes, in the others with a tenth of them: there loops begin at fewer operations.
-    """
-    rng = np.random.default_rng(3)
-    most, share = MAX_OPERATIONS, 1
-    if language != "python":
-        most, share = MAX_OPERATIONS // 10, 10
-        monkeypatch.setattr(written, "MAX_OPERATIONS", most)
-    springs, at = net(20 if share == 1 else 7)
-    floors = [sw.Floor(restitution=0.1, friction=0.3), sw.Sphere((0.0, 0.5), 0.4)]
-    particles, places = sw.Particles(np.ones(150 // share), floor=floors), rng.normal(size=(150 // share, 2))
-    bodies = sw.NBody(np.ones(60 if share == 1 else 20), force="newton", softening=0.1)
-    apart = rng.normal(size=bodies.y_shape)
-    masses = 700 // share
-    every = [
-        Journey(springs, "false_euler", 0.1 * rng.normal(size=at.shape), at, 5, options={"force": rng.normal(size=at.shape)}),
-        Journey(sw.Chain(masses), "rk4", rng.normal(size=masses), rng.normal(size=masses), 5),
-        Journey(particles, "false_heun", rng.normal(size=places.shape), places, 9),
-        Journey(bodies, "verlet", rng.normal(size=apart.shape), apart, 3, dt=0.01),
-        Journey(bodies, "false_euler", 0.0 * apart, apart, 3, dt=0.01, options={"control": sw.EnergyControl(0.3)}),
-    ]
-    sources = [each.export(language, f"step_{i}") for i, each in enumerate(every)]
-    assert all(each.operations > most for each in sources)
-    assert_same(every, run(language, every, tmp_path, [each.source for each in sources]))

@@ -51,6 +51,10 @@ def test_the_example_at_the_head_runs(language: str, tmp_path: Path) -> None:
     run = sw.integrate(sw.Pendulum(2.0, a=sw.Sinusoid(1.0, 3.0)), "rk4", steps=STEPS, **arguments)
     step = sw.export(sw.Pendulum(2.0, a=sw.Sinusoid(1.0, 3.0)), "rk4", language, **arguments)
     assert shown(step, tmp_path) == run.y[-1]
+    arguments = {"v": 0.1, "y": 0.7, "dt": 0.02, "t0": 0.3, "dtype": "float32"}
+    run = sw.integrate(sw.Pendulum(1.1), "rk4", steps=STEPS, **arguments)
+    step = sw.export(sw.Pendulum(1.1), "rk4", language, name="single", **arguments)
+    assert np.float32(shown(step, tmp_path)) == run.y[-1]
     chain = sw.Chain(20)
     run = sw.integrate(chain, "verlet", v=0.0, y=np.arange(1.0, 21.0), dt=0.01, steps=STEPS)
     assert shown(sw.export(chain, "verlet", language), tmp_path) == run.y[-1, 0]

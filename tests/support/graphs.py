@@ -27,8 +27,8 @@ def assert_one_graph(tape: Any, core: list[Any], reference: list[Any]) -> None:
             pytest.fail(f"number {i} of the state: the core has  {a[line:][:1]}  where the reference has  {b[line:][:1]}")
 
 
-def model(system: sw.System, method: sw.Method) -> Any:
-    return engine.model(engine.Plan(system, method, system.batch, 0.1))
+def model(system: sw.System, method: sw.Method, *, single: bool = False) -> Any:
+    return engine.model(engine.Plan(system, method, system.batch, 0.1, single=single))
 
 
 def methods(system: sw.System) -> Iterator[sw.Method]:
