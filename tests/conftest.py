@@ -13,6 +13,7 @@ LONGEST = (
     "test_charts.py",
     "test_export.py",
     "test_export_files.py",
+    "test_export_loops.py",
     "test_site.py",
     "test_docs.py",
     "test_adaptive.py",
