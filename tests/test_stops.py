@@ -49,8 +49,8 @@ def test_out_of_steps_tells_how_many_and_how_long(method: str) -> None:
     paces = run.paces
     assert paces is not None
     mean = float(paces.t) / int(paces.accepted)
-    words = f"out of max_steps: 3000 attempts, {int(paces.rejected)} of them rejected, steps of {mean:.2g} on average; max_steps="
-    assert words in text
+    words = f"out of max_steps: 3000 attempts, {int(paces.rejected)} of them rejected, steps of {mean:.2g} on average"
+    assert f"{words}, not held down by stability; max_steps=" in text
     assert run.stopped_at == paces.t
 
 
@@ -64,17 +64,18 @@ def test_stiffness_is_named_by_its_rate(method: str, members: tuple[int, ...]) -
     state = run.controller_state.y[:, 0] if members else run.controller_state.y
     match = re.search(r"the fastest rate there, 1/([\d.e-]+), lets no steps beyond ([\d.e-]+) be stable \(stiff", text)
     assert match is not None
-    # Both are told with two digits.
-    assert float(match[1]) == pytest.approx(1.0 / (1e4 * state[2] + 6e7 * state[1]), rel=0.06)
-    longest = float(sw.stability_limit(sw.LinearSystem([[-1.0 / float(match[1])]]), method))
-    assert float(match[2]) == pytest.approx(longest, rel=0.1)
+    # Both are told with three digits.
+    assert float(match[1]) == pytest.approx(1.0 / (1e4 * state[2] + 6e7 * state[1]), rel=0.006)
+    if method != "taylor":  # its order goes by the tolerance: see tests/test_stiffness.py
+        longest = float(sw.stability_limit(sw.LinearSystem([[-1.0 / float(match[1])]]), method))
+        assert float(match[2]) == pytest.approx(longest, rel=0.01)
 
 
 @pytest.mark.parametrize("method", CHOOSE)
 def test_what_turns_or_is_only_fast_is_not_called_stiff(method: str) -> None:
     for system, start in (
         (sw.Oscillator(40.0), {"v": 0.0, "y": 1.0}),
-        (sw.Oscillator(1.0, damping=0.05), {"v": 0.0, "y": 1.0}),
+        (sw.Oscillator(1.0, damping=0.0005), {"v": 0.0, "y": 1.0}),
         (van_der_pol(mu=1.0), {"v": 0.0, "y": 2.0}),
     ):
         _, text = stopped(system, method, tolerance=1e-9, at=[1e7], max_steps=4000, **start)

@@ -41,6 +41,7 @@ registry.register(
     run_to_xarray="stepwell.interop.tables:to_xarray",
     safe_step="stepwell.analysis.stability.nets:safe_step",
     save_run="stepwell.interop.saving:save",
+    stiffness_of="stepwell.analysis.stiffness:finding_of",
     watched_for_growth="stepwell.analysis.growth:watched",
 )
 

@@ -16,6 +16,7 @@ from .errors import ControlWarning as ControlWarning
 from .errors import DivergenceWarning as DivergenceWarning
 from .errors import EventWarning as EventWarning
 from .errors import StepwellError as StepwellError
+from .errors import StiffnessWarning as StiffnessWarning
 from .errors import ToleranceWarning as ToleranceWarning
 from .interop.saving import load as load
 from .interop.solve_ivp import solve_ivp as solve_ivp

@@ -98,6 +98,22 @@ class ToleranceWarning(UserWarning):
     """
 
 
+class StiffnessWarning(UserWarning):
+    """Stability, and not the tolerance, holds down the adaptive steps of some members: their equations are stiff.
+
+    The results are right. A method that is stable with longer steps would need far fewer of them.
+
+    Example:
+        >>> @sw.system(order=1)
+        ... def stiff(t, y): return np.array([-y[0], -1e4 * (y[1] - y[0])])
+        >>> with warnings.catch_warnings(record=True) as caught:
+        ...     warnings.simplefilter("always", sw.StiffnessWarning)
+        ...     run = sw.integrate(stiff, "merson", y=np.ones(2), tolerance=1e-6, at=[5.0])
+        >>> str(caught[0].message)[:73]
+        'stability, and not the tolerance, held down the steps of the run: at t = '
+    """
+
+
 class ControlWarning(UserWarning):
     """A control is so strong that it overshoots.
 

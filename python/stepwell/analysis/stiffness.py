@@ -1,74 +1,391 @@
-"""Whether stability, and not accuracy, limits the adaptive steps of a run (stiffness)."""
+"""Stiffness: whether stability, and not accuracy, holds down the adaptive steps of a run.
+
+It is looked for after the run, where members stood at their last waypoints (``runs/engine/adaptive.py``) and at the end. A step
+that is held down by accuracy changes the state by much more than is tolerated as its error, so nearly all runs are seen to be
+tame there. Where one is not, a few steps are tried from these states, first as the run makes them, then of half their length:
+with these the method is well within its stability limit, and what it had amplified decays. What is left is the solution. If a
+polynomial of fourth degree fits it within the tolerance over many steps of the run, a method of fifth order could make them one.
+If, besides, the steps are near the limit of the method for the fastest rate there, it is stability that holds them down.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from collections.abc import Callable, Sequence
+from functools import cache
+from math import prod
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base import checks
-from ..base.arrays import Array, Shape
-from ..runs.result import Run
-from ..runs.stops import rates_of, start_of
+from ..base.arrays import Array, Shape, Whole
+from ..base.reprs import first_of, share
+from ..errors import StiffnessWarning, UnsupportedError
+from ..model.compatibility import fits_together
+from ..model.methods import STABLE_FAMILIES, Method, for_stiff
+from ..model.methods import method as find_method
+from ..model.systems import LinearSystem
+from ..reference import adaptive
+from ..runs import engine
+from ..runs.events.attempts import attempted
+from ..runs.events.members import Members
+from ..runs.findings import Finding
+from ..runs.request import Request
+from ..runs.result import Run, Status
 
-#: Stiffness is tested after at least this many attempts, for at most this many numbers of a state, and of its matrices in all:
-#: that is little work beside the run.
-ATTEMPTS, MOST_RATES, MOST_NUMBERS = 1000, 32, 100_000
-#: A mode is stiff if it decays rather than oscillates, the run has lasted this many of its time constants, and the step is at
-#: least this fraction of the largest at which the method is stable for it.
-DECAYED, SHARE_OF_LIMIT = 100.0, 0.2
+Complex = np.ndarray[Any, np.dtype[np.complex128]]
+
+#: Steps are looked at further if they change no group of components by more than MOVED times the tolerated error, or by more than
+#: this part of a step for which accuracy asks: its error is about the power ``error_order`` of its relative change.
+MOVED, PART_OF_A_STEP = 4.0, 0.25
+#: So many attempts are made as the run makes them, and then so many of SETTLED of their mean length, of which the last ones are
+#: looked at.
+NATURAL, SETTLING, SETTLED, LOOKED_AT = 32, 128, 0.5, 64
+#: The degree of the polynomials that are fitted to so many of these steps. The error of such a fit is that of a step of a method
+#: of fifth order, with a constant of 1/120, which is a fourth as long.
+DEGREE, FITTED, LONGER = 4, (16, 32, 64), 4.0
+#: Rounding bounds the error of a fit from below.
+LEAST_ERROR = 1e-15
+#: Equations are stiff if the tolerance allows steps this many times as long as those that are made, and these are at least NEAR
+#: and at most BEYOND of the limit at which the method is stable for the fastest rate.
+STIFF, NEAR, BEYOND = 5.0, 0.4, 4.0
+#: Ratios beyond this are not told.
+MOST_RATIO = 1000.0
+#: A state of more numbers has no matrix of rates; its fastest rate is found by so many rates nearby.
+MOST_RATES, ITERATIONS = 256, 40
+#: The most numbers in the matrices of members at once.
+MOST_NUMBERS = 1_000_000
 #: The fraction of a number by which it is changed to approximate a derivative: half of its digits.
 PART = 2.0**-26
 
 
-def held_by_stability(run: Run, index: Shape, attempts: int) -> str:
-    """The end of the message for a member that stopped where stability limited its steps; empty if it did not."""
-    assert run.paces is not None
-    assert run.controller_state is not None
-    numbers = run.controller_state.v.size + run.controller_state.y.size
-    n = numbers // run.status.size
-    if attempts < ATTEMPTS or n > MOST_RATES or n * numbers > MOST_NUMBERS:
-        return ""
-    matrix = _derivative(run, index, n)
-    if not np.isfinite(matrix).all():
-        return ""
-    values = np.linalg.eigvals(matrix)
-    fastest: Any = values[np.abs(values).argmax()]
-    rate, elapsed = abs(fastest), abs(float(run.paces.t[index]) - start_of(run, index))
-    if not (-fastest.real >= 0.5 * rate and rate * elapsed > DECAYED):
-        return ""
-    from ..analysis.stability import stability_limit  # needed for stiff equations only
-    from ..model.systems import LinearSystem
+class Stand(NamedTuple):
+    """Where some members stand, one after the other; a member may be there several times.
 
-    mode = [[fastest.real, -fastest.imag], [fastest.imag, fastest.real]] if fastest.imag else [[fastest.real]]
-    limit = float(stability_limit(LinearSystem(mode), run.method))
-    if not float(run.paces.h[index]) >= SHARE_OF_LIMIT * limit:
+    Attributes:
+        members: their places in the flattened batch.
+        paces: their step-size controllers, shape (numbers, stands).
+        v: velocities, shape (*block, stands).
+        y: coordinates, likewise.
+    """
+
+    members: Whole
+    paces: Array
+    v: Array
+    y: Array
+
+
+class Held(NamedTuple):
+    """What holds down the steps from where members stand; a rate and a limit are zero where no matrix says them.
+
+    Attributes:
+        ratio: how many times as long steps the tolerance allows; 0 if it is not stability that holds them down.
+        t: the time there, in the direction of the system.
+        rate: the eigenvalue of the largest size of the derivative of the rates.
+    """
+
+    ratio: Array
+    t: Array
+    rate: Complex
+
+
+def finding_of(run: Run, request: Request, waypoints: Array) -> Finding | None:
+    """The finding for the members whose steps were held down by stability, and that did not stop; None if there is none."""
+    if run.method.family in STABLE_FAMILIES or not (seen := _suspects(request.plan, waypoints)):
+        return None
+    status = run.status.reshape(-1)[seen]
+    suspects = np.array(seen)[(status == Status.OK) | (status == Status.EVENT)]
+    if not suspects.size:
+        return None
+    verdicts = _verdicts(request, _stands(run, request, waypoints, suspects))
+    stiff = np.array([verdict.ratio > 0.0 for verdict in verdicts])
+    held = stiff.sum(axis=0) >= 2
+    if not held.any():
+        return None
+    k = int(held.argmax())
+    verdict = verdicts[int(stiff[:, k].argmax())]
+    members = np.zeros(run.status.size, dtype=bool)
+    members[suspects[held]] = True
+    members = members.reshape(run.status.shape)
+    first, number = tuple(np.argwhere(members)[0].tolist()), int(held.sum())
+    who = f"{share(number, members.shape, members.size)}{first_of(number, first, members.size)}"
+    text = (
+        f"stability, and not the tolerance, held down the steps of {who}{';' if members.size > 1 else ':'} "
+        f"{_in_words(request, verdict, k, f'at t = {verdict.t[k]:g}')}, where the tolerance allows {_times(verdict.ratio[k])} as "
+        f"long (stiff equations); {_advice(run, request)}"
+    )
+    return Finding(StiffnessWarning, text, members)
+
+
+def held_by_stability(run: Run, request: Request, waypoints: Sequence[Array], index: Shape) -> str:
+    """The end of the message for a member that ran out of attempts: whether stability held down its steps."""
+    if run.method.family in STABLE_FAMILIES:
         return ""
+    place = np.array([np.ravel_multi_index(index, run.status.shape) if index else 0])
+    rows = waypoints[0] if waypoints else None
+    verdicts = _verdicts(request, _stands(run, request, rows, place))
+    stiff = [bool(verdict.ratio[0] > 0.0) for verdict in verdicts]
+    if not (stiff[0] or sum(stiff) >= 2):
+        return ", not held down by stability"
+    verdict = verdicts[stiff.index(True)]
+    there = "there" if stiff[0] else f"at t = {verdict.t[0]:g}"
     return (
-        f", held down by stability and not by accuracy: the fastest rate there, 1/{1.0 / rate:.2g}, lets no steps beyond "
-        f"{limit:.2g} be stable (stiff equations; SciPy's Radau and LSODA are for them)"
+        f", held down by stability and not by accuracy: {_in_words(request, verdict, 0, there)} (stiff equations: the tolerance "
+        f"allows {_times(verdict.ratio[0])} as long; {_advice(run, request)})"
     )
 
 
-def _derivative(run: Run, index: Shape, n: int) -> Array:
-    """The Jacobian of the rates of a member at its state, by differences."""
-    assert run.controller_state is not None
-    assert run.paces is not None
-    paces, blocks = run.paces, (run.controller_state.v, run.controller_state.y)
-    flat = [block.reshape(-1, *run.status.shape) for block in blocks]
+def _in_words(request: Request, verdict: Held, k: int, where: str) -> str:
+    """The fastest rate and the longest stable step, in words."""
+    rate = complex(verdict.rate[k])
+    limit = limit_of(request.plan.method, request.plan.order, rate)
+    return f"the fastest rate {where}, 1/{1.0 / abs(rate):.3g}, lets no steps beyond {limit:.3g} be stable"
 
-    def at(state: Array) -> Array:
-        parts = state[: len(flat[0])].reshape(blocks[0].shape), state[len(flat[0]) :].reshape(blocks[1].shape)
-        rates = rates_of(run.system, run.status.shape, paces.t, parts)
-        return np.concatenate([checks.member(rate, index).reshape(-1) for rate in rates])
 
+def _times(ratio: float) -> str:
+    """A ratio in words, with one digit."""
+    return "more than 1000 times" if ratio >= MOST_RATIO else f"about {float(f'{ratio:.1g}'):g} times"
+
+
+def _advice(run: Run, request: Request) -> str:
+    """What to take for stiff equations."""
+    assert request.step_control is not None
+    instead = for_stiff(float(np.min(request.step_control.paces[engine.RELATIVE])))
+    if instead is not None:
+        try:
+            fits_together(run.system, instead)
+        except UnsupportedError:
+            instead = None
+    return "SciPy's Radau and LSODA are for them" if instead is None else f'"{instead.name}" is stable there'
+
+
+def _suspects(plan: engine.Plan, waypoints: Array) -> list[int]:
+    """The members whose steps to their waypoints moved them as little as those that stability holds down.
+
+    Nearly all members are known to be no such by the first number of their state, so they are looked at one by one, in floats.
+    """
+    n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
+    groups, of_v = _places(plan.acceptance.groups, n_v, n_y), plan.acceptance.counts(n_v, n_y)[0]
+    exponent = 1.0 / (plan.order or plan.method.error_order or plan.method.order)
+    # What v makes of y within its rounding counts as nothing.
+    lost = 0.0 if of_v in (0, len(groups)) else _rounding(plan)
+    members: Any = (0,) if plan.members == 1 else np.flatnonzero(waypoints[:, 2 * (n_v + n_y) + engine.COUNTS.start].all(axis=0))
+    own = plan.acceptance.own
+    return [
+        k for k in members if all(_hardly_moves(row, groups, of_v, own, exponent, lost) for row in waypoints[..., k].tolist())
+    ]
+
+
+@cache
+def _places(groups: tuple[int, ...], n_v: int, n_y: int) -> list[list[int]]:
+    """The places of the numbers of each group among those of v and y."""
+    n = n_v + n_y
+    groups = groups or tuple(int(0 < n_v <= i) for i in range(n))
+    return [[i for i in range(n) if groups[i] == group] for group in sorted(set(groups))]
+
+
+def _hardly_moves(row: list[float], groups: list[list[int]], of_v: int, own: bool, exponent: float, lost: float) -> bool:
+    """Whether the step to a waypoint moved a member as little as one that stability holds down.
+
+    The largest sizes so far stand for the present ones, which allows rather more than is tolerated.
+    """
+    n, count = sum(map(len, groups)), len(groups)
+    first = 2 * n + engine.PACE_NUMBERS
+    if not row[2 * n + engine.COUNTS.start]:
+        return False
+    relative, absolute = row[2 * n + engine.RELATIVE], row[2 * n + engine.ABSOLUTE]
+    for group, places in enumerate(groups):
+        size = longest = row[first + group]
+        if lost and group < of_v:
+            size = max(size, lost / row[2 * n + engine.STEP] * max(row[first + of_v : first + count]))
+        if own:
+            relative, absolute = row[first + count + group], row[first + 2 * count + group]
+        tolerated = absolute + relative * size
+        step = PART_OF_A_STEP * longest * (tolerated / longest) ** exponent if longest > 0.0 else 0.0
+        moved = abs(row[n + places[0]] - row[places[0]])
+        if len(places) > 1:
+            moved = math.hypot(*(row[n + i] - row[i] for i in places))
+        if not moved <= max(MOVED * tolerated, step):
+            return False
+    return True
+
+
+def _rounding(plan: engine.Plan) -> float:
+    return adaptive.SINGLE_ROUNDING if plan.single else adaptive.ROUNDING
+
+
+def _stands(run: Run, request: Request, waypoints: Array | None, members: Whole) -> list[Stand]:
+    """Where members stand at the end, and where they stood at their last waypoints, the later one first."""
+    end = run.controller_state
+    assert end is not None
+    shapes, size = (run.system.v_shape, run.system.y_shape), run.status.size
+    blocks = [block.reshape(*shape, size)[..., members] for block, shape in zip((end.v, end.y), shapes, strict=True)]
+    stands = [Stand(members, end.pace.reshape(-1, size)[:, members], *blocks)]
+    if waypoints is None:
+        return stands
+    n_v, n = prod(shapes[0]), prod(shapes[0]) + prod(shapes[1])
+    rows = waypoints[:, n:, members]
+    count = rows[:, n + engine.COUNTS.start]
+    order = np.argsort(-count, axis=0)
+    rows = np.take_along_axis(rows, order[:, np.newaxis], axis=0)
+    for each in rows:
+        v, y = (each[part].reshape(*shape, len(members)) for part, shape in zip((slice(n_v), slice(n_v, n)), shapes, strict=True))
+        if (each[n + engine.COUNTS.start] > 0.0).all():
+            stands.append(Stand(members, each[n:], v, y))
+    return stands
+
+
+def _verdicts(request: Request, stands: Sequence[Stand]) -> list[Held]:
+    """What holds down the steps from each of some places where members stand, found for all together."""
+    held = _held(request, Stand(*(np.concatenate(each, axis=-1) for each in zip(*stands, strict=True))))
+    return [Held(*each) for each in zip(*(np.split(numbers, len(stands)) for numbers in held), strict=True)]
+
+
+def _held(request: Request, stand: Stand) -> Held:
+    """What holds down the steps from where members stand."""
+    assert request.step_control is not None
+    plan, jumps = Members(request.plan._replace(progress=None)).plan(stand.members), request.step_control.pacing.jumps
+    if jumps is not None and jumps.ndim > 1:
+        jumps = np.broadcast_to(jumps, (len(jumps), *request.plan.batch)).reshape(len(jumps), -1)[:, stand.members]
+    paces = np.array(stand.paces)
+    paces[[engine.EXTRA, engine.HELD, *range(engine.COUNTS.start, engine.COUNTS.stop)]] = 0.0
+    t, most = paces[engine.TIME], paces[engine.MOST_STEP].copy()
+    natural = attempted(plan, np.inf, NATURAL, NATURAL, False, paces, stand.v, stand.y, jumps)
+    step = (natural.t[-1] - t) / NATURAL
+    paces = natural.paces.copy()
+    paces[[engine.HELD, *range(engine.COUNTS.start, engine.COUNTS.stop)]] = 0.0
+    paces[engine.MOST_STEP] = np.minimum(most, SETTLED * step)
+    paces[engine.STEP] = np.minimum(paces[engine.STEP], paces[engine.MOST_STEP])
+    settled = attempted(plan, np.inf, SETTLING, SETTLING, False, paces, natural.v[-1], natural.y[-1], jumps)
+    with np.errstate(all="ignore"):
+        lengths = np.diff(settled.t[-LOOKED_AT - 1 :], axis=0) / paces[engine.MOST_STEP]
+        ratio = np.where((np.abs(lengths - 1.0) < 1e-3).all(axis=0), _smooth_for(plan, settled.v, settled.y, settled.paces), 0.0)
+        # Steps that something else bounds are not held down by stability.
+        bound = np.where(t < stand.paces[engine.UNTIL], np.minimum(most, stand.paces[engine.INTERVAL]), most)
+        ratio = np.where((ratio >= STIFF) & (natural.lengths(plan).max(axis=0) < 0.99 * bound), ratio, 0.0)
+    rate = np.zeros(len(t), dtype=np.complex128)
+    suspects = np.flatnonzero(ratio)
+    n = prod(request.system.v_shape) + prod(request.system.y_shape)
+    for some in np.array_split(suspects, -(-len(suspects) * n * n // MOST_NUMBERS)) if suspects.size else ():
+        rate[some] = _fastest(plan, some, t[some], stand.v[..., some], stand.y[..., some])
+    reach = step * np.abs(rate) / limit_of(plan.method, plan.order, -1.0)
+    ratio = np.where((reach >= NEAR) & (reach <= BEYOND), ratio, 0.0)
+    sign = -1.0 if plan.backward else 1.0
+    return Held(ratio, sign * t, rate)
+
+
+def _smooth_for(plan: engine.Plan, v: Array, y: Array, paces: Array) -> Array:
+    """How many times as long as before they settled the steps may be that follow the last states within the tolerance."""
+    pace = engine.pace_of(plan, paces)
+    size = adaptive.sizes(v[-1], y[-1], plan.block_axes, plan.acceptance.groups)
+    counts = plan.acceptance.counts(*adaptive.numbers_in(v[-1], y[-1], plan.block_axes))
+    _, tolerated = adaptive.tolerated(pace, pace.h, counts, size, size, _rounding(plan))
+    best = np.zeros(plan.members)
+    for steps in FITTED:
+        rest_v, rest_y = (_besides_a_polynomial(block[-steps - 1 :]) for block in (v, y))
+        error = adaptive.over(adaptive.sizes(rest_v, rest_y, plan.block_axes, plan.acceptance.groups), tolerated[..., np.newaxis])
+        error = error.max(axis=-1)
+        times = SETTLED * steps / LONGER * np.maximum(error, LEAST_ERROR) ** (-1.0 / (DEGREE + 1))
+        best = np.where(error <= 1.0, np.fmax(best, times), best)
+    return best
+
+
+def _besides_a_polynomial(states: Array) -> Array:
+    """What is left of states at equal distances besides the polynomials that fit them best; the first axis becomes the last."""
+    places = np.linspace(-1.0, 1.0, len(states))
+    q, _ = np.linalg.qr(np.polynomial.chebyshev.chebvander(places, DEGREE))
+    rows = states.reshape(len(states), -1)
+    return np.moveaxis((rows - q @ (q.T @ rows)).reshape(states.shape), 0, -1)
+
+
+def limit_of(method: Method, order: int, rate: complex) -> float:
+    """The longest stable step of a method for a rate λ; of a series of that order."""
+    angle = math.atan2(abs(rate.imag), rate.real) if rate.imag else math.pi if rate.real < 0.0 else 0.0
+    return _limit_along(method.name, order, angle) / abs(rate)
+
+
+@cache
+def _limit_along(name: str, order: int, angle: float) -> float:
+    """The longest stable step for a rate of size 1 at an angle."""
+    from .stability import stability_limit  # needed for stiff equations only
+
+    method, mode = find_method(name), complex(math.cos(angle), math.sin(angle) if angle < math.pi else 0.0)
+    if method.has_series and order:
+        return _limit_of_series(order, mode)
+    matrix = [[mode.real, -mode.imag], [mode.imag, mode.real]] if mode.imag else [[mode.real]]
+    return float(stability_limit(LinearSystem(matrix), method))
+
+
+def _limit_of_series(order: int, mode: complex) -> float:
+    """The longest step with which the first terms of the exponential function are no larger than 1."""
+    terms = [1.0 / math.factorial(k) for k in range(order, -1, -1)]
+
+    def grows(step: float) -> bool:
+        return bool(abs(np.polyval(terms, step * mode)) > 1.0 + 1e-12)
+
+    below = next(k for k in range(64 * order) if grows((k + 1) / 32.0)) / 32.0
+    above = below + 1.0 / 32.0
+    for _ in range(50):
+        middle = 0.5 * (below + above)
+        below, above = (below, middle) if grows(middle) else (middle, above)
+    return below
+
+
+def _fastest(plan: engine.Plan, members: Whole, t: Array, v: Array, y: Array) -> Complex:
+    """The eigenvalues of the largest size of the derivatives of the rates; of states of many numbers their sizes, negated.
+
+    Args:
+        plan: of all members.
+        members: those that are looked at.
+        t: their times.
+        v: their velocities.
+        y: their coordinates.
+    """
+    n_v = prod(plan.system.v_shape)
+    n, count = n_v + prod(plan.system.y_shape), len(members)
+    flat = [block.reshape(block.size // count, count) for block in (v, y)]
     state = np.concatenate(flat)
-    lengths = np.concatenate([np.full(block.shape, np.sqrt((block * block).sum(axis=0))) for block in flat])
+    lengths = np.concatenate([np.broadcast_to(np.sqrt((block * block).sum(axis=0)), block.shape) for block in flat])
     least = np.finfo(np.float64).tiny / PART  # below it, that fraction of the number would underflow
-    scale = np.where(np.abs(state) >= least, np.abs(state), np.where(lengths >= least, lengths, 1.0))
-    matrix, here = np.empty((n, n)), at(state)
-    for i in range(n):
-        moved = state.copy()
-        moved[i] += PART * scale[i]
-        matrix[:, i] = (at(moved) - here) / float(checks.member(moved - state, index)[i])
-    return matrix
+    scale = np.where(lengths >= least, lengths, 1.0)
+    if n > MOST_RATES:
+        return _by_iteration(_rates(plan, members, t), state, PART * scale)
+    scale = np.where(np.abs(state) >= least, np.abs(state), scale)
+    # The states, and each with one of its numbers changed, are members side by side.
+    changed = np.repeat(state[:, np.newaxis], n + 1, axis=1)
+    changed[np.arange(n), np.arange(1, n + 1)] += PART * scale
+    every = np.tile(np.arange(count), n + 1)
+    rates = _rates(plan, members[every], t[every])(changed.reshape(n, -1)).reshape(n, n + 1, count)
+    change = changed[np.arange(n), np.arange(1, n + 1)] - state
+    matrix = np.moveaxis((rates[:, 1:] - rates[:, :1]) / change, -1, 0)
+    values = np.linalg.eigvals(np.where(np.isfinite(matrix).all(axis=(1, 2), keepdims=True), matrix, 0.0))
+    largest: Complex = np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, np.newaxis], 1)[:, 0].astype(np.complex128)
+    return largest
+
+
+def _rates(plan: engine.Plan, members: Whole, t: Array) -> Callable[[Array], Array]:
+    """The rates of some members as a function of their states, rows of numbers."""
+    plan = Members(plan).plan(members)
+    unit, n_v, shapes = engine.attempted_system(plan).unit, prod(plan.system.v_shape), (plan.system.v_shape, plan.system.y_shape)
+
+    def rates(state: Array) -> Array:
+        parts = [part.reshape(*shape, len(members)) for part, shape in zip((state[:n_v], state[n_v:]), shapes, strict=True)]
+        with np.errstate(all="ignore"):
+            both = unit.dv(t, *parts), unit.dy(t, *parts)
+        wide = (np.broadcast_to(rate, part.shape) for rate, part in zip(both, parts, strict=True))
+        return np.concatenate([rate.reshape(rate.size // len(members), len(members)) for rate in wide])
+
+    return rates
+
+
+def _by_iteration(rates: Callable[[Array], Array], state: Array, scale: Array) -> Complex:
+    """About minus the sizes of the largest eigenvalues, by powers of the derivative on a vector."""
+    change, here, grown = np.cos(np.arange(len(state)) ** 2.0)[:, np.newaxis] * scale, rates(state), []
+    length = np.linalg.norm(scale, axis=0)
+    for _ in range(ITERATIONS):
+        change = change * (length / np.linalg.norm(change, axis=0))
+        change, before = rates(state + change) - here, np.linalg.norm(change, axis=0)
+        grown.append(np.linalg.norm(change, axis=0) / before)
+    with np.errstate(all="ignore"):
+        size = np.exp(np.mean(np.log(grown[ITERATIONS // 2 :]), axis=0))
+    return np.where(np.isfinite(size), -size, 0.0).astype(np.complex128)

@@ -14,6 +14,9 @@ from ..base.immutable import Immutable
 from ..base.reprs import facts
 from ..errors import ArgumentError
 
+#: Families of methods that are stable with steps of any length where a motion decays.
+STABLE_FAMILIES = ("Rosenbrock",)
+
 
 class Steps(Protocol):
     """The functions of a file in ``reference/steppers``; only a method with a carry has ``start`` and ``finish``."""
@@ -167,6 +170,16 @@ def methods() -> tuple[Method, ...]:
         ['fehlberg', 'fehlberg_5']
     """
     return tuple(_catalogue().values())
+
+
+def for_stiff(tolerance: float) -> Method | None:
+    """The method with adaptive steps that is stable with long ones where equations are stiff; None if there is none.
+
+    Of several it is the one of the highest order, or for tolerances of a thousandth and more that of the lowest.
+    """
+    able = [each for each in methods() if each.error_order is not None and each.family in STABLE_FAMILIES]
+    best = min if tolerance >= 1e-3 else max
+    return best(able, key=lambda each: each.order, default=None)
 
 
 def choice(methods: Any) -> list[Method]:

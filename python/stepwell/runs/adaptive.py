@@ -13,11 +13,13 @@ from .request import Request
 from .result import AdaptiveState, Paces, Run
 
 
-def adaptive_run(request: Request) -> Run:
-    """Make the run, without its diagnostics."""
+def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
+    """Make the run, without its diagnostics. Where its members stood on the way is added to ``waypoints``, if it is known."""
     assert request.step_control is not None
     plan, (pacing, paces, t0, times, going_on, every, start), method = request.plan, request.step_control, request.plan.method
     with_events, adapt, keeper = None, engine.adapt, None
+    if waypoints is not None:
+        pacing = pacing._replace(waypoints=True)
     if every is not None:
         from .kept_steps import StepKeeper  # only such runs need it
 
@@ -35,6 +37,8 @@ def adaptive_run(request: Request) -> Run:
         shown = bar(f"{method.title} to t = {times[-1].max():g}")
     with shown as progress:
         out = adapt(plan if progress is None else plan._replace(progress=progress), pacing, paces, request.v, request.y)
+    if waypoints is not None and out.waypoints is not None:
+        waypoints.append(out.waypoints)
     accepted, rejected, extra_steps = out.paces[engine.COUNTS].astype(np.int64)
     # A series needs no further evaluation for the states within a step, unless operations are fused.
     again = out.paces[engine.HELD] > 0.0 if method.has_series and not plan.fused else extra_steps

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from math import prod
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ import numpy as np
 from ..base import registry
 from ..base.arrays import Array, Shape, Whole
 from ..base.reprs import first_of, in_words, of_member, share
-from ..errors import AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning
+from ..errors import AccuracyWarning, ControlWarning, DivergenceWarning, StiffnessWarning, ToleranceWarning
 from ..model.controls import EnergyControl
 from ..model.parameters import aligned
 from ..model.systems import NBody, System
@@ -38,6 +38,13 @@ EVALUATIONS, PAIRS, MOST_NUMBERS = 2000, 200_000, 1_000_000
 #: From this many bodies on the core computes an energy faster than NumPy, although it makes a step too.
 MIN_BODIES_BY_CORE = 24
 
+#: Stiffness is looked for in runs of MANY steps: little work beside a run whose members have FEW_NUMBERS in all. A run of less
+#: numbers makes a thousand steps in some tenths of a millisecond, so there it is MANY_OF_FEW.
+MANY, MANY_OF_FEW, FEW_NUMBERS = 512, 2048, 64
+
+#: In a run that was stopped it is looked for, after this many attempts.
+STOPPED = 256
+
 #: Pairs are checked in at most this many saved states.
 STATES = 32
 
@@ -54,10 +61,13 @@ class Ends(NamedTuple):
     moved: Array
 
 
-def findings_of(run: Run, request: Request, heard: Callable[[type[Warning]], bool]) -> tuple[Finding, ...]:
+def findings_of(
+    run: Run, request: Request, heard: Callable[[type[Warning]], bool], waypoints: Sequence[Array] = ()
+) -> tuple[Finding, ...]:
     """Findings of a run: how it ended, and which numbers mean nothing, as far as that costs little.
 
-    What takes longer than an evaluation of the last state is computed only if its warning is ``heard``.
+    What takes longer than an evaluation of the last state is computed only if its warning is ``heard``. ``waypoints`` is where
+    members with adaptive steps stood on the way, if it is known.
     """
     noticed = list(run.findings)  # of events that it came to rest at
     if run.paces is None:
@@ -66,7 +76,9 @@ def findings_of(run: Run, request: Request, heard: Callable[[type[Warning]], boo
         if np.count_nonzero(run.status) and (diverged := _of_divergence(run, request)) is not None:
             noticed.append(diverged)
     else:
-        noticed += of_stops(run)
+        noticed += of_stops(run, partial(_why_steps_are_short, run, request, waypoints))
+        if (stiff := _of_stiffness(run, request, waypoints, heard)) is not None:
+            noticed.append(stiff)
         if (lost := _of_a_lost_motion(run, request)) is not None:
             noticed.append(lost)
     # The energy says nothing where events changed the state, nor where the run began from what a method carries.
@@ -159,6 +171,29 @@ def _of_divergence(run: Run, request: Request) -> Finding | None:
         f"(t = {time_of(run, step, first):g}), by {run.method.name} with dt = {run.dt:g}{why}",
         bad,
     )
+
+
+def _why_steps_are_short(run: Run, request: Request, waypoints: Sequence[Array], index: Shape) -> str:
+    """Whether stability held down the steps of a member that is out of attempts, in words."""
+    assert run.paces is not None
+    if run.paces.accepted[index] + run.paces.rejected[index] < STOPPED:
+        return ""
+    return str(registry.task("held_by_stability")(run, request, waypoints, index))
+
+
+def _of_stiffness(
+    run: Run, request: Request, waypoints: Sequence[Array], heard: Callable[[type[Warning]], bool]
+) -> Finding | None:
+    """The members whose steps were held down by stability, of those that made enough steps for that to matter."""
+    assert run.paces is not None
+    accepted = run.paces.accepted
+    steps = int(accepted) if not accepted.shape else int(accepted.max(initial=0))
+    if not waypoints or steps < MANY or (steps < MANY_OF_FEW and run.y[-1].size + run.v[-1].size < FEW_NUMBERS):
+        return None
+    if not heard(StiffnessWarning):
+        return None
+    found: Finding | None = registry.task("stiffness_of")(run, request, waypoints[0])
+    return found
 
 
 def _of_a_lost_motion(run: Run, request: Request) -> Finding | None:

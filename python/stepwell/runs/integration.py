@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..base.arrays import Array
 from ..model.controls import AnyControl
 from ..model.methods import Method
 from ..model.systems import System
@@ -138,6 +139,8 @@ def integrate(
         DivergenceWarning: how many members left the finite range, which first, and when. Nothing computed is lost.
         ToleranceWarning: how many members stopped before the last time of ``at``, and why; or that an absolute tolerance is so
             large that the motion is lost in it.
+        StiffnessWarning: how many members had steps that stability held down, and not the tolerance, with the limit and how much
+            longer steps the tolerance allows.
         AccuracyWarning: if the numbers of a run are finite but mean nothing: a pendulum turned so far that its angle has no sine;
             a state grew a million times by fixed steps that are beyond the stability limit at the start; bodies without control,
             or with a tolerance any system whose energy or declared invariant is constant, ended with another energy; a motion
@@ -166,8 +169,9 @@ def step(request: Request) -> Run:
 
 def noticing(request: Request, heard: Callable[[type[Warning]], bool] = lambda _: True) -> Run:
     """The requested run with its findings; what takes a while to find is searched only if its warning is ``heard``."""
-    run = step(request)
-    if findings := findings_of(run, request, heard):
+    waypoints: list[Array] = []
+    run = fixed_run(request) if request.step_control is None else adaptive_run(request, waypoints)
+    if findings := findings_of(run, request, heard, waypoints):
         run.findings = findings
     return run
 

@@ -49,7 +49,7 @@ class StepKeeper:
         while len(left):
             part = members.plan(left)
             at, jumps = (_of_members(times, plan, left) for times in (pacing.at, pacing.jumps))
-            again = pacing._replace(at=at, jumps=jumps, begins=False, room=self._room(part, pacing.budget))
+            again = pacing._replace(waypoints=False, at=at, jumps=jumps, begins=False, room=self._room(part, pacing.budget))
             piece = engine.adapt(part, again, np.ascontiguousarray(rows[:, left]), *(end[..., left] for end in ends))
             self._take(index[left], piece, until[left])
             rows[:, left], status[left] = piece.paces, piece.status

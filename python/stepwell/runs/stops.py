@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ..base import checks, registry
+from ..base import checks
 from ..base.arrays import Array, Shape
 from ..base.reprs import counted, first_of, share
 from ..errors import ToleranceWarning
@@ -37,8 +38,8 @@ USUAL = 2.0**-10
 State = tuple[Array, Array]
 
 
-def of_stops(run: Run) -> list[Finding]:
-    """The members that stopped by themselves: how many, which was first, when and why."""
+def of_stops(run: Run, why_short: Callable[[Shape], str]) -> list[Finding]:
+    """The members that stopped by themselves: how many, which was first, when and why; ``why_short`` says why steps are short."""
     assert run.paces is not None
     if not np.count_nonzero(run.status) or not (stopped := (run.status != 0) & (run.status < Status.EVENT)).any():
         return []
@@ -48,21 +49,20 @@ def of_stops(run: Run) -> list[Finding]:
     number = int(np.count_nonzero(stopped))
     text = (
         f"{share(number, stopped.shape, stopped.size)} stopped before t = {end:g}"
-        f"{first_of(number, first, stopped.size) or ','} at t = {time:g}; {_why(run, first)}"
+        f"{first_of(number, first, stopped.size) or ','} at t = {time:g}; {_why(run, first, why_short)}"
     )
     return [Finding(ToleranceWarning, text, stopped)]
 
 
-def _why(run: Run, index: Shape) -> str:
+def _why(run: Run, index: Shape, why_short: Callable[[Shape], str]) -> str:
     """Why a member stopped, with numbers."""
     assert run.paces is not None
     status = Status(int(run.status[index]))
     if status == Status.BUDGET:
         accepted, rejected = int(run.paces.accepted[index]), int(run.paces.rejected[index])
         mean = f", steps of {abs(float(run.paces.t[index]) - start_of(run, index)) / accepted:.2g} on average" if accepted else ""
-        by_stability = registry.task("held_by_stability")(run, index, accepted + rejected)
         tried = f"{counted(accepted + rejected, 'attempt')}, {rejected} of them rejected{mean}"
-        return f"{WHY_STOPPED[status]}: {tried}{by_stability}; max_steps= allows more"
+        return f"{WHY_STOPPED[status]}: {tried}{why_short(index)}; max_steps= allows more"
     if status == Status.UNDERFLOW and (beyond := _of_rates_beyond(run, index)):
         return f"{WHY_STOPPED[Status.NOT_FINITE]}: {beyond} beyond"
     if wrong := _of_rates_there(run, index):

@@ -258,6 +258,7 @@ struct AdaptiveArraysOf<'py> {
     status: PyReadwriteArray1<'py, i64>,
     trail: Option<PyReadwriteArrayDyn<'py, f64>>,
     steps: Option<KeptStepsOf<'py>>,
+    waypoints: Option<PyReadwriteArrayDyn<'py, f64>>,
 }
 
 /// Makes a run of adaptive steps from the rows of `v` and `y`, and fills what is kept at the times of the pacing. Returns whether
@@ -294,6 +295,7 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
         attempt_log: filled(&mut arrays.trail)?,
         steps,
         kept_steps,
+        waypoints: filled(&mut arrays.waypoints)?,
     };
     interruptible(py, plan.progress, |monitor| adaptive::run(&run, to_fill, monitor))
 }

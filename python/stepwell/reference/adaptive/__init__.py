@@ -6,7 +6,7 @@ decides after them. ``runs`` goes from one saved time to the next. What is toler
 
 from .attempts import Attempted, Backward, Pair, Stretched, Tried, tried
 from .controller import MAX_FACTOR, MIN_FACTOR, MOVES, SINGLE_MOVES, Outlook, Pace
-from .pace import ONSET, OUTSIDE, ROUNDING, SINGLE_ROUNDING, attempt, begin, decided, judged, over
+from .pace import ONSET, OUTSIDE, ROUNDING, SINGLE_ROUNDING, attempt, begin, decided, judged, over, tolerated
 from .runs import BUDGET, NOT_FINITE, OK, UNDERFLOW, Jumps, Outcome, run, waiting
 from .sizes import largest, longer, numbers_in, sizes, stacked, total
 
@@ -43,6 +43,7 @@ __all__ = [
     "run",
     "sizes",
     "stacked",
+    "tolerated",
     "total",
     "tried",
     "waiting",

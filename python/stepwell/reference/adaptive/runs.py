@@ -7,6 +7,7 @@ import numpy as np
 
 from ...base.arrays import Array, Whole
 from ..bits import where
+from . import waypoints as passed
 from .controller import MAX_FACTOR, MIN_FACTOR, MOVES, Pace
 
 OK, BUDGET, UNDERFLOW, NOT_FINITE = 0, 2, 3, 4
@@ -119,10 +120,12 @@ def run(
     jumps: Jumps | None = None,
     series: bool = False,
     every: int = 0,
+    waypoints: Array | None = None,
 ) -> Outcome:
     """Continue all members and save their states at each time of ``at``, ascending. Members that stop before have NaN.
 
-    ``attempt(pace, budget, v, y)`` is one attempt of all members. Every ``every``-th accepted step is kept; 0 for none.
+    ``attempt(pace, budget, v, y)`` is one attempt of all members. Every ``every``-th accepted step is kept; 0 for none. Where
+    members stood at their last waypoints is written to ``waypoints``.
     """
     one = np.ones(pace.t.shape)
     saved_v, saved_y, steps = [], [], []
@@ -135,9 +138,11 @@ def run(
             there, at_target = np.zeros(pace.t.shape, dtype=bool), (np.full(v.shape, np.nan), np.full(y.shape, np.nan))
             while True:
                 while pace.outlook(budget).runs.any():
-                    before = pace.accepted
+                    accepted, before = pace.accepted, (v, y)
                     pace, v, y = attempt(pace, budget, v, y)
-                    if every and (due := (pace.accepted > before) & (pace.accepted % every == 0.0)).any():
+                    if waypoints is not None:
+                        passed.keep(waypoints, accepted, before, pace, v, y)
+                    if every and (due := (pace.accepted > accepted) & (pace.accepted % every == 0.0)).any():
                         steps.append((due, pace.t, v, y))
                     if jumps is not None:
                         pace = jumps.crossed(pace, series=series)

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 #: The numbers of a ``Pace`` that are not of a group of components; those of groups follow.
 PACE_NUMBERS = 20
 #: Places among them; the counts are of accepted, rejected and extra steps.
-TIME, STEP, TARGET, HELD, RELATIVE, ABSOLUTE, LASTS, ERROR = 0, 1, 2, 4, 5, 6, 7, 18
-MOST_STEP, COUNTS, WORK = 11, slice(15, 18), 19
+TIME, STEP, TARGET, EXTRA, HELD, RELATIVE, ABSOLUTE, LASTS, ERROR = 0, 1, 2, 3, 4, 5, 6, 7, 18
+INTERVAL, UNTIL, MOST_STEP, COUNTS, WORK = 9, 10, 11, slice(15, 18), 19
 #: The first step if the state does not determine one, in units of time; in a run shorter than SHORT this part of its time. So
 #: steps of longer runs do not depend on the saved times.
 BLIND = 1.0 / (1 << 20)
@@ -32,6 +32,9 @@ SHORT = 32.0 * BLIND
 #: The least absolute tolerance, 1024 times the smallest number above zero. A state that grows from zero under a smooth push
 #: begins with numbers of few bits, whose relative error cannot be small.
 LEAST = 2.0**-1064
+#: How many waypoints are kept of a member, and the most numbers of them; of larger batches there are none.
+WAYPOINTS = 2
+MOST_IN_WAYPOINTS = 1 << 21
 #: The status of a member that has no room to save another step.
 FULL = -1
 
@@ -52,7 +55,7 @@ class Pacing(NamedTuple):
 
     ``at`` and ``jumps``, the times that no step crosses, are the same for all members or one for each, shape (times, *batch).
     Every ``every``-th accepted step of a member is saved, 0 for none. The core has ``room`` for this many steps of each member,
-    and a member that has filled it ends with the status ``FULL``.
+    and a member that has filled it ends with the status ``FULL``. ``waypoints`` asks for where members stood on the way.
     """
 
     at: Array
@@ -61,6 +64,7 @@ class Pacing(NamedTuple):
     jumps: Array | None = None
     every: int = 0
     room: int = 0
+    waypoints: bool = False
 
 
 class CorePacing(NamedTuple):
@@ -131,6 +135,7 @@ class AdaptiveArrays(NamedTuple):
         trail: None; or times and steps to try next, shape (2, times, members). Attempts are then made one by one, and the states
             before the first and after each are saved.
         steps: None; or the saved steps.
+        waypoints: None; or zeros, for where members stood at their last waypoints, shape (waypoints, numbers, members).
     """
 
     v: Array
@@ -143,12 +148,16 @@ class AdaptiveArrays(NamedTuple):
     status: Whole
     trail: Array | None = None
     steps: KeptSteps | None = None
+    waypoints: Array | None = None
 
 
 class Adapted(NamedTuple):
     """Saved states, and for each member at the end its state, the numbers of its ``Pace`` and the status.
 
-    ``evaluations`` is the number of function evaluations of an attempt, ``steps`` the saved steps or None.
+    ``evaluations`` is the number of function evaluations of an attempt, ``steps`` the saved steps or None. ``waypoints`` is where
+    members stood after the last two numbers of accepted steps that are powers of two, 256 or more, shape (2, numbers, members):
+    v and y before the step to there, v and y after it, and the numbers of the ``Pace``; zeros of members that did not come so
+    far, and None if it was not asked for.
     """
 
     v: Array
@@ -159,6 +168,14 @@ class Adapted(NamedTuple):
     status: Whole
     evaluations: int
     steps: KeptSteps | None = None
+    waypoints: Array | None = None
+
+
+def _room_for_waypoints(pacing: Pacing, numbers: int, members: int) -> Array | None:
+    """Zeros for so many numbers of the waypoints of all members; None if they are not asked for, or are too many."""
+    if not pacing.waypoints or WAYPOINTS * numbers * members > MOST_IN_WAYPOINTS:
+        return None
+    return np.zeros((WAYPOINTS, numbers, members))
 
 
 def groups_of(plan: Plan) -> int:
@@ -308,7 +325,9 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     if pacing.every:
         blocks = (np.empty((pacing.room, *shape, members)) for shape in (plan.system.v_shape, plan.system.y_shape))
         steps = KeptSteps(np.zeros(members, np.int64), np.empty((pacing.room, members)), *blocks)
-    arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, status.reshape(-1), None, steps)
+    waypoints = _room_for_waypoints(pacing, 2 * len(last) + numbers, members)
+    ends = status.reshape(-1)
+    arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, ends, None, steps, waypoints)
     core_pacing, core_plan = pacing_of_core(plan, pacing), plan._replace(t0=0.0)
     spec = model(core_plan)
     if not _core.adapt(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
@@ -316,7 +335,8 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
         _core.adapt(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
     each = _evaluations_of_attempt(plan)
     last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
-    return Adapted(saved_v, saved_y, last_v, last_y, last_paces.reshape(numbers, *plan.batch), status, each, steps)
+    paces = last_paces.reshape(numbers, *plan.batch)
+    return Adapted(saved_v, saved_y, last_v, last_y, paces, status, each, steps, waypoints)
 
 
 def _evaluations_of_attempt(plan: Plan) -> int:
@@ -331,11 +351,14 @@ def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array
 
     pace = begun(plan, paces, v, y) if pacing.begins else pace_of(plan, paces)
     attempt, jumps = attempt_by_numpy(plan, pacing.budget), jumps_of(plan, pacing)
-    series = plan.method.has_series
-    out = adaptive.run(attempt, v, y, pace, at=pacing.at, budget=pacing.budget, jumps=jumps, series=series, every=pacing.every)
+    series, numbers = plan.method.has_series, 2 * (prod(plan.system.v_shape) + prod(plan.system.y_shape))
+    waypoints = _room_for_waypoints(pacing, numbers + pace_numbers(plan), plan.members)
+    at, budget, every = pacing.at, pacing.budget, pacing.every
+    out = adaptive.run(attempt, v, y, pace, at=at, budget=budget, jumps=jumps, series=series, every=every, waypoints=waypoints)
     each = _evaluations_of_attempt(plan)
     steps = _gathered(plan, out.steps) if pacing.every else None
-    return Adapted(out.v, out.y, out.last_v, out.last_y, numbers_of(out.pace), out.status, each, steps)
+    paces = numbers_of(out.pace)
+    return Adapted(out.v, out.y, out.last_v, out.last_y, paces, out.status, each, steps, waypoints)
 
 
 def _gathered(plan: Plan, steps: Sequence[tuple[Any, Any, Array, Array]]) -> KeptSteps:

@@ -6,6 +6,7 @@ use super::{
     Model,
     columns::{Columns, cut},
     fixed::expect,
+    waypoints::{self, WAYPOINTS},
     workers::{self, GoOn, Workers},
 };
 use crate::{
@@ -80,6 +81,8 @@ pub struct Arrays<'a> {
     pub steps: [&'a mut [f64]; 3],
     /// One row: how many of them each member has.
     pub kept_steps: &'a mut [i64],
+    /// Empty; or where members stood at their last waypoints: see `run/waypoints.rs`.
+    pub waypoints: &'a mut [f64],
 }
 
 /// Attempts between two checks of the lanes.
@@ -102,6 +105,7 @@ struct Part<'a> {
     attempt_log: Columns<'a, f64>,
     steps: [Columns<'a, f64>; 3],
     kept_steps: Columns<'a, i64>,
+    waypoints: Columns<'a, f64>,
 }
 
 /// Makes the run, and returns whether it did: where members stand at the start is not found for a system whose attempt is not one
@@ -122,6 +126,9 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
     expect("status", b, arrays.status.len())?;
     if !arrays.attempt_log.is_empty() {
         expect("attempt_log", 2 * plan.at.len() * b, arrays.attempt_log.len())?;
+    }
+    if !arrays.waypoints.is_empty() {
+        expect("waypoints", WAYPOINTS * (2 * (p + q) + numbers) * b, arrays.waypoints.len())?;
     }
     if plan.every > 0 {
         let kept = arrays.steps[0].len() / b.max(1);
@@ -151,18 +158,28 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
     let shares: Vec<usize> = (0..shares).map(|i| b * (i + 1) / shares - b * i / shares).collect();
     let mut whole = [arrays.status, arrays.kept_steps].map(|a| cut(a, b, &shares).into_iter());
     let [t, v, y] = arrays.steps;
-    let mut rows = [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces, arrays.attempt_log, t, v, y]
+    let mut rows = [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces, arrays.attempt_log, t, v, y, arrays.waypoints]
         .map(|a| cut(a, b, &shares).into_iter());
     let mut parts = Vec::with_capacity(shares.len());
     let mut first = 0;
     for count in shares {
         if let (
-            [Some(saved_v), Some(saved_y), Some(state), Some(paces), Some(attempt_log), Some(t), Some(v), Some(y)],
+            [
+                Some(saved_v),
+                Some(saved_y),
+                Some(state),
+                Some(paces),
+                Some(attempt_log),
+                Some(t),
+                Some(v),
+                Some(y),
+                Some(waypoints),
+            ],
             [Some(status), Some(kept_steps)],
         ) = (rows.each_mut().map(Iterator::next), whole.each_mut().map(Iterator::next))
         {
             let steps = [t, v, y];
-            parts.push(Part { first, count, saved_v, saved_y, state, paces, status, attempt_log, steps, kept_steps });
+            parts.push(Part { first, count, saved_v, saved_y, state, paces, status, attempt_log, steps, kept_steps, waypoints });
         }
         first += count;
     }
@@ -188,12 +205,14 @@ struct Assignment {
     /// How many accepted steps it had when a step was looked at last, and how many are kept of this run.
     accepted: f64,
     kept_steps: usize,
+    /// How many accepted steps it had when a waypoint was looked for last.
+    passed: u64,
 }
 
 impl Assignment {
     /// Of a member of the log of attempts.
     fn of_log(member: usize, next: usize) -> Assignment {
-        Assignment { member, next, origin: None, held_before: false, accepted: 0.0, kept_steps: 0 }
+        Assignment { member, next, origin: None, held_before: false, accepted: 0.0, kept_steps: 0, passed: 0 }
     }
 }
 
@@ -240,9 +259,15 @@ impl<'a> Worker<'a> {
             let numbers = self.plan.v.len() + self.plan.y.len();
             if self.group.has_terms() {
                 let attempts = if self.plan.every > 0 { 1 } else { self.attempts_by_series() };
+                let attempts = attempts.min(self.attempts_to_next_waypoint(&part, &assignments));
                 self.group.attempt(attempts);
                 if self.plan.every == 0 {
                     self.group.find_running(self.plan.budget as f64, &mut runs);
+                }
+                for (lane, assigned) in assignments.iter_mut().enumerate().filter(|(lane, _)| runs[*lane]) {
+                    if let Some(assigned) = assigned {
+                        self.keep_waypoint(&mut part, lane, assigned);
+                    }
                 }
                 unseen += attempts;
                 if unseen >= ATTEMPTS_BETWEEN_CHECKS {
@@ -263,7 +288,8 @@ impl<'a> Worker<'a> {
             } else {
                 ATTEMPTS_BETWEEN_CHECKS
             };
-            self.group.attempt(attempts.min(self.attempts_to_next_kept(&assignments)));
+            let kept = self.attempts_to_next_kept(&assignments).min(self.attempts_to_next_waypoint(&part, &assignments));
+            self.group.attempt(attempts.min(kept));
             if !go_on(0) {
                 return Err(Error::Interrupted);
             }
@@ -281,6 +307,34 @@ impl<'a> Worker<'a> {
             assigned.as_ref().map(|_| every - self.group.pace(lane).accepted as i64 % every)
         };
         assignments.iter().enumerate().filter_map(left).min().unwrap_or(1) as usize
+    }
+
+    /// After how many attempts a member may be at a waypoint or a step before one.
+    fn attempts_to_next_waypoint(&self, part: &Part, assignments: &[Option<Assignment>]) -> usize {
+        if part.waypoints.rows() == 0 {
+            return usize::MAX;
+        }
+        let taken = assignments.iter().enumerate().filter(|(_, assigned)| assigned.is_some());
+        let row = self.group.row(self.plan.v.len() + self.plan.y.len() + Pace::<f64>::ACCEPTED);
+        taken.map(|(lane, _)| waypoints::steps_to_next(self.accepted(row, lane))).min().unwrap_or(1)
+    }
+
+    /// How many steps a lane has accepted; `row` has that of all lanes, if they stand side by side.
+    fn accepted(&self, row: Option<&[f64]>, lane: usize) -> f64 {
+        row.map_or_else(|| self.group.pace(lane).accepted, |accepted| accepted[lane])
+    }
+
+    /// Keeps where a lane stands if it has come to a waypoint or a step before one.
+    fn keep_waypoint(&self, part: &mut Part, lane: usize, assigned: &mut Assignment) {
+        if part.waypoints.rows() == 0 {
+            return;
+        }
+        let row = self.group.row(self.plan.v.len() + self.plan.y.len() + Pace::<f64>::ACCEPTED);
+        let accepted = self.accepted(row, lane) as u64;
+        if accepted != assigned.passed {
+            assigned.passed = accepted;
+            waypoints::keep(&mut part.waypoints, &*self.group, lane, assigned.member, accepted);
+        }
     }
 
     /// Keeps the state of a lane if it has made a step that is to be kept. Returns whether there is no room for another.
@@ -424,7 +478,12 @@ impl<'a> Worker<'a> {
         let before = &plan.jumps[..plan.jumps.len() / 2];
         let next = before.get(before.partition_point(|row| row.at(at) <= pace.t));
         self.group.set_pace(lane, Pace { target: pace.t, wall: next.map_or(f64::INFINITY, |row| row.at(at)), ..pace });
-        Assignment { accepted: pace.accepted, held_before: pace.held > 0.0, ..Assignment::of_log(member, 0) }
+        Assignment {
+            accepted: pace.accepted,
+            held_before: pace.held > 0.0,
+            passed: pace.accepted as u64,
+            ..Assignment::of_log(member, 0)
+        }
     }
 
     /// Brings a lane to its next attempt: saves the states that it has reached and sets its next time, or ends its member and
@@ -448,6 +507,7 @@ impl<'a> Worker<'a> {
                     self.group.set_state(lane, &origin);
                 }
             }
+            self.keep_waypoint(part, lane, &mut assigned);
             if !plan.jumps.is_empty() {
                 self.cross(lane, part.first + assigned.member);
             }

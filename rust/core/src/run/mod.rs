@@ -4,6 +4,7 @@ pub mod adaptive;
 mod columns;
 pub(crate) mod compiled;
 pub mod fixed;
+mod waypoints;
 mod workers;
 pub mod world;
 

@@ -153,6 +153,8 @@ impl<N: Number> Pace<N> {
     pub const NUMBERS: usize = NUMBERS;
     /// Places of the time and of the step to try next among them.
     pub(crate) const PLACES: [usize; 2] = [0, 1];
+    /// The place of the number of accepted attempts.
+    pub(crate) const ACCEPTED: usize = 15;
 
     /// Where the next step ends, and whether that is at the wall.
     fn reach(&self) -> (N, N::Truth) {
