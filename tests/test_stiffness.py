@@ -127,6 +127,22 @@ def test_members_that_are_stiff_are_counted_and_the_first_is_named() -> None:
     assert one.findings[-1].members.tolist() == [[False, True, False]]
 
 
+def test_of_many_members_the_same_are_stiff() -> None:
+    """Those of a large batch are first looked at side by side: second-order equations, too, and tolerances of each component."""
+    k = np.where(np.arange(20) % 7 == 3, 2000.0, 1.0)
+    run, (text,) = told(system=follows(k=k), method="merson", y=np.ones(20), tolerance=1e-4, at=[20.0])
+    assert "of 3 of 20 members; the first was member 3; " in text
+    (finding,) = (each for each in run.findings if each.category is sw.StiffnessWarning)
+    assert np.flatnonzero(finding.members).tolist() == [3, 10, 17]
+    mu = np.where(np.arange(20) == 5, 1000.0, 1.0)
+    _, (text,) = told(system=van_der_pol(mu=mu), method="merson", v=0.0, y=np.full(20, 2.0), tolerance=1e-4, at=[20.0])
+    assert "of 1 of 20 members: member 5; " in text
+    y = np.array([1.0, 0.0, 0.0])[:, np.newaxis] * np.ones(9)
+    tolerance = np.array([1e-5, 1e-6, 1e-5])[:, np.newaxis], np.array([1e-8, 1e-12, 1e-8])[:, np.newaxis]
+    _, (text,) = told(system=robertson(), method="merson", y=y, tolerance=tolerance, at=[20.0])
+    assert "of 9 of 9 members; the first was member 0; " in text
+
+
 def test_a_batch_of_stopped_and_of_finished_members_tells_of_each() -> None:
     run, texts = told(
         system=follows(k=np.array([1000.0, 10_000.0])), method="merson", y=np.ones(2), tolerance=1e-3, at=[20.0], max_steps=9000

@@ -38,6 +38,8 @@ Complex = np.ndarray[Any, np.dtype[np.complex128]]
 #: Steps are looked at further if they change no group of components by more than MOVED times the tolerated error, or by more than
 #: this part of a step for which accuracy asks: its error is about the power ``error_order`` of its relative change.
 MOVED, PART_OF_A_STEP = 4.0, 0.25
+#: Of so many members the numbers are first looked at side by side.
+SEVERAL = 8
 #: So many attempts are made as the run makes them, and then so many of SETTLED of their mean length, of which the last ones are
 #: looked at.
 NATURAL, SETTLING, SETTLED, LOOKED_AT = 32, 128, 0.5, 64
@@ -162,18 +164,32 @@ def _advice(run: Run, request: Request) -> str:
 def _suspects(plan: engine.Plan, waypoints: Array) -> list[int]:
     """The members whose steps to their waypoints moved them as little as those that stability holds down.
 
-    Nearly all members are known to be no such by the first number of their state, so they are looked at one by one, in floats.
+    Nearly all members are known to be no such by one number of their state, so they are looked at one by one, in floats; of
+    several, those that are left by one number.
     """
     n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
     groups, of_v = _places(plan.acceptance.groups, n_v, n_y), plan.acceptance.counts(n_v, n_y)[0]
     exponent = 1.0 / (plan.order or plan.method.error_order or plan.method.order)
     # What v makes of y within its rounding counts as nothing.
     lost = 0.0 if of_v in (0, len(groups)) else _rounding(plan)
-    members: Any = (0,) if plan.members == 1 else np.flatnonzero(waypoints[:, 2 * (n_v + n_y) + engine.COUNTS.start].all(axis=0))
+    members: Any = range(plan.members) if plan.members < SEVERAL else _by_the_last_group(plan, waypoints, groups, exponent)
     own = plan.acceptance.own
     return [
         k for k in members if all(_hardly_moves(row, groups, of_v, own, exponent, lost) for row in waypoints[..., k].tolist())
     ]
+
+
+def _by_the_last_group(plan: engine.Plan, waypoints: Array, groups: list[list[int]], exponent: float) -> Any:
+    """The members of which a number of the last group hardly moved, as ``_hardly_moves`` has it."""
+    n, count = sum(map(len, groups)), len(groups)
+    place, size = groups[-1][0], waypoints[:, 2 * n + engine.PACE_NUMBERS + count - 1]
+    own = 2 * n + engine.PACE_NUMBERS + count
+    rows = (own + count - 1, own + 2 * count - 1) if plan.acceptance.own else (2 * n + engine.RELATIVE, 2 * n + engine.ABSOLUTE)
+    with np.errstate(all="ignore"):
+        tolerated = waypoints[:, rows[1]] + waypoints[:, rows[0]] * size
+        step = np.fmax(MOVED * tolerated, PART_OF_A_STEP * size * (tolerated / size) ** exponent)
+        hardly = np.abs(waypoints[:, n + place] - waypoints[:, place]) <= step
+    return np.flatnonzero((hardly & (waypoints[:, 2 * n + engine.COUNTS.start] > 0.0)).all(axis=0))
 
 
 @cache
