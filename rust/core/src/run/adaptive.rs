@@ -259,15 +259,9 @@ impl<'a> Worker<'a> {
             let numbers = self.plan.v.len() + self.plan.y.len();
             if self.group.has_terms() {
                 let attempts = if self.plan.every > 0 { 1 } else { self.attempts_by_series() };
-                let attempts = attempts.min(self.attempts_to_next_waypoint(&part, &assignments));
-                self.group.attempt(attempts);
+                self.attempt(&mut part, attempts, &mut assignments);
                 if self.plan.every == 0 {
                     self.group.find_running(self.plan.budget as f64, &mut runs);
-                }
-                for (lane, assigned) in assignments.iter_mut().enumerate().filter(|(lane, _)| runs[*lane]) {
-                    if let Some(assigned) = assigned {
-                        self.keep_waypoint(&mut part, lane, assigned);
-                    }
                 }
                 unseen += attempts;
                 if unseen >= ATTEMPTS_BETWEEN_CHECKS {
@@ -288,8 +282,8 @@ impl<'a> Worker<'a> {
             } else {
                 ATTEMPTS_BETWEEN_CHECKS
             };
-            let kept = self.attempts_to_next_kept(&assignments).min(self.attempts_to_next_waypoint(&part, &assignments));
-            self.group.attempt(attempts.min(kept));
+            let attempts = attempts.min(self.attempts_to_next_kept(&assignments));
+            self.attempt(&mut part, attempts, &mut assignments);
             if !go_on(0) {
                 return Err(Error::Interrupted);
             }
@@ -309,29 +303,43 @@ impl<'a> Worker<'a> {
         assignments.iter().enumerate().filter_map(left).min().unwrap_or(1) as usize
     }
 
-    /// After how many attempts a member may be at a waypoint or a step before one.
-    fn attempts_to_next_waypoint(&self, part: &Part, assignments: &[Option<Assignment>]) -> usize {
+    /// So many attempts of every lane, and keeps where lanes stand that come to a waypoint or to a step before one.
+    fn attempt(&mut self, part: &mut Part, attempts: usize, assignments: &mut [Option<Assignment>]) {
         if part.waypoints.rows() == 0 {
-            return usize::MAX;
+            self.group.attempt(attempts);
+            return;
         }
-        let taken = assignments.iter().enumerate().filter(|(_, assigned)| assigned.is_some());
-        let row = self.group.row(self.plan.v.len() + self.plan.y.len() + Pace::<f64>::ACCEPTED);
-        taken.map(|(lane, _)| waypoints::steps_to_next(self.accepted(row, lane))).min().unwrap_or(1)
+        let mut left = attempts;
+        while left > 0 {
+            let row = self.accepted_of_lanes();
+            let taken = assignments.iter().enumerate().filter(|(_, assigned)| assigned.is_some());
+            let next = taken.map(|(lane, _)| waypoints::steps_to_next(self.accepted(row, lane))).min();
+            let next = next.unwrap_or(left).min(left);
+            self.group.attempt(next);
+            left -= next;
+            let row = self.accepted_of_lanes();
+            for (lane, assigned) in assignments.iter_mut().enumerate() {
+                if let Some(assigned) = assigned {
+                    // An extra step accepts none, so the state of a lane that has accepted one is that of the run.
+                    self.keep_waypoint(part, lane, assigned, self.accepted(row, lane) as u64);
+                }
+            }
+        }
     }
 
-    /// How many steps a lane has accepted; `row` has that of all lanes, if they stand side by side.
+    /// How many steps all lanes have accepted, if they stand side by side.
+    fn accepted_of_lanes(&self) -> Option<&[f64]> {
+        self.group.row(self.plan.v.len() + self.plan.y.len() + Pace::<f64>::ACCEPTED)
+    }
+
+    /// How many steps a lane has accepted.
     fn accepted(&self, row: Option<&[f64]>, lane: usize) -> f64 {
         row.map_or_else(|| self.group.pace(lane).accepted, |accepted| accepted[lane])
     }
 
     /// Keeps where a lane stands if it has come to a waypoint or a step before one.
-    fn keep_waypoint(&self, part: &mut Part, lane: usize, assigned: &mut Assignment) {
-        if part.waypoints.rows() == 0 {
-            return;
-        }
-        let row = self.group.row(self.plan.v.len() + self.plan.y.len() + Pace::<f64>::ACCEPTED);
-        let accepted = self.accepted(row, lane) as u64;
-        if accepted != assigned.passed {
+    fn keep_waypoint(&self, part: &mut Part, lane: usize, assigned: &mut Assignment, accepted: u64) {
+        if accepted != assigned.passed && part.waypoints.rows() > 0 {
             assigned.passed = accepted;
             waypoints::keep(&mut part.waypoints, &*self.group, lane, assigned.member, accepted);
         }
@@ -507,7 +515,6 @@ impl<'a> Worker<'a> {
                     self.group.set_state(lane, &origin);
                 }
             }
-            self.keep_waypoint(part, lane, &mut assigned);
             if !plan.jumps.is_empty() {
                 self.cross(lane, part.first + assigned.member);
             }
@@ -559,6 +566,7 @@ impl<'a> Worker<'a> {
         if !pace.holds() {
             self.group.set_pace(lane, Pace { held: 0.0, ..pace });
             self.group.attempt_by_terms(spec, lane, member);
+            self.keep_waypoint(part, lane, assigned, self.accepted(None, lane) as u64);
             return;
         }
         pace.extra = pace.target - pace.t;
