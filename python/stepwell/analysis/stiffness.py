@@ -207,7 +207,7 @@ def _hardly_moves(row: list[float], groups: list[list[int]], of_v: int, own: boo
     """
     n, count = sum(map(len, groups)), len(groups)
     first = 2 * n + engine.PACE_NUMBERS
-    if not row[2 * n + engine.COUNTS.start]:
+    if not row[2 * n + engine.COUNTS.start] > 0.0:
         return False
     relative, absolute = row[2 * n + engine.RELATIVE], row[2 * n + engine.ABSOLUTE]
     for group, places in enumerate(groups):

@@ -72,7 +72,9 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
         work=None if control is None else out.paces[engine.WORK] / engine.pushes(control, method.attempt_evaluations),
     )
     if request.record:
-        run.recorded = engine.recorded(run.system, request.record, run.dt, run.v, run.y, plan.backend)
+        from .engine.recorded import recorded  # only runs that record need it
+
+        run.recorded = recorded(run.system, request.record, run.dt, run.v, run.y, plan.backend)
     if stopped:
         run.stopped_at = np.where(out.status == 0, np.nan, sign * out.paces[engine.TIME])
     if with_events is not None:

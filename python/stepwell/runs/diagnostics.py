@@ -393,8 +393,10 @@ def _energies(run: Run, bodies: NBody, v: Array, y: Array) -> Array:
     """The energies of a state, with the same bits by the core and by NumPy."""
     if len(y) < MIN_BODIES_BY_CORE:
         return bodies.energy(v, y)
+    from .engine.recorded import recorded  # only bodies of some number need it
+
     v, y = np.broadcast_to(v, run.v.shape[1:]), np.broadcast_to(y, run.y.shape[1:])
-    energies: Array = engine.recorded(bodies, ("energy",), 1.0, v[np.newaxis], y[np.newaxis])["energy"][0]
+    energies: Array = recorded(bodies, ("energy",), 1.0, v[np.newaxis], y[np.newaxis])["energy"][0]
     return energies
 
 

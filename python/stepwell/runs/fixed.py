@@ -63,7 +63,9 @@ def fixed_run(request: Request) -> Run:
     if with_events is not None:
         with_events.write_to(run)
     if later := [name for name in request.record if name not in run.recorded]:
-        run.recorded |= engine.recorded(run.system, later, run.dt, run.v, run.y, plan.backend)
+        from .engine.recorded import recorded  # only runs that record need it
+
+        run.recorded |= recorded(run.system, later, run.dt, run.v, run.y, plan.backend)
     return run
 
 

@@ -16,7 +16,6 @@ from ..base.reprs import MAX_LINE, counted, facts, shortened
 from ..errors import UnsupportedError
 from ..model.methods import Method
 from ..model.systems import System
-from . import engine
 from .encounters import Collision, Encounter
 from .findings import Finding
 
@@ -240,10 +239,12 @@ class Run(ValueEquality):
         Raises:
             UnknownNameError: if the system has none of that name.
         """
+        from .engine.recorded import recorded  # only quantities of saved states need it
+
         name = checks.known("name", name, ("energy", *self.system.quantities))
         if name not in self.system.quantities:
             self.system.energy(self.v[-1], self.y[-1])  # raises, since there is none
-        return engine.recorded(self.system, (name,), self.dt, self.v, self.y)[name]
+        return recorded(self.system, (name,), self.dt, self.v, self.y)[name]
 
     @property
     def energy(self) -> Array:

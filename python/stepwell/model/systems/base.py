@@ -15,12 +15,12 @@ from ...base.immutable import Immutable, ValueEquality, changed
 from ...base.reprs import MAX_LINE, facts, shortened
 from ...errors import ArgumentError, DTypeError, UnsupportedError
 from ...reference.around import ORDER, Bound, wrapped
-from ...reference.quantities import Quantity
 from ..around import FORCE, Force, Part
 from ..inputs import Sampled
 from ..parameters import CoreParameters, flat, of_shape
 
 if TYPE_CHECKING:
+    from ...reference.quantities import Quantity
     from ..controls import AnyControl, ConstraintControl, EnergyControl, Projection
     from ..inputs import Input
     from ..methods import Method

@@ -138,10 +138,10 @@ def run(
             there, at_target = np.zeros(pace.t.shape, dtype=bool), (np.full(v.shape, np.nan), np.full(y.shape, np.nan))
             while True:
                 while pace.outlook(budget).runs.any():
-                    accepted, before = pace.accepted, (v, y)
+                    accepted = pace.accepted
                     pace, v, y = attempt(pace, budget, v, y)
                     if waypoints is not None:
-                        passed.keep(waypoints, accepted, before, pace, v, y)
+                        passed.keep(waypoints, accepted, pace, v, y)
                     if every and (due := (pace.accepted > accepted) & (pace.accepted % every == 0.0)).any():
                         steps.append((due, pace.t, v, y))
                     if jumps is not None:

@@ -53,7 +53,6 @@ from .adaptive import (
 from .direct import to_slot
 from .forms import advance
 from .plan import Arrays, Outcome, Plan, Watched, model, pushes
-from .recorded import recorded
 
 __all__ = [
     "ABSOLUTE",
@@ -101,7 +100,6 @@ __all__ = [
     "paces",
     "pacing_of_core",
     "pushes",
-    "recorded",
     "to_slot",
 ]
 

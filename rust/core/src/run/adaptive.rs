@@ -219,6 +219,8 @@ impl Assignment {
 struct Worker<'a> {
     plan: &'a AdaptiveRun<'a>,
     group: Box<dyn AdaptiveBatch>,
+    /// Fewer attempts bring no lane to its next waypoint, or to a step before one.
+    attempts_to_waypoint: usize,
 }
 
 impl<'a> Worker<'a> {
@@ -227,7 +229,7 @@ impl<'a> Worker<'a> {
         let machine = Machine { threads, ..plan.machine };
         let mut group = plan.model.adaptive(traced, machine, plan.members, plan.budget as f64)?;
         group.set_stop_flag(stop);
-        Ok(Worker { plan, group })
+        Ok(Worker { plan, group, attempts_to_waypoint: 1 })
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
@@ -311,20 +313,28 @@ impl<'a> Worker<'a> {
         }
         let mut left = attempts;
         while left > 0 {
-            let row = self.accepted_of_lanes();
-            let taken = assignments.iter().enumerate().filter(|(_, assigned)| assigned.is_some());
-            let next = taken.map(|(lane, _)| waypoints::steps_to_next(self.accepted(row, lane))).min();
-            let next = next.unwrap_or(left).min(left);
+            let next = left.min(self.attempts_to_waypoint);
             self.group.attempt(next);
             left -= next;
-            let row = self.accepted_of_lanes();
-            for (lane, assigned) in assignments.iter_mut().enumerate() {
-                if let Some(assigned) = assigned {
-                    // An extra step accepts none, so the state of a lane that has accepted one is that of the run.
-                    self.keep_waypoint(part, lane, assigned, self.accepted(row, lane) as u64);
-                }
+            self.attempts_to_waypoint -= next;
+            if self.attempts_to_waypoint == 0 {
+                self.attempts_to_waypoint = self.keep_waypoints(part, assignments);
             }
         }
+    }
+
+    /// Keeps where lanes stand that have come to a waypoint or a step before one; after how many attempts the next one may.
+    fn keep_waypoints(&self, part: &mut Part, assignments: &mut [Option<Assignment>]) -> usize {
+        let (row, mut next) = (self.accepted_of_lanes(), usize::MAX);
+        for (lane, assigned) in assignments.iter_mut().enumerate() {
+            if let Some(assigned) = assigned {
+                let accepted = self.accepted(row, lane);
+                // An extra step accepts none, so the state of a lane that has accepted one is that of the run.
+                self.keep_waypoint(part, lane, assigned, accepted as u64);
+                next = next.min(waypoints::steps_to_next(accepted));
+            }
+        }
+        next
     }
 
     /// How many steps all lanes have accepted, if they stand side by side.
@@ -485,6 +495,7 @@ impl<'a> Worker<'a> {
         self.group.set_scales(lane, &scales);
         let before = &plan.jumps[..plan.jumps.len() / 2];
         let next = before.get(before.partition_point(|row| row.at(at) <= pace.t));
+        self.attempts_to_waypoint = self.attempts_to_waypoint.min(waypoints::steps_to_next(pace.accepted));
         self.group.set_pace(lane, Pace { target: pace.t, wall: next.map_or(f64::INFINITY, |row| row.at(at)), ..pace });
         Assignment {
             accepted: pace.accepted,
@@ -566,7 +577,9 @@ impl<'a> Worker<'a> {
         if !pace.holds() {
             self.group.set_pace(lane, Pace { held: 0.0, ..pace });
             self.group.attempt_by_terms(spec, lane, member);
-            self.keep_waypoint(part, lane, assigned, self.accepted(None, lane) as u64);
+            let accepted = self.accepted(None, lane);
+            self.keep_waypoint(part, lane, assigned, accepted as u64);
+            self.attempts_to_waypoint = self.attempts_to_waypoint.min(waypoints::steps_to_next(accepted));
             return;
         }
         pace.extra = pace.target - pace.t;
