@@ -22,8 +22,7 @@ use crate::{
 /// What the core knows of it. Given: the whole numbers `n`, of particles, and `dim`; the lists `pairs`, both ends of each spring,
 /// and `fixed`, particles; `masses` and `drag` of the particles, `stiffness`, `rest` and `damping` of the springs, each one or
 /// one for all; `gravity`, a vector.
-pub const KIND: Kind =
-    Kind { name: "springs", shape, velocity_term, quantities, controllable: true, operations, make };
+pub const KIND: Kind = Kind { name: "springs", shape, velocity_term, quantities, controllable: true, operations, make };
 
 fn shape(signature: &Signature) -> Result<Shape, Error> {
     let (n, dim, ends) = (signature.whole("n"), signature.whole("dim"), signature.list("pairs"));
