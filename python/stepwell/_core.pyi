@@ -31,6 +31,7 @@ __all__ = [
     "listen",
     "operations",
     "program",
+    "recorded",
     "run",
     "series_evaluations",
     "sound",
