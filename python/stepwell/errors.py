@@ -109,8 +109,8 @@ class StiffnessWarning(UserWarning):
         >>> with warnings.catch_warnings(record=True) as caught:
         ...     warnings.simplefilter("always", sw.StiffnessWarning)
         ...     run = sw.integrate(stiff, "merson", y=np.ones(2), tolerance=1e-6, at=[5.0])
-        >>> str(caught[0].message)[:73]
-        'stability, and not the tolerance, held down the steps of the run: at t = '
+        >>> str(caught[0].message).partition(":")[0]
+        'stability, and not the tolerance, held down the steps of the run'
     """
 
 
