@@ -50,7 +50,11 @@ class TookLongError(Exception):
 def wrong(call: Callable[..., Any], options: dict[str, Any], argument: str, make: Callable[[], Any]) -> str | None:
     """What is wrong with how a call treats something strange, or None."""
 
+    calls = True
+
     def enough(_: int, frame: Any) -> None:
+        if not calls:  # the time was over as the call ended
+            return
         while frame is not None:
             if "hypothesis" in frame.f_code.co_filename:  # its callback within a collection of garbage: no place to raise from
                 signal.setitimer(signal.ITIMER_REAL, 0.01)
@@ -65,7 +69,7 @@ def wrong(call: Callable[..., Any], options: dict[str, Any], argument: str, make
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            for kind in (sw.DivergenceWarning, sw.ToleranceWarning, sw.ControlWarning, sw.AccuracyWarning):
+            for kind in (sw.DivergenceWarning, sw.ToleranceWarning, sw.ControlWarning, sw.AccuracyWarning, sw.StiffnessWarning):
                 warnings.simplefilter("ignore", kind)
             call(**options | {argument: value})
     except TookLongError:
@@ -81,6 +85,7 @@ def wrong(call: Callable[..., Any], options: dict[str, Any], argument: str, make
     except BaseException as error:  # a panic of the core is no Exception
         return f"{type(error).__name__}: {str(error)[:200]}"
     finally:
+        calls = False
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
     return None
