@@ -60,7 +60,7 @@ def names() -> str:
     return table(head, rows)
 
 
-def asks() -> str:
+def requirements() -> str:
     """What each method asks of a system, when it checks it, and what it carries."""
     head = "name", "asks for", "rates at (of a step)", "carries", "starts"
     return table(
@@ -112,7 +112,7 @@ def deviations() -> str:
 
 
 def operations() -> str:
-    """What a step of the undamped oscillator takes."""
+    """The operations of a step of the undamped oscillator."""
     head = "method", "additions", "products", "quotients", "roots", "function evaluations"
     rows = []
     for c in sw.criteria():
@@ -129,7 +129,9 @@ def paper() -> str:
         entries = sw.paper.entries(section)
         columns = [(entry.kind, entry.says, entry.corrected or "—", entry.here, entry.run().numbers) for entry in entries]
         rows = [[cell.replace("|", "\\|") for cell in row] for row in columns]
-        parts.append(f"## {section}\n\n" + table(("what", "the document says", "right instead", "here", "found"), rows))
+        parts.append(
+            f"## {section}\n\n" + table(("kind", "statement of the document", "correction", "in stepwell", "numbers"), rows)
+        )
     return "\n" + "\n".join(parts) + "\n"
 
 
@@ -155,7 +157,7 @@ TABLES = {
     "paper": paper,
     "methods": methods,
     "names": names,
-    "asks": asks,
+    "asks": requirements,
     "criteria": criteria,
     "deviations": deviations,
     "operations": operations,

@@ -32,7 +32,7 @@ def test_words_that_make_no_command_end_with_2(capsys, words):
     with pytest.raises(SystemExit) as end:
         cli.main(words)
     assert end.value.code == 2
-    assert capsys.readouterr().err.endswith(" --help says what it takes.\n")
+    assert capsys.readouterr().err.endswith(" --help lists the options.\n")
 
 
 def test_without_a_word_the_commands_are_listed_in_one_line_each(capsys):

@@ -36,7 +36,7 @@ from support.commands import run_command
         (["criteria", "-o", "criteria.txt"], "-o: expected a file ending in .json or .md"),
         (["stability", "rk5", "-o", "out"], "did you mean 'rk4'?"),
         (["stability", "--charts", "locus", "-o", "out"], "--charts: there is no 'locus'; did you mean 'loci'?"),
-        (["stability", "--charts", "loci"], "-o: expected a folder for what --charts asks for"),
+        (["stability", "--charts", "loci"], "-o: expected a folder for the charts of --charts, got none"),
         (["stability", "--phi", "0", "-o", "out"], "--phi: expected numbers above zero in rad"),
         (["figures", "rk5", "-o", "out"], "did you mean 'rk4'?"),
         (["figures", "--phi", "0", "-o", "out"], "phi: expected numbers above zero in rad"),
@@ -121,7 +121,7 @@ def test_a_reader_who_leaves_early_is_no_error():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("run", "clover"), "stepwell run: still needed: --method\n"),
+        (("run", "clover"), "stepwell run: missing: --method\n"),
         (("run", "clover", "--method", "rk4", "--dt", "abc"), "stepwell run: --dt: expected a number, got 'abc'\n"),
         (("run", "clover", "--method", "rk4", "--steps", "1.5"), "stepwell run: --steps: expected a whole number, got '1.5'\n"),
         (("run", "clover", "--method", "rk4", "--steps", "many"), "stepwell run: --steps: expected a whole number, got 'many'\n"),
@@ -132,7 +132,7 @@ def test_words_that_are_not_understood_say_what_was_expected(words, message, cap
     with pytest.raises(SystemExit) as end:
         cli.main(words)
     assert end.value.code == 2
-    assert capsys.readouterr().err == f"{message}stepwell run --help says what it takes.\n"
+    assert capsys.readouterr().err == f"{message}stepwell run --help lists the options.\n"
 
 
 def test_a_command_that_is_not_there_is_told_with_the_nearest(capsys):

@@ -285,7 +285,7 @@ def test_what_does_not_go_together_is_refused() -> None:
         sw.integrate(round_a_ball, "dop853", **paced | {"y": [[1.0, 0.0]]})
     with pytest.raises(UnsupportedError, match=r"control: .* meets surfaces"):
         sw.integrate(sw.NBody(floor=sw.Floor()), "rk4", v=0.0, y=np.eye(3)[:, :2], dt=0.1, steps=1, control=sw.Projection())
-    with pytest.raises(ArgumentError, match=r"restitution: expected numbers of 0 to 1, got 1.5"):
+    with pytest.raises(ArgumentError, match=r"restitution: expected numbers from 0 to 1, got 1.5"):
         sw.Floor(restitution=1.5)
     with pytest.raises(ArgumentError, match="omega: expected the frequency of the spring, got None"):
         sw.Floor(way="spring")

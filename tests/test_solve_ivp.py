@@ -193,7 +193,7 @@ def test_sol_is_refused_outside_its_steps() -> None:
     assert result.sol([]).shape == (2, 0)
     assert (result.sol.t_min, result.sol.t_max) == (0.0, 1.0)
     for wrong in (-1e-9, 1.0 + 1e-9, [0.5, 2.0]):
-        with pytest.raises(ArgumentError, match="t: expected times from 0 to 1, between which there are steps"):
+        with pytest.raises(ArgumentError, match="t: expected times within the solution, from 0 to 1, got"):
             result.sol(wrong)
     with pytest.raises(ShapeError, match="t: expected a time, or times along one axis"):
         result.sol([[0.5]])

@@ -288,7 +288,7 @@ def test_what_cannot_travel_is_told() -> None:
 
     with (
         ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool,
-        pytest.raises((ArgumentError, RuntimeError), match=r"engine: system and outcomes go to other processes by pickle|shared"),
+        pytest.raises((ArgumentError, RuntimeError), match=r"engine: the system and the outcomes must be pickled|shared"),
     ):
         small(engine=pool, outcomes=locked)
 

@@ -26,13 +26,13 @@ FAILURES = {
 
 
 class Trajectory:
-    """One trajectory, stepped one step at a time; the time of the system grows, whatever the direction of the user's.
+    """One trajectory, advanced step by step. The time of the system grows even if the user integrates backward.
 
     Attributes:
         times: the start and the ends of the accepted steps.
         states: the states at these times.
         pace: the state of the step-size controller.
-        status: the status of the core: ``adaptive.OK`` when the end was reached, ``adaptive.BUDGET`` before.
+        status: the status of the core: ``adaptive.OK`` at the end, ``adaptive.BUDGET`` before it.
         extra_steps: the number of extra steps for states between the ends of steps.
     """
 
@@ -54,7 +54,7 @@ class Trajectory:
         self.extra_steps = 0
 
     def limited(self, first_step: float | None, max_step: float) -> None:
-        """Set the step to try first, and the longest."""
+        """Set the first trial step and the longest step."""
         first = self.pace.h if first_step is None else np.asarray(first_step)
         self.pace = self.pace._replace(h=np.minimum(first, max_step), most_step=np.asarray(max_step))
 
@@ -65,7 +65,7 @@ class Trajectory:
         return self._method.attempt_evaluations * (int(attempts) + self.extra_steps)
 
     def advance(self) -> bool:
-        """Make one step, with as many attempts as needed; returns whether a step was made."""
+        """Make one accepted step, by as many attempts as it takes. Return whether there was one."""
         while self.status == adaptive.BUDGET:
             accepted = float(self.pace.accepted)
             attempts = int(accepted + self.pace.rejected) + 1
@@ -80,8 +80,8 @@ class Trajectory:
                 return True
         return False
 
-    def straight_to_the_end(self, times: Array) -> Array:
-        """The states at ascending times up to the end, as many as were reached."""
+    def advance_to_the_end(self, times: Array) -> Array:
+        """Continue to the end; return the states at these ascending times, up to the last one reached."""
         saved, _ = self._continued(self.pace, self.states[-1], times, MAX_ATTEMPTS)
         return saved[: len(times) if self.status == adaptive.OK else int((times <= float(self.pace.t)).sum())]
 
@@ -120,7 +120,7 @@ class Trajectory:
         return saved
 
     def _continued(self, pace: Any, y: Array, times: Array, attempts: int) -> tuple[Array, Array]:
-        """Step on from a pace and a state; returns the states at these times, and the last state."""
+        """Continue from a state of the controller and a state; return the states at these times, and the last state."""
         n = len(y)
         saved_v, saved_y = np.empty((len(times), 0)), np.empty((len(times), n))
         last, status = np.empty((n, 1)), np.empty(1, dtype=np.int64)
@@ -159,7 +159,7 @@ class Solution:
             raise ShapeError(f"t: expected a time, or times along one axis, got shape {times.shape}")
         if times.size and not (self.t_min <= times.min() and times.max() <= self.t_max):
             raise ArgumentError(
-                f"t: expected times from {self.t_min:g} to {self.t_max:g}, between which there are steps, got {times.min():g} to "
+                f"t: expected times within the solution, from {self.t_min:g} to {self.t_max:g}, got {times.min():g} to "
                 f"{times.max():g}"
             )
         states = self._trajectory.at(self._sign * times.reshape(-1))

@@ -127,7 +127,7 @@ def solve_ivp(
         ``message`` and ``success``.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
         TraceError: if an operation of ``fun`` cannot be traced.
         UnknownNameError: if there is no such method; for a method of SciPy that stepwell lacks, it says what to write.
 
@@ -168,7 +168,7 @@ def solve_ivp(
     if times is not None and noted is None and not dense_output and end != begin:
         wanted = sign * times
         output = wanted if len(wanted) and wanted[-1] == trajectory.end else np.append(wanted, trajectory.end)
-        states = trajectory.straight_to_the_end(output)[: len(times)].T
+        states = trajectory.advance_to_the_end(output)[: len(times)].T
         return _result(trajectory, None, times[: states.shape[1]], np.ascontiguousarray(states), None, None)
 
     ended = _advanced(trajectory, noted, sign) if end != begin else None

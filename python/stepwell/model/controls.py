@@ -52,7 +52,7 @@ class EnergyControl(OfEnergy):
         target: the energy to keep; that of the start if None. Broadcasts.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> bodies = sw.scenes.energy_control()
@@ -129,7 +129,7 @@ class Control(Immutable, ValueEquality):
         target: the value to keep; that of the start if None. Broadcasts.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> @sw.system
@@ -268,7 +268,7 @@ class Projection(OfEnergy):
         target: the energy to keep; that of the start if None. Broadcasts over the batch.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> bodies = sw.scenes.energy_control()

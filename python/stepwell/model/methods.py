@@ -19,16 +19,16 @@ STABLE_FAMILIES = ("Rosenbrock",)
 
 
 class Steps(Protocol):
-    """The functions of a file in ``reference/steppers``; only a method with a carry has ``start`` and ``finish``."""
+    """The interface of a module in ``reference/steppers``. Only a method with a carry has ``start`` and ``finish``."""
 
     def step(self, s: Scaled, t: float, h: float, v: Array, y: Array, /) -> Blocks:
-        """One step."""
+        """Make one step."""
 
     def start(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
-        """The carry, in place of v."""
+        """Compute the carry, which replaces v, from the first state."""
 
     def finish(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
-        """The velocity from the carry."""
+        """Compute v from the carry."""
 
 
 class Method(Immutable):
@@ -59,7 +59,7 @@ class Method(Immutable):
     attempt_evaluations: int
     #: The family of methods to which it belongs.
     family: str
-    #: Whether its steps sum the Taylor series of the solution; with a tolerance it then takes the order that needs least work.
+    #: Whether its steps sum the Taylor series of the solution. With a tolerance it then chooses the order that costs least.
     has_series: bool
     #: The undamped oscillator is stable for Φ = ω₀·dt below this limit; 0 means never.
     limit: float
@@ -91,7 +91,7 @@ class Method(Immutable):
         return "it is that of the core; another method is chosen by its name, stepwell.method(name)"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Each name has one object, which a copy or an unpickled method is."""
+        """Copies and unpickled methods are the one object of that name."""
         return method, (self.name,)
 
     @property
@@ -100,7 +100,7 @@ class Method(Immutable):
         return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))
 
     def start_choice(self, start: str | None) -> int:
-        """The number that the core has for a start."""
+        """The number of a start in the core."""
         if start is None:
             return 0
         if not self.starts:
@@ -151,7 +151,7 @@ class Method(Immutable):
 
 
 def _section(method: Method) -> int:
-    """The number of the document's section, 99 without one."""
+    """The number of the document's section; 99 for a method that is not in the document."""
     number = re.search(r"\d+", method.section)
     return int(number[0]) if number else 99
 
@@ -198,15 +198,15 @@ def method(name: str | Method) -> Method:
     """The method of that name.
 
     Args:
-        name: its name, or any other of its record, in any spelling: ``"false_euler"``, ``"symplectic Euler"`` or
+        name: its name or another name in its record, in any spelling: ``"false_euler"``, ``"symplectic Euler"`` or
             ``"Euler-Cromer"``.
 
     Returns:
         The ``Method``, with its record.
 
     Raises:
-        UnknownNameError: if there is none, or more than one. The message names the nearest; of the name of another method that is
-            easily confused with one of these (``"RK45"``), it says what that is.
+        UnknownNameError: if no method or more than one has that name. The message suggests the nearest; it explains the name of a
+            method that is easily confused with one of these, such as ``"RK45"``.
 
     Example:
         >>> sw.method("velocity Verlet").name
@@ -217,7 +217,7 @@ def method(name: str | Method) -> Method:
     if type(name) is str and (known := _catalogue().get(name)) is not None:
         return known
     if isinstance(name, str):
-        from .method_names import resolved  # other names may take their time; the import of stepwell may not
+        from .method_names import resolved  # not at the top: importing stepwell must be fast
 
         return resolved(str(name), _catalogue())
     return _catalogue()[checks.known("method", name, _catalogue())]

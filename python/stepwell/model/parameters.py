@@ -1,4 +1,4 @@
-"""Parameters by name: arrays (axes of their own first, then those of the batch), signals and strings, and their other forms."""
+"""Parameters by name (arrays, signals, strings), converted for the core. An array has its own axes before those of the batch."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ CONTIGUOUS = (8,)
 
 
 def flat(parameters: dict[str, Any], batch: Shape) -> CoreParameters:
-    """Parameters as the core takes them: None is left out, and a list becomes its length and its elements."""
+    """Parameters as the core takes them: without those that are None, and with a list as its length and its elements."""
     entries: CoreParameters = []
     for name, value in parameters.items():
         if value is None:
             continue
-        if type(value) is np.ndarray:  # the most frequent case, and the others take longer to recognise
+        if type(value) is np.ndarray:  # first, because it is the most frequent case and quick to test
             entries.append((name, rows(value, batch)))
             continue
         match value:
@@ -74,7 +74,7 @@ def aligned(values: Array, own: int, batch: Shape) -> Array:
 
 
 def in_a_row(values: Array, batch: Shape, own: int | None = None) -> Array:
-    """Numbers with one batch axis after their own: over all members, or of length 1 if all members share them."""
+    """Numbers with a single batch axis after their own; its length is that of the batch, or 1 if all members share them."""
     own = max(0, values.ndim - len(batch)) if own is None else own
     over = values.shape[own:]
     if is_common(values, own):
@@ -83,16 +83,16 @@ def in_a_row(values: Array, batch: Shape, own: int | None = None) -> Array:
 
 
 def of_shape(parameters: dict[str, Any], batch: Shape) -> dict[str, Any]:
-    """Parameters with one batch axis, reshaped for a batch whose last axis that is."""
+    """Parameters with a single batch axis, reshaped for a batch whose last axis it is."""
     if len(batch) == 1:
         return parameters
     return with_numbers(parameters, lambda values, own: values.reshape((*values.shape[:-1], *(1,) * (len(batch) - 1), -1)))
 
 
 def with_numbers(parameters: dict[str, Any], change: Callable[[Array, int | None], Array]) -> dict[str, Any]:
-    """Parameters whose numbers are changed.
+    """Parameters with ``change`` applied to their numbers.
 
-    ``change`` takes numbers, and how many axes of their own they have: None for all axes that the batch does not have.
+    Its arguments are the numbers and the number of their own axes: None for all axes that the batch does not have.
     """
 
     def table(samples: Held) -> Held:

@@ -30,7 +30,7 @@ def from_axis_angle(axis: Any, angle: Any) -> Array:
         Unit quaternions, shape (4, …).
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> sw.quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.5 * np.pi)  # a quarter of a turn about the third axis
@@ -67,7 +67,7 @@ def product(p: Any, q: Any) -> Array:
         Quaternions, shape (4, …).
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> quarter = sw.quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.5 * np.pi)

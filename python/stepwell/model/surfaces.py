@@ -27,9 +27,9 @@ WAYS: tuple[ContactWay, ...] = ("safe", "restitution", "flip", "spring")
 
 
 class Surface(Immutable, ValueEquality, ABC):
-    """The base class of surfaces that points meet: see ``Floor`` and ``Sphere``."""
+    """The base class of ``Floor`` and ``Sphere``."""
 
-    #: The kind of surface, and the names of its arguments besides those of every surface.
+    #: The kind of the surface in the core, and the names of the arguments that only this kind has.
     kind: ClassVar[str]
     own: ClassVar[tuple[str, ...]]
 
@@ -37,7 +37,7 @@ class Surface(Immutable, ValueEquality, ABC):
         self.way = checks.known("way", way, WAYS)
         self.restitution = checks.not_negative("restitution", restitution)
         if (self.restitution > 1.0).any():
-            raise ArgumentError(f"restitution: expected numbers of 0 to 1, got {self.restitution.max():g}")
+            raise ArgumentError(f"restitution: expected numbers from 0 to 1, got {self.restitution.max():g}")
         self.friction = None if friction is None else checks.not_negative("friction", friction)
         self.omega = None if omega is None else checks.numbers("omega", omega, positive=True, unit="rad per unit of time")
         springs = way == "spring"
@@ -54,7 +54,7 @@ class Surface(Immutable, ValueEquality, ABC):
 
     @property
     def batch(self) -> Shape:
-        """The shape to which its numbers broadcast."""
+        """The batch shape of its parameters."""
         numbers = {"restitution": self.restitution, "friction": self.friction, "omega": self.omega}
         shapes = {name: each.shape for name, each in numbers.items() if each is not None}
         return checks.batch_shape(shapes | self._shapes())
@@ -66,14 +66,14 @@ class Surface(Immutable, ValueEquality, ABC):
     @property
     @abstractmethod
     def dim(self) -> int | None:
-        """The number of its dimensions; None if it fits any."""
+        """The number of dimensions; None if the surface fits any."""
 
     @abstractmethod
     def place(self, dim: int) -> dict[str, Any]:
-        """The parameters of its place by name, for so many dimensions; vectors have their components along the first axis."""
+        """The parameters of its geometry by name, in ``dim`` dimensions. Vectors have their components along the first axis."""
 
     def parameters(self, dim: int) -> dict[str, Any]:
-        """Its parameters by name, for so many dimensions."""
+        """Its parameters by name, in ``dim`` dimensions."""
         common: dict[str, Any] = {"way": self.way}
         if self.way == "spring":
             common["omega"] = self.omega
@@ -113,14 +113,14 @@ class Floor(Surface):
     Args:
         restitution: e, the velocity after an impact divided by that before it, 0 to 1, without a unit; broadcasts over the batch.
         friction: Coulomb's coefficient μ, without a unit, zero or more; broadcasts. None leaves the term out.
-        normal: a vector out of the floor, of any length, shape (dim,) or (dim, *batch); the last axis if None.
+        normal: a vector that points out of the floor, of any length, shape (dim,) or (dim, *batch); the last axis if None.
         offset: distance of the plane from the origin along the normal, in units of length; broadcasts. Without ``normal`` it is
             the height of the floor.
-        way: one of the table.
+        way: how points bounce; see the table.
         omega: ω of the spring in rad per unit of time, its stiffness per mass being ω²; with ``way="spring"`` only. Broadcasts.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> sw.Particles(floor=sw.Floor(restitution=0.8))
@@ -166,14 +166,14 @@ class Sphere(Surface):
     Args:
         centre: shape (dim,) or (dim, *batch), in units of length.
         radius: in units of length, above zero; broadcasts over the batch.
-        inside: whether points are inside.
+        inside: whether points stay inside.
         restitution: e, as of ``Floor``.
         friction: Coulomb's coefficient, as of ``Floor``.
         way: the way of contact, as of ``Floor``.
         omega: ω of the spring, as of ``Floor``.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> sw.Particles(floor=sw.Sphere((0.0, 0.0), 1.0, inside=True))
@@ -227,7 +227,7 @@ def _vector(argument: str, value: Any) -> Array:
 
 
 def _unit(vector: Array) -> Array:
-    """The vector of length 1 in the direction of another."""
+    """The unit vector in a direction."""
     size = np.abs(vector).max(axis=0)
     if not (size > 0.0).all():
         raise ArgumentError("normal: expected a vector with a direction, got one of length 0")
@@ -249,11 +249,11 @@ class Surfaces(Part):
 
     @property
     def batch(self) -> Shape:
-        """The shape to which the numbers of all broadcast."""
+        """The batch shape of the parameters of all surfaces."""
         return checks.batch_shape(batches(self.surfaces))
 
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
-        """The number of surfaces, and for each its kind, its way and its numbers."""
+        """The number of surfaces, and the kind, way and numbers of each."""
         parameters: dict[str, Any] = {"contacts": len(self.surfaces)}
         for i, surface in enumerate(self.surfaces):
             parameters[f"contact_{i}"] = surface.kind
@@ -262,7 +262,7 @@ class Surfaces(Part):
         return parameters
 
     def own_axes(self, name: str) -> int:
-        """One for vectors, else none."""
+        """1 for vectors, 0 for other parameters."""
         return 1 if name.endswith(VECTORS) else 0
 
     def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> contact.Touching:
@@ -290,15 +290,15 @@ def floors(argument: Any) -> tuple[Surface, ...]:
 
 
 def around(surfaces: tuple[Surface, ...]) -> tuple[Part, ...]:
-    """The parts around a system that surfaces make: none without surfaces."""
+    """The surfaces as a part around a system; empty without surfaces."""
     return (Surfaces(surfaces),) if surfaces else ()
 
 
 def batches(surfaces: tuple[Surface, ...]) -> dict[str, Shape]:
-    """The batch shapes of surfaces by their names."""
+    """The batch shape of each surface, by the name that messages use."""
     return {f"floor {i}": surface.batch for i, surface in enumerate(surfaces)}
 
 
 def dimensions(surfaces: tuple[Surface, ...]) -> dict[str, int]:
-    """The numbers of dimensions of surfaces by their names, without those that fit any."""
+    """The number of dimensions of each surface, by the name that messages use. Surfaces that fit any are left out."""
     return {f"floor {i}": surface.dim for i, surface in enumerate(surfaces) if surface.dim is not None}

@@ -1,7 +1,7 @@
-"""Operations on numbers that a step needs beside arithmetic: comparisons, choices, roots, operations on bits.
+"""Operations of a step beside arithmetic: comparisons, selections, roots, operations on bits.
 
-Each takes numbers, NumPy's arrays, symbols of a tape, and arrays of symbols. On numbers NumPy does it; symbols, and whatever else
-stands in an array of objects, do it themselves. So what a step executes has no ``if`` on a number, and takes all this from here.
+Each takes numbers, NumPy's arrays, symbols of a tape, and arrays of symbols. NumPy computes those of numbers; symbols, and other
+objects in an array, have methods for them. A step uses these functions in place of ``if``, which symbols do not allow.
 """
 
 from __future__ import annotations
@@ -13,25 +13,25 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-#: Of a number's bits: its sign, and all others. A tape of float32 has its own in their place.
+#: Masks of the bits of a number: its sign, and all others. Tapes of float32 have their own.
 SIGN, NOT_SIGN = 1 << 63, (1 << 63) - 1
 
 
 class Precision:
-    """Numbers of one size and their bits.
+    """The floating-point format of a precision.
 
     Attributes:
-        number: NumPy's type of them.
-        bits: NumPy's type of a whole number of as many bits.
-        fraction_bits: how many of the lowest bits are the fraction. Those of the exponent are above them.
-        sign_place: which bit is the sign.
-        all_bits: what is true as a number: all bits are set.
-        upper_half: all bits but the lower half of the digits. A product of two numbers that are cut to these is exact.
-        bias: the exponent's bits of 1.
+        number: NumPy's type of the numbers.
+        bits: NumPy's type of a whole number with as many bits.
+        fraction_bits: the number of bits of the fraction, which are the lowest; the exponent is above them.
+        sign_place: the position of the sign bit.
+        all_bits: the number with all bits set, which stands for true.
+        upper_half: a mask of all bits but the lower half of the digits. A product of two numbers cut by it is exact.
+        bias: the exponent bits of 1.
         lowest_bit: the number with only the lowest bit set.
         least_normal: the least normal number above zero.
-        first_whole: from here to its double the low bits of a number hold a whole number.
-        magic: a number added to this is rounded to a whole one, which then stands in the low bits.
+        first_whole: in numbers from this one to its double the low bits hold a whole number.
+        magic: adding a number to this one rounds it to a whole number, which is then in the low bits.
     """
 
     def __init__(self, number: type, bits: type, fraction_bits: int, formats: tuple[str, str]) -> None:
@@ -55,11 +55,11 @@ class Precision:
         return np.asarray(bits, dtype=self.bits).view(self.number)
 
     def mask(self, truth: Any) -> Any:
-        """All bits where it is true, none elsewhere."""
+        """All bits set where the condition is true, none elsewhere."""
         return self.number_of(np.where(truth, self.bits(self.all_bits), self.bits(0)))
 
     def pattern(self, x: float) -> int:
-        """The bits of one number, which is rounded to this size."""
+        """The bits of one number, rounded to this precision."""
         bits: int = struct.unpack(self._formats[1], struct.pack(self._formats[0], x))[0]
         return bits
 
@@ -76,13 +76,13 @@ T = TypeVar("T")
 
 
 class PerPrecision(NamedTuple, Generic[T]):
-    """What is different for numbers of 64 bits and of 32."""
+    """A pair of values, for float64 and for float32."""
 
     double: T
     single: T
 
     def of(self, x: Any) -> T:
-        """That of the precision of these numbers or symbols."""
+        """The value for the precision of these numbers or symbols."""
         return self.single if is_single(x) else self.double
 
 
@@ -95,7 +95,7 @@ def is_symbol(x: Any) -> bool:
 
 
 def is_single(x: Any) -> bool:
-    """Whether these are symbols of a tape of float32."""
+    """Whether these are symbols on a tape of float32."""
     if not isinstance(x, np.ndarray):
         return bool(getattr(x, "single", False))
     return x.dtype == object and any(getattr(each, "single", False) for each in x.flat)
@@ -106,7 +106,7 @@ def _objects(*values: Any) -> bool:
 
 
 def _call(method: str, x: Any, *others: Any) -> Any:
-    """A method of every element."""
+    """Call a method of each element."""
     if is_symbol(x) and not any(isinstance(each, np.ndarray) for each in others):
         return getattr(x, method)(*others)
     return np.frompyfunc(lambda each, *rest: getattr(each, method)(*rest), 1 + len(others), 1)(x, *others)
@@ -128,12 +128,12 @@ def equal(a: Any, b: Any) -> Any:
 
 
 def where(truth: Any, yes: Any, no: Any) -> Any:
-    """One of two numbers, chosen by a comparison."""
+    """The first number where the comparison is true, else the second."""
     return _call("choose", truth, yes, no) if _objects(truth) else np.where(truth, yes, no)
 
 
 def clamp(x: Any, least: float, most: float) -> Any:
-    """The number of these bounds that is nearest to x, or x between them; a NaN stays one."""
+    """Clamp x to these bounds; NaN stays NaN."""
     x = where(less(x, least), least, x)
     return where(less(most, x), most, x)
 
@@ -149,42 +149,42 @@ def floor(x: Any) -> Any:
 
 
 def and_bits(x: Any, bits: int) -> Any:
-    """The bits of x that a constant has too."""
+    """Bitwise and of x and a constant."""
     return _call("and_bits", x, bits) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) & np.uint64(bits))
 
 
 def or_bits(x: Any, bits: int) -> Any:
-    """The bits of x and those of a constant."""
+    """Bitwise or of x and a constant."""
     return _call("or_bits", x, bits) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) | np.uint64(bits))
 
 
 def add_bits(x: Any, whole: int) -> Any:
-    """The bits of x as a whole number, and a constant added."""
+    """The sum of the bits of x, as a whole number, and a constant."""
     return _call("add_bits", x, whole) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) + np.uint64(whole))
 
 
 def shift_up(x: Any, places: int) -> Any:
-    """The bits of x, moved up."""
+    """The bits of x shifted to higher places."""
     return _call("shift_up", x, places) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) << np.uint64(places))
 
 
 def shift_down(x: Any, places: int) -> Any:
-    """The bits of x, moved down."""
+    """The bits of x shifted to lower places."""
     return _call("shift_down", x, places) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) >> np.uint64(places))
 
 
 def either_bits(x: Any, y: Any) -> Any:
-    """The bits of x and those of y."""
+    """Bitwise or of x and y."""
     return x | y if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) | DOUBLE.bits_of(y))
 
 
 def turn_bits(x: Any, y: Any) -> Any:
-    """The bits that one of x and y has, but not both."""
+    """Bitwise exclusive or of x and y."""
     return _call("xor_bits", x, y) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) ^ DOUBLE.bits_of(y))
 
 
 def turn_sign(x: Any, y: Any) -> Any:
-    """X, its sign turned where the lowest bit of y is set."""
+    """Change the sign of x where the lowest bit of y is set."""
     if _objects(x, y):
         return _call("xor_bits", x, _call("shift_up", y, PRECISIONS.of(y).sign_place))
     return turn_bits(x, shift_up(y, 63))
@@ -196,5 +196,5 @@ def magnitude(x: Any) -> Any:
 
 
 def sign_of(x: Any) -> Any:
-    """−0 or +0, as the sign of x is."""
+    """Zero with the sign of x."""
     return and_bits(x, SIGN)

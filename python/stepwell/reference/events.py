@@ -1,4 +1,4 @@
-"""Events: changes of sign of a quantity g along a motion, and where in a step they are: the specification of both backends."""
+"""Events: changes of sign of a quantity g along a motion, located within steps. Specifies both backends."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Array, Whole
 
-#: A change of sign is located to this share of the time since the start of its step: to the roundings of a trial's length.
+#: The relative accuracy of a change of sign, of the time since the start of its step: the rounding error of a trial's length.
 SPACING = 2.0**-52
 #: It is looked for in rounds, the first down to this share of the step, in so many trials: bisection needs 48, and may be left
 #: behind by one. Each later round begins with the bracket of the last, since an event may be ever so near to the step's start.
@@ -34,7 +34,7 @@ MOST_HALVINGS = 26
 #: Of one step no more parts than this are halved at a time. A step that follows the motion has a few at most; one that is far
 #: beyond the stability limit, whose slopes say nothing of it, would else have twice as many after each halving.
 MOST_PARTS = 32
-#: The same as ``MOST_HALVINGS`` where g begins at zero and is known to leave it: a bracket begins where it has done so.
+#: As ``MOST_HALVINGS``, for steps in which g begins at zero and leaves it: a bracket begins where g is not zero any more.
 MOST_HALVINGS_FROM_ZERO = 60
 
 #: From some members and shares of their steps to g, v and y there; the axis of the members comes last.
@@ -44,18 +44,18 @@ Look = Callable[[Any, Array], tuple[Array, Array, Array, Array]]
 
 
 class Parts(NamedTuple):
-    """Parts of steps, from the share ``low`` of a step to ``high``, with what is known at both ends.
+    """Parts of steps with g, its slope and the state at their ends. Positions are shares of the step, from 0 to 1.
 
     Attributes:
-        of: the number of the step among those that are looked into.
-        low: the share of the step where the part begins.
-        high: and where it ends.
-        g_low: g there.
-        g_high: likewise.
-        slope_low: the rate of change of g there, along the motion, over the time of the whole step.
-        slope_high: likewise.
+        of: the index of the step of each part.
+        low: where the part begins.
+        high: where the part ends.
+        g_low: g at the beginning.
+        g_high: g at the end.
+        slope_low: the rate of change of g at the beginning, along the motion, times the length of the whole step.
+        slope_high: the same rate at the end.
         v: velocities at the end of the part, shape (*block, n).
-        y: coordinates there.
+        y: coordinates at the end of the part, likewise.
     """
 
     of: Whole
@@ -69,22 +69,22 @@ class Parts(NamedTuple):
     y: Array
 
     def some(self, which: Any) -> Parts:
-        """Some of them."""
+        """Select parts by indices or a mask."""
         parts: Any = (each[..., which] for each in self)
         return Parts(*parts)
 
 
 def joined(parts: Sequence[Parts]) -> Parts:
-    """All of them."""
+    """Concatenate parts."""
     return Parts(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
 
 
 def may_change(before: Array, g: Array) -> Any:
-    """In which of some steps g may change its sign, once or there and back: shape (steps, members).
+    """Whether g may change its sign in each step, once or twice: shape (steps, members).
 
     Args:
-        before: g one state before the first, NaN where it is not known, shape (members,).
-        g: its values at both ends of all steps, shape (steps + 1, members).
+        before: g at the state before the first step, NaN where it is not known, shape (members,).
+        g: its values at the ends of the steps, shape (steps + 1, members).
     """
     with np.errstate(all="ignore"):
         bend, size, above = np.empty((len(g) - 1, *g.shape[1:])), np.abs(g), g > 0.0
@@ -100,15 +100,15 @@ def may_change(before: Array, g: Array) -> Any:
 
 
 def near(g: Array, before: Array) -> Any:
-    """Whether g is so near to zero, against its change from another state, that it may be there within a step or two."""
+    """Whether g is so small against its change from another state that it may be zero within a step or two."""
     with np.errstate(all="ignore"):
         return ~(np.abs(g) > REACH * np.abs(g - before))
 
 
 def sides(parts: Parts) -> tuple[Array, Array]:
-    """The sign of g just behind the beginning of each part and just before its end: where g is zero, its slope tells.
+    """The sign of g just after the beginning of each part and just before its end; where g is zero, by its slope.
 
-    So a state at which g is 0 belongs to the step that ends there, and not to the one that begins there. NaN has no sign.
+    So a zero of g at the end of a step belongs to that step and not to the next one. NaN has no sign.
     """
     begin = np.where(parts.g_low == 0.0, np.sign(parts.slope_low), np.sign(parts.g_low))
     end = np.where(parts.g_high == 0.0, -np.sign(parts.slope_high), np.sign(parts.g_high))
@@ -116,9 +116,9 @@ def sides(parts: Parts) -> tuple[Array, Array]:
 
 
 def bends(parts: Parts) -> Any:
-    """Whether there may be more zeros in these parts than the signs at both ends say.
+    """Whether these parts may have more zeros than the signs at their ends show.
 
-    The cubic with the same values and slopes has none where its control points are on one side of zero.
+    They have none if the control points of the cubic with the same values and slopes are on one side of zero.
     """
     begin, end = sides(parts)
     third = (parts.high - parts.low) / 3.0
@@ -130,14 +130,15 @@ def bends(parts: Parts) -> Any:
 
 
 def parted(look: Look, parts: Parts) -> tuple[Parts, Whole]:
-    """The parts of steps in which g changes its sign once, ascending in each step, and those steps whose start g cannot leave.
+    """Divide steps into parts in which g changes its sign once.
 
     Args:
         look: g, its slope and the state at a share of these steps.
         parts: whole steps.
 
     Returns:
-        Those parts, at whose end g may be 0; and the steps at whose start g is zero and returns to it within roundings.
+        The parts with a change of sign, ascending in each step (g may be 0 at their ends); and the steps at whose start g is zero
+        and returns to zero within rounding errors.
     """
     brackets, stuck = [], np.zeros(0, dtype=np.int64)
     count = int(parts.of.max(initial=-1)) + 1
@@ -166,9 +167,9 @@ def parted(look: Look, parts: Parts) -> tuple[Parts, Whole]:
 
 
 def _return(parts: Parts) -> Array:
-    """Where to cut parts in which g leaves zero and returns: at first behind its return, then between both.
+    """Where to cut parts in which g leaves zero and returns: first after its return, then between both zeros.
 
-    The parabola with the same slope at zero tells, if it returns within the part; else it is the middle.
+    The return is estimated by the parabola with the same slope at zero. If it does not return within the part, cut in the middle.
     """
     width = parts.high - parts.low
     with np.errstate(all="ignore"):
@@ -178,22 +179,22 @@ def _return(parts: Parts) -> Array:
 
 
 def located(trial: Trial, low: Array, high: Array, g_low: Array, g_high: Array, v: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Where in its step g changes its sign, and the state there, which is one that is known to be at or past the change.
+    """Locate a change of sign of g in each step, and the state there, which is at or after the change.
 
     Each trial is a step of the method from the step's own start, of another length. The lengths are chosen by the ITP method
     (Oliveira and Takahashi 2020), a secant that in each round never takes more than one trial more than bisection would.
 
     Args:
-        trial: makes steps of these shares of the full ones.
-        low: the share of each step behind which the change is, shape (n,).
-        high: the share before which it is, likewise, or at which.
-        g_low: g there, likewise.
-        g_high: g there, likewise, of the other sign or 0.
-        v: velocities at the higher share, shape (*block, n).
-        y: coordinates there, likewise.
+        trial: makes steps of these shares of the full steps.
+        low: the share of each step after which the change is, shape (n,).
+        high: the share at or before which it is, likewise.
+        g_low: g at ``low``, likewise.
+        g_high: g at ``high``, of the other sign or 0, likewise.
+        v: velocities at ``high``, shape (*block, n).
+        y: coordinates at ``high``, likewise.
 
     Returns:
-        The share of each step, above 0 and at most 1, and v and y there.
+        The share of each step, above 0 and at most 1, and v and y at it.
     """
     low, high, v, y, n = low.copy(), high.copy(), v.copy(), y.copy(), len(low)
     sign = np.where(g_low < 0.0, 1.0, -1.0)
@@ -227,15 +228,15 @@ def located_alone(
     g_high: float,
     roundings: Callable[[float], float] = lambda high: SPACING * high,
 ) -> tuple[float, float]:
-    """The same of one step in Python's numbers, which take a tenth of the time: the bracket in which g changes its sign.
+    """Bracket a change of sign of g in a single step: as ``located``, but in Python's numbers, which take a tenth of the time.
 
     Args:
-        g: its value at a share of the step.
-        low: the share of the step behind which the change is.
-        high: the share before which it is, or at which.
-        g_low: g there.
-        g_high: g there, of the other sign or 0.
-        roundings: the width of a bracket that is narrow enough, by its higher end.
+        g: the function of the share of the step.
+        low: the share of the step after which the change is.
+        high: the share at or before which it is.
+        g_low: g at ``low``.
+        g_high: g at ``high``, of the other sign or 0.
+        roundings: the width at which a bracket is narrow enough, as a function of its higher end.
     """
     sign = 1.0 if g_low < 0.0 else -1.0
     g_low, g_high = sign * g_low, sign * g_high
@@ -255,7 +256,7 @@ def located_alone(
 
 
 class Arithmetic(NamedTuple):
-    """What NumPy's arrays and Python's numbers do by functions of other names."""
+    """Functions that have other names for NumPy's arrays and for Python's numbers."""
 
     where: Callable[..., Any]
     minimum: Callable[..., Any]
@@ -270,9 +271,9 @@ NUMBERS = Arithmetic(lambda condition, yes, no: yes if condition else no, min, m
 def next_trial(
     low: Any, high: Any, g_low: Any, g_high: Any, edge: Any, within: Any, unit: Any, left: Any, of: Arithmetic = ARRAYS
 ) -> Any:
-    """The next trial within brackets: the secant's, a little towards the middle, and not too far from the middle.
+    """The next trial within brackets: that of the secant, moved a little towards the middle, and not too far from the middle.
 
-    The brackets come down from ``unit`` to ``within`` in so many trials as are left; ``edge`` is by how much an end must move.
+    The remaining trials narrow the brackets from ``unit`` to ``within``; ``edge`` is the least distance from both ends.
     """
     width, middle = high - low, 0.5 * (low + high)
     with np.errstate(all="ignore") if of is ARRAYS else nullcontext():
@@ -283,4 +284,4 @@ def next_trial(
     near = of.minimum(of.maximum(near, low + edge), high - edge)
     most = of.ldexp(0.5 * within, left) - 0.5 * width
     share = of.where(abs(near - middle) <= most, near, middle - towards * most)
-    return of.where((low < share) & (share < high), share, middle)  # a trial at an end would change nothing
+    return of.where((low < share) & (share < high), share, middle)  # a trial at an end of the bracket would not narrow it

@@ -1,4 +1,4 @@
-"""Runs with steps of one length."""
+"""Runs with fixed steps."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .result import Run
 
 
 def fixed_run(request: Request) -> Run:
-    """Make the run, without its diagnostics."""
+    """Compute the run, without its diagnostics."""
     plan, v, y, carried, method = request.plan, request.v, request.y, request.carried, request.plan.method
     make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=request.before, carried=carried)
     with_events = None
     if request.events is not None:
-        from .events import driver  # only such runs need it
+        from .events import driver  # imported late: only runs with events need it
 
         with_events = driver.Run(request.events, v, y, request.before, carried)
         make = with_events.advance
@@ -63,14 +63,14 @@ def fixed_run(request: Request) -> Run:
     if with_events is not None:
         with_events.write_to(run)
     if later := [name for name in request.record if name not in run.recorded]:
-        from .engine.recorded import recorded  # only runs that record need it
+        from .engine.recorded import recorded  # imported late: only runs that record need it
 
         run.recorded |= recorded(run.system, later, run.dt, run.v, run.y, plan.backend)
     return run
 
 
 def _times(plan: engine.Plan) -> Array:
-    """t0 + k·dt of every saved state."""
+    """The times t0 + k·dt of the saved states."""
     if plan.every is None:
         return np.array([plan.t0 + (plan.first + plan.steps) * plan.dt])
     t: Array = buffer_pool.empty((plan.save_count,))
@@ -79,6 +79,6 @@ def _times(plan: engine.Plan) -> Array:
 
 
 def _small_copy(array: Array) -> Array:
-    """A copy of the array that this one was broadcast from, broadcast again."""
+    """A copy that is as small in memory: the array before it was broadcast is copied, and broadcast again."""
     own = checks.once_of(array).copy()
     return own if own.shape == array.shape else np.broadcast_to(own, array.shape)

@@ -1,4 +1,4 @@
-//! The tape: what it makes of expressions, as values and as text.
+//! The tape: the values and the listings of expressions.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 

@@ -43,7 +43,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         dtype: NumPy's type of the world's arrays, for ``make_world``.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
         UnsupportedError: if ``make_world`` makes arrays of another type than ``dtype``.
     """
 

@@ -136,7 +136,7 @@ def _definition(module: str, name: str) -> Any:
 
 
 def _changes(value: Any) -> bool:
-    """Whether the value of a parameter is an input or a function of the time."""
+    """Whether a parameter changes with the time: an input or a function."""
     return isinstance(value, (Sinusoid, Sampled)) or callable(value)
 
 
@@ -161,7 +161,7 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
 
 
 def _from_code(function: FunctionType, state: int) -> dict[str, Any]:
-    """Names and defaults by the code of a function; the names are cached."""
+    """The names and defaults of a function, read from its code. The names are cached."""
     code, positional, named = function.__code__, function.__defaults__ or (), function.__kwdefaults__ or {}
     key = code, len(positional), tuple(named), state
     if (names := _NAMES.get(key)) is None:
@@ -173,7 +173,7 @@ def _from_code(function: FunctionType, state: int) -> dict[str, Any]:
 
 
 def _from_signature(function: Callable[..., Any], state: int) -> dict[str, Any]:
-    """Names and defaults by ``inspect``, which is slow; raise if the arguments are not those of rates."""
+    """The names and defaults of a function by ``inspect``, which is slow. Raises an error if they are not those of rates."""
     name = function.__name__
     expected = "(t, v, y, *, …)" if state == 3 else "(t, y, *, …)"
     signature = inspect.signature(function)
@@ -225,8 +225,8 @@ def system(
         blocks: 2 for a function that returns both rates.
         shape: the shape of the state of a member, with None for a length that is open; with ``blocks=2`` a pair of shapes. If it
             is not given, it is taken from the initial state of a run: its first axes, as few as the function accepts.
-        quick_sines: sine and cosine at half the operations, as the built-in systems compute them: within a unit in the last place
-            of 1 for angles up to 10⁶ rad, while the default is within a unit in the last place of the result.
+        quick_sines: whether sine and cosine take half the operations, as in built-in systems. Their error is then below a unit in
+            the last place of 1, for angles up to 10⁶ rad; by default it is below a unit in the last place of the result.
         scale: the size to which the error of an adaptive step is relative: the largest value that each ``"component"`` has had,
             so that components may have different units; the length of each ``"row"`` along the last axis, for a state of shape
             (bodies, 3) whose directions are equivalent; or the length of each whole ``"block"``, v and y.

@@ -1,4 +1,4 @@
-"""A user's function for blocks of known shapes, as the modules that trace it see it."""
+"""The interface of a user's function for blocks of known shapes."""
 
 from typing import Any, Protocol
 
@@ -6,7 +6,7 @@ from ...base.arrays import Array, Shape
 
 
 class TracedFunction(Protocol):
-    """The part of ``trace.Equations`` that its invariants and its rates of series use.
+    """What invariants and Taylor series need of ``trace.Equations``.
 
     Attributes:
         v_shape: shape of a member's velocity block.
@@ -26,7 +26,7 @@ class TracedFunction(Protocol):
         """How many axes of its own a parameter has."""
 
     def rates(self, t: Any, v: Array, y: Array, values: dict[str, Any], /) -> tuple[Array, Array]:
-        """v̇ and ẏ."""
+        """The rates (v̇, ẏ) of a state."""
 
     def of_state(self, invariant: Any, t: Any, v: Array, y: Array, values: dict[str, Any], /) -> Any:
-        """The value of an invariant."""
+        """The value of an invariant at a state."""

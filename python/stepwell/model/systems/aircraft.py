@@ -65,7 +65,7 @@ class Aircraft(OwnSystem):
         controllers: as given.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> aircraft = sw.Aircraft(roll=30.0)
@@ -152,7 +152,7 @@ class Aircraft(OwnSystem):
             The angle in degrees, shape (times, *batch); NaN without controllers.
 
         Raises:
-            ArgumentError: what is wrong with which argument.
+            ArgumentError: if an argument is wrong.
         """
         name, times = checks.known("name", name, ("roll", "pitch")), checks.numbers("t", t, unit="units of time")
         if times.ndim != 1:
@@ -224,7 +224,7 @@ class Aircraft(OwnSystem):
             The angles, shape (3, *batch), or the quaternion of length 1, shape (4, *batch).
 
         Raises:
-            ArgumentError: what is wrong with which argument.
+            ArgumentError: if an argument is wrong.
 
         Example:
             >>> sw.Aircraft("quaternion").attitude(pitch=180.0).round(3)
@@ -248,7 +248,7 @@ class Aircraft(OwnSystem):
             Angles from −180 to 180 in place of the numbers of a state. Those of a quaternion have the pitch from −90 to 90.
 
         Raises:
-            ArgumentError: what is wrong with which argument.
+            ArgumentError: if an argument is wrong.
 
         Example:
             >>> roll, pitch, yaw = aircraft.angles(run.y[-1])
@@ -275,7 +275,7 @@ class Aircraft(OwnSystem):
             point forward, to the left and up.
 
         Raises:
-            ArgumentError: what is wrong with which argument.
+            ArgumentError: if an argument is wrong.
         """
         block, _ = self._block(y, axis)
         with np.errstate(all="ignore"):

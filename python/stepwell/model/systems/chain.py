@@ -26,7 +26,7 @@ class Chain(System):
         mass: the masses, likewise, with n (or 1) along the first axis.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> chain = sw.Chain(3, stiffness=2.0, mass=1.0)

@@ -17,7 +17,7 @@ from ..inputs import Input, Pulse, as_input
 from ..parameters import aligned
 from .base import System
 
-#: A run of many states has so many copies of A in memory: the argument, its rows, and the core's.
+#: The number of copies of A in memory during a run of many states: the argument, its rows, and the core's.
 COPIES_OF_A = 5
 
 
@@ -35,18 +35,18 @@ class LinearSystem(System):
         D: feedthrough matrix, shape (r, m, *batch); None for zero. A number is accepted for one input and one output.
         x: the inputs, a sequence of m: each a number, an array over the batch, ``Sinusoid``, ``Sampled``, or None for zero. A
             single input need not be in a sequence. None if all are zero.
-        velocities: the states in the block v: a number, for the first so many, or a sequence of indices in the order of the
-            block; the other states, in their order, are the block y. By default the first n // 2.
+        velocities: the states in the block v: their number, if they come first, or a sequence of their indices in the order of
+            the block. The other states, in their order, are the block y. By default the first n // 2 are v.
 
     Attributes:
         second_order: whether ẏ is v times a number, so that Verlet can step it if no row of v depends on v.
         input_names: ``("x",)`` for one input, ``("x[0]", "x[1]", …)`` for several.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
-        >>> mass = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], x=1.0)  # states: velocity, place
+        >>> mass = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], x=1.0)  # states: velocity, position
         >>> run = sw.integrate(mass, "rk4", v=0.0, y=0.0, dt=0.05, steps=2000)
         >>> run.y[-1].round(4)
         array([0.25])
@@ -90,7 +90,7 @@ class LinearSystem(System):
         self._find_order()
 
     def _find_order(self) -> None:
-        """Set whether ẏ is v times a number, and whether v̇ depends on v, by A and B."""
+        """Find out from A and B whether ẏ is v times a number, and whether v̇ depends on v."""
         v, y = list(self.velocities), list(self.coordinates)
         speeds, n = self.A[y][:, v], len(v)
         unit = np.eye(n).reshape(n, n, *(1,) * (self.A.ndim - 2))
@@ -115,7 +115,7 @@ class LinearSystem(System):
         return tuple(range(len(self.A)))
 
     def given_inputs(self) -> dict[str, Input]:
-        """Its inputs by name, without those that are None."""
+        """The inputs by name, without those that are None."""
         return {name: each for name, each in zip(self.input_names, self.x, strict=True) if each is not None}
 
     def without_inputs(self) -> LinearSystem:
@@ -123,7 +123,7 @@ class LinearSystem(System):
         return LinearSystem(self.A, self.B, self.C, self.D, velocities=self.velocities)
 
     def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> LinearSystem:
-        """The system with these samples as its only input."""
+        """The system with one input, these samples, and no others."""
         if name not in self.input_names:
             raise KeyError(name)
         x = [Pulse(values, interval, start) if name == each else None for each in self.input_names]
@@ -162,7 +162,7 @@ class LinearSystem(System):
         """The blocks (v, y) of a state in the order of A, shape (n, *batch).
 
         Raises:
-            ArgumentError: what is wrong with the state.
+            ArgumentError: if the state is wrong.
         """
         array = checks.block("state", state, (len(self.A),), self.axes)
         return array[list(self.velocities)], array[list(self.coordinates)]
@@ -171,7 +171,7 @@ class LinearSystem(System):
         """The state in the order of A, shape (n, *batch), of the blocks v and y: undoes ``split``.
 
         Raises:
-            ArgumentError: what is wrong with which block.
+            ArgumentError: if a block is wrong.
         """
         v = checks.block("v", v, self.v_shape, self.axes, finite=False)
         y = checks.block("y", y, self.y_shape, self.axes, finite=False)
@@ -187,7 +187,7 @@ class LinearSystem(System):
         The sums run over the states in the order of A, then over the inputs, and do not depend on the machine.
 
         Raises:
-            UnsupportedError: if the system was given no C.
+            UnsupportedError: if the system has no C.
         """
         if self.C is None:
             return super().auxiliary(t, v, y)
@@ -228,14 +228,14 @@ def _matrix(
 
 
 def _side_by_side(parts: list[Array], batch: Shape) -> Array:
-    """Matrices of equally many rows as one matrix over the whole batch."""
+    """Matrices with the same number of rows, joined side by side, over the whole batch."""
     parts = [aligned(each, 2, batch) for each in parts]
     common = np.broadcast_shapes(*(each.shape[2:] for each in parts))
     return np.concatenate([np.broadcast_to(each, (*each.shape[:2], *common)) for each in parts], axis=1)
 
 
 def _inputs(x: Any, names: tuple[str, ...]) -> tuple[Input | None, ...]:
-    """The argument x as one input for each name."""
+    """The inputs of the argument x, one for each name."""
     if x is None:
         return (None,) * len(names)
     if len(names) == 1 and not (isinstance(x, (list, tuple)) and len(x) == 1):

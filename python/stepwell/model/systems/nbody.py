@@ -42,7 +42,7 @@ class NBody(System):
         dim: 2 or 3; if None, taken from the shape of the state.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> sun_and_planet = sw.NBody([1.0, 1e-3], force="newton", G=1.0)

@@ -42,7 +42,7 @@ class Oscillator(System):
             v is the velocity.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> block = sw.Oscillator(0.0, friction=0.5 * 9.81, form="physical")  # slides on a plane, μ = 0.5

@@ -33,7 +33,7 @@ RATES = "equations()"
 DERIVED = ("_core", "_single", "_with_functions", "_digest", "_bounds", "_met")
 #: The most shapes of states that a system caches.
 MOST_SHAPES = 256
-#: The operations of functions that were traced, and the most functions.
+#: A cache of the operations of traced functions, and its most entries.
 _TRACED: dict[Any, Any] = {}
 MOST_TRACED = 256
 #: Without a state, the shapes that are tried: a number, and vectors up to this length.
@@ -105,7 +105,7 @@ class OwnSystem(System):
     # ---- shapes
 
     def for_state_shapes(self, *states: Any) -> OwnSystem:
-        """This system for states v and y of these shapes; None is an unknown state."""
+        """This system, traced for states v and y of these shapes; None for an unknown shape."""
         shapes = {name: checks.shape_of(name, state) for name, state in zip("vy", states, strict=False) if state is not None}
         if self.equations is not None and self._fits(shapes):
             return self
@@ -124,12 +124,12 @@ class OwnSystem(System):
         raise self._refusal(shapes, refused)
 
     def _refusal(self, shapes: dict[str, Shape], refused: list[TraceError]) -> Exception:
-        """The error if the function can be run with none of the candidates, which were refused by these errors."""
+        """The error to raise if the function fails with every candidate shape; ``refused`` has the candidates' errors."""
         name = self.definition.name
         if not refused:
             states = ", ".join(f"{block} of shape {shape}" for block, shape in shapes.items())
             return ShapeError(f"{name}: expected a state of the declared shape {self.definition.shape[1]}, got {states}")
-        # The error of a function of arrays that is run with a number would be misleading.
+        # A function of arrays fails with a number, too, but that error would mislead.
         for error in refused:
             if not error.of_shape:
                 return error
@@ -154,12 +154,12 @@ class OwnSystem(System):
         return ""
 
     def _fits(self, shapes: dict[str, Shape]) -> bool:
-        """Whether blocks of the known shapes can be the first axes of these."""
+        """Whether states of these shapes can begin with blocks of the known shapes."""
         mine = {"v": self.v_shape, "y": self.y_shape}
         return all(shape == () or shape[: len(mine[name])] == mine[name] for name, shape in shapes.items())
 
     def _candidates(self, shapes: dict[str, Shape]) -> Iterator[tuple[Shape, Shape]]:
-        """Shapes of v and y that the function may be written for, the shortest first."""
+        """The shapes of v and y to try the function with, the shortest first."""
         declared_v, declared_y = self.definition.shape
         v, y = shapes.get("v", ()), shapes.get("y", ())
         pairs: Iterable[tuple[Shape, Shape]]
@@ -195,7 +195,7 @@ class OwnSystem(System):
         return bound
 
     def _trace_once(self) -> None:
-        """Trace the function, or take the operations of an equal function with parameters of the same kinds."""
+        """Trace the function, unless the cache has the operations of an equal function with parameters of the same kinds."""
         key = self._key()
         if key is not None and (operations := _TRACED.get(key)) is not None:
             self._take(operations)
@@ -207,7 +207,7 @@ class OwnSystem(System):
             _TRACED[key] = self._core
 
     def _key(self) -> Any:
-        """A key of everything that the operations depend on; None if something may change unseen."""
+        """A key of all that the operations depend on; None if a part of it may change unnoticed."""
         definition = self.definition
         try:
             parameters = tuple((name, self._kind_of(name, value)) for name, value in self.parameters_given.items())
@@ -219,7 +219,7 @@ class OwnSystem(System):
             return None
 
     def _kind_of(self, name: str, value: Any) -> Any:
-        """A key of everything that the operations depend on in a parameter: not its numbers."""
+        """A key of what the operations depend on in a parameter: its kind, not its numbers."""
         if isinstance(value, np.ndarray):
             return value.shape[: self.own_axes(name)]
         if isinstance(value, (Sinusoid, Sampled)):
@@ -236,7 +236,7 @@ class OwnSystem(System):
         complete(self, velocity_term="forces that do" if operations.reads_v else None)
 
     def _rates(self, marks: Marks | None = None, *, single: bool = False) -> Any:
-        """The rates as operations; with marks also the derivatives of the functions among them.
+        """The rates as operations; with ``marks`` also the derivatives of elementary functions in them.
 
         The function is run twice, to check that it always does the same. The rates of float32 lack the invariants that can be
         recorded, which are computed in float64.
@@ -364,7 +364,7 @@ class OwnSystem(System):
 
     @property
     def quantities(self) -> dict[str, Shape]:
-        """The invariants, each one number; one of a parameter that changes with the time is not constant, and is left out."""
+        """The invariants, each one number. One with a parameter that changes with the time is not constant and is left out."""
         values = self.parameters_given
         constant = (
             name
@@ -396,7 +396,7 @@ class OwnSystem(System):
     def _invariant_of(self, control: Any) -> str:
         if isinstance(control, EnergyControl):
             raise UnsupportedError(
-                f"control: EnergyControl pushes velocities by the kinetic energy, which {self!r} does not tell; use "
+                f"control: EnergyControl pushes velocities by the kinetic energy, which {self!r} does not define; use "
                 f"Control('energy', gain), which pushes along the gradient of an invariant"
             )
         if isinstance(control, ConstraintControl):
@@ -405,14 +405,14 @@ class OwnSystem(System):
         if isinstance(control, Projection) and control.way in WAYS:
             if control.way == "scaling":
                 raise UnsupportedError(
-                    f"control: Projection('scaling') scales velocities by the kinetic energy, which {self!r} does not tell; use "
-                    f"Projection('energy'), which goes along the gradient of an invariant"
+                    f"control: Projection('scaling') scales velocities by the kinetic energy, which {self!r} does not define; "
+                    f"use Projection('energy'), which goes along the gradient of an invariant"
                 )
             name = "energy"
         return checks.known("control", name, self.definition.invariants)
 
     def _keeping(self, name: str, control: Any) -> OwnSystem:
-        known = self._known().uncontrolled  # one control takes the place of another
+        known = self._known().uncontrolled  # a control replaces another
         assert isinstance(known, OwnSystem)
         assert known.equations is not None
         pushed = isinstance(control, Control)
@@ -432,7 +432,7 @@ class OwnSystem(System):
 
     @property
     def has_time(self) -> bool:
-        """Always, because the function takes the time, whether or not it uses it."""
+        """True, because the function has the time as an argument, whether or not it uses it."""
         return True
 
     def given_inputs(self) -> dict[str, Input]:
@@ -446,10 +446,10 @@ def _checked(argument: str, value: Any, own: int) -> tuple[Any, Shape]:
     if not is_input and not callable(value):
         numbers = checks.numbers(argument, value)
         if numbers.ndim < own:
-            raise ShapeError(f"{argument}: expected {own} axes of its own, as its default has, got shape {numbers.shape}")
+            raise ShapeError(f"{argument}: expected {own} axes of its own, like its default, got shape {numbers.shape}")
         return numbers, numbers.shape[own:]
     if not is_input:
         checks.argument_order(argument, value, ("t",))
     if own:
-        raise ShapeError(f"{argument}: expected an array of {own} axes of its own, as its default, got {value!r}")
+        raise ShapeError(f"{argument}: expected an array with {own} axes of its own, like its default, got {value!r}")
     return value, getattr(value, "batch", ())

@@ -32,7 +32,7 @@ class Particles(System):
     If ``masses`` is one number, there are as many points as the state has.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> ball = sw.Particles(gravity=9.81, floor=sw.Floor(restitution=0.8))

@@ -27,7 +27,7 @@ class Pendulum(System):
     a run that saves such an angle gives an ``AccuracyWarning``.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=np.radians([10.0, 170.0]), dt=0.01, steps=740)

@@ -30,7 +30,7 @@ class Pendulum3D(RodSystem):
         floor: a ``Floor`` or ``Sphere`` that the mass meets, or a list of them; with ``way="safe"`` only.
 
     Raises:
-        ArgumentError: what is wrong with which argument; and before a run, if the mass is at the origin, where the rod has no
+        ArgumentError: if an argument is wrong; and before a run, if the mass is at the origin, where the rod has no
             direction.
 
     Example:

@@ -49,7 +49,7 @@ class RigidBody(System):
         quantities: ``"energy"``, ``"angular_momentum"``, along the axes of space, and ``"norm_error"``, q·q − 1, can be recorded.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> top = sw.RigidBody([1.0, 2.0, 3.0])

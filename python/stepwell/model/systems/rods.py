@@ -111,7 +111,7 @@ class Rods(RodSystem):
     motion.
 
     Raises:
-        ArgumentError: what is wrong with which argument; and before a run, if the ends of a rod are in one place, or if a rod
+        ArgumentError: if an argument is wrong; and before a run, if the ends of a rod are in one place, or if a rod
             is redundant.
 
     Example:

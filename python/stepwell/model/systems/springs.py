@@ -53,7 +53,7 @@ class Springs(System):
     step that is safe. Lengths, masses and times may have any consistent units.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> pendulum = sw.Springs([(0, 1)], stiffness=100.0, rest=1.0, fixed=[0], gravity=(0.0, -9.81))

@@ -1,4 +1,4 @@
-"""Runs with a tolerance: from one saved time to the next, and across jumps of the inputs."""
+"""Runs with a tolerance, which end steps at jumps of the inputs and save states at requested times."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple, Self
@@ -16,9 +16,9 @@ OK, BUDGET, UNDERFLOW, NOT_FINITE = 0, 2, 3, 4
 def waiting(
     t0: Any, first: Any, tolerance: tuple[Any, Any, float], samples: tuple[float, float], most_step: Any = np.inf, groups: int = 2
 ) -> Pace:
-    """The pace of a member that has not begun: ``begin`` adds what depends on its state.
+    """The pace of a member before its first step. ``begin`` adds what depends on its state.
 
-    ``first`` is the step to try first. Below zero it is to be chosen, and is minus this number if all rates are zero.
+    ``first`` is the first trial step. If it is negative, ``begin`` chooses one, which is ``-first`` where all rates are zero.
     ``tolerance`` is ``relative``, ``absolute`` and ``lasts`` of a ``Pace``, ``samples`` its ``interval`` and ``until``.
     """
     counts = *tolerance, t0, *samples, most_step, np.inf, 1.0, MAX_FACTOR
@@ -26,11 +26,11 @@ def waiting(
 
 
 class Jumps(NamedTuple):
-    """The times that no step crosses: each is between two, just before and just after it.
+    """The jumps that no step crosses. A step ends just before a jump, and the next one begins just after it.
 
     Attributes:
-        before: those times, ascending along the first axis, the same for all members or of each.
-        after: the times from which members go on.
+        before: the ends of steps before the jumps, ascending along the first axis, for all members or for each.
+        after: the beginnings of steps after the jumps, likewise.
     """
 
     before: Array
@@ -38,7 +38,7 @@ class Jumps(NamedTuple):
 
     @classmethod
     def around(cls, times: Array, t0: Any, in_single: Any = None) -> Self:
-        """Some roundings before and after each; t0 is the start, before which no jump counts. An infinite one is none.
+        """Bracket each jump by some rounding errors of its time. Jumps before the start t0 and infinite ones do not count.
 
         Times of stages are rounded to the larger of the times at both ends of a step, so they stay on their side. ``in_single``
         are the jumps that rates compare with times of float32.
@@ -54,12 +54,12 @@ class Jumps(NamedTuple):
         return cls(np.where(gone, -np.inf, before), np.where(gone, -np.inf, after))
 
     def begun(self, t0: Any) -> Any:
-        """The time of the start: behind a jump that is there."""
+        """The time at which steps start: t0, or just after a jump at t0."""
         there = (self.before <= t0) & (t0 <= self.after)
         return np.where(there, self.after, t0).max(axis=0)
 
     def passed(self, t: Any) -> Any:
-        """How many jumps are at or before t."""
+        """The number of jumps at or before t."""
         if self.before.ndim == 1:
             return np.searchsorted(self.before, t, side="right")
         return np.count_nonzero(self.before <= t, axis=0)
@@ -69,7 +69,7 @@ class Jumps(NamedTuple):
         return self._of_each(t, self.before, self.passed(t))
 
     def crossed(self, pace: Pace, *, series: bool) -> Pace:
-        """The pace of members that have come to a wall: behind it, with a new step."""
+        """The pace, where members at a wall continue just after it with a new trial step."""
         there = pace.t >= pace.wall
         if not np.any(there):
             return pace
@@ -87,7 +87,7 @@ class Jumps(NamedTuple):
 
     @staticmethod
     def _of_each(t: Any, times: Array, place: Any) -> Any:
-        """The time at a place of each member; infinite behind the last."""
+        """The time at an index of each member; infinite past the last."""
         shape = np.shape(t)
         rows = np.broadcast_to(times.reshape(len(times), *(times.shape[1:] or len(shape) * (1,))), (len(times), *shape))
         ended = np.concatenate([rows, np.full((1, *shape), np.inf)])
@@ -97,7 +97,7 @@ class Jumps(NamedTuple):
 class Outcome(NamedTuple):
     """Saved states, and the state, pace and status of each member at the end.
 
-    Of the attempts after which a step was kept, ``steps`` has which members made it, the times, v and y.
+    ``steps`` has an entry for each attempt with accepted steps that are recorded: which members made one, the times, v and y.
     """
 
     v: Array
@@ -122,10 +122,10 @@ def run(
     every: int = 0,
     waypoints: Array | None = None,
 ) -> Outcome:
-    """Continue all members and save their states at each time of ``at``, ascending. Members that stop before have NaN.
+    """Continue all members and save their states at the ascending times ``at``. States after a member has stopped are NaN.
 
-    ``attempt(pace, budget, v, y)`` is one attempt of all members. Every ``every``-th accepted step is kept; 0 for none. Where
-    members stood at their last waypoints is written to ``waypoints``.
+    ``attempt(pace, budget, v, y)`` is one attempt of all members. Every ``every``-th accepted step is recorded, or none if
+    it is 0. ``waypoints`` gets the last waypoints of each member (``waypoints.keep``).
     """
     one = np.ones(pace.t.shape)
     saved_v, saved_y, steps = [], [], []

@@ -1,7 +1,7 @@
-"""Makes an elementary function from one of symbols, or of arrays of float64.
+"""The decorator of elementary functions.
 
-``elementary`` wraps it so that it accepts all that users may pass. Inside it all values are arrays of float64, or all are
-symbols; none is a number of Python. Sums, products, quotients and comparisons are operators; all else is in
+A function is written for arrays of float64 or for symbols; ``elementary`` wraps it, so that it takes all that users may pass.
+Inside the function there are no numbers of Python. Sums, products, quotients and comparisons are operators; all else is in
 ``reference/bits.py``.
 """
 
@@ -31,7 +31,7 @@ def symbol_of(values: Sequence[Any]) -> Any:
 
 
 def lifted(symbol: Any, name: str, value: Any) -> Any:
-    """A number, as one on the tape of a symbol; a symbol stays one."""
+    """A number as a constant on the tape of a symbol; a symbol is returned unchanged."""
     return value if is_symbol(value) else symbol.number(float(numbers(name, value, finite=False)))
 
 
@@ -46,7 +46,7 @@ def as_array(name: str, value: Any) -> Any:
 
 
 def shape_of(names: Sequence[str], values: Sequence[Any]) -> tuple[int, ...]:
-    """The shape to which all broadcast."""
+    """The shape to which all values broadcast."""
     shapes = [each.shape if isinstance(each, np.ndarray) else () for each in values]
     try:
         return np.broadcast_shapes(*shapes)

@@ -35,7 +35,7 @@ from .pieces import INFINITY, NAN, by_parity, halves
 
 
 class Constants(NamedTuple):
-    """Those of one precision.
+    """The constants of a precision.
 
     Attributes:
         log_long: 3·(artanh s − s − s³/3)/s⁵ in powers of s².
@@ -104,12 +104,12 @@ def log2_in_two(x: Any) -> tuple[Any, Any]:
 
 @elementary
 def any_power(x: Any, y: Any) -> Any:
-    """X to the power y, as C's pow."""
+    """The power x^y, with the special values of C's pow."""
     a = magnitude(x)
     upper, lower = log2_in_two(a)
     largest = CONSTANTS.of(x).largest_exponent
     lowest, highest = EXPONENTIAL.of(x).lowest_power_of_two, EXPONENTIAL.of(x).highest_power_of_two
-    # The two precisions choose the same by other operations.
+    # Both precisions select the same, but by different operations.
     single = is_single(x)
     e = clamp(y, -largest, largest) if single else where(y < -largest, -largest, where(y > largest, largest, y))
     e1, e2 = halves(e)
@@ -121,7 +121,7 @@ def any_power(x: Any, y: Any) -> Any:
     half = 0.5 * y
     whole, even = equal(floor(y), y), equal(floor(half), half)
     value = where(whole, value, where(x < 0.0, NAN, value))
-    endless = equal(a, 0.0) | equal(a, INFINITY)  # each stays, or becomes the other one
+    endless = equal(a, 0.0) | equal(a, INFINITY)  # the power is this number, or the other of the two
     value = where(endless, where(y < 0.0, turn_bits(a, INFINITY), a), value)
     value = either_bits(value, where(even, 0.0, where(whole, sign_of(x), 0.0)))
     value = where(equal(x, x) & equal(y, y), value, NAN)
@@ -149,7 +149,7 @@ def _known_power(exponent: float) -> Any:
             return where(equal(x, x), 1.0, 1.0)
         value: Any = _product(x, whole)
         if whole != abs(exponent):
-            value = (value * root(x) if whole else root(x)) + 0.0  # +0 also of −0, as in C
+            value = (value * root(x) if whole else root(x)) + 0.0  # √−0 becomes +0, as in C
         return 1.0 / value if exponent < 0.0 else value
 
     return of

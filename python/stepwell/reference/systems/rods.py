@@ -1,4 +1,4 @@
-"""Points joined by rods: the rods' pulls are found from equations that they share, one for each rod."""
+"""Points joined by rods. The pulls of the rods solve a system of linear equations, one for each rod."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ CORRECTIONS = 3
 
 
 def dot(a: Array, b: Array) -> Array:
-    """The sum of products along the first axis."""
+    """The dot product along the first axis."""
     whole: Array = a[0] * b[0]
     for c in range(1, len(a)):
         whole = whole + a[c] * b[c]
@@ -90,7 +90,7 @@ class Rods(Recorded):
         return self.h * v
 
     def velocity(self, d: Array) -> Array:
-        """The v whose increment of y is d."""
+        """The velocity v for which dy is d."""
         return d / self.h
 
     def spans(self, y: Array) -> list[Array]:
@@ -103,7 +103,7 @@ class Rods(Recorded):
         return [v[b] - v[a] if a < len(self.masses) else v[b] for a, b in self.rods]
 
     def matrix(self, d: list[Array]) -> list[list[Any]]:
-        """How a pull of a rod changes C̈ of another: nothing unless they share a point."""
+        """The matrix of the equations: how the pull of a rod changes C̈ of another, zero unless they share a point."""
         rows = []
         for k, (a, b) in enumerate(self.rods):
             row: list[Any] = [None if (w := self.shared(k, other)) is None else w * dot(d[k], d[other]) for other in range(k)]
@@ -112,7 +112,7 @@ class Rods(Recorded):
         return rows
 
     def shared(self, k: int, other: int) -> Any:
-        """1/m of the point that two rods share, with the sign of their directions there, or None."""
+        """1/m of the point that two rods share, negative if only one of them begins there; None without such a point."""
         (a, b), (first, second) = self.rods[k], self.rods[other]
         if b == second:
             return self.inverse[b]
@@ -123,7 +123,7 @@ class Rods(Recorded):
         return self.minus[b] if b == first else None
 
     def pushed(self, d: list[Array], pulls: list[Array]) -> list[Array]:
-        """What the pulls of the rods do to each point."""
+        """The increments of v by the pulls of the rods."""
         sums: list[Any] = [None] * len(self.masses)
         for (a, b), span, pull in zip(self.rods, d, pulls, strict=True):
             along = pull * span
@@ -133,7 +133,7 @@ class Rods(Recorded):
         return [minus * each for minus, each in zip(self.minus, sums, strict=True)]
 
     def project(self, v: Array, y: Array) -> Blocks:
-        """The state after a step, with rods of their lengths and no velocity along them, if the system projects.
+        """The state after a step; if the system projects, with the rods' lengths restored and no velocity along the rods.
 
         Each correction moves the points by the least sum of m·(distance)², and so do the velocities: momentum stays.
         """
@@ -147,7 +147,7 @@ class Rods(Recorded):
         return self.moved(v, d, [dot(span, u) for span, u in zip(d, self.closing(v), strict=True)]), y
 
     def moved(self, block: Array, d: list[Array], off: list[Array]) -> Array:
-        """A block, changed along the rods by what takes these errors away."""
+        """A block, changed along the rods so that these errors vanish."""
         pushed = self.pushed(d, solved(factored(self.matrix(d)), off))
         return np.stack([each + push for each, push in zip(block, pushed, strict=True)])
 

@@ -21,7 +21,7 @@ class Increment(NamedTuple):
 
 
 class Rewriting:
-    """A tape that is written anew, line by line."""
+    """Rewrites a tape line by line."""
 
     def __init__(self, tape: Sequence[Operation], roots: Sequence[int], single: bool = False) -> None:
         self.tape = tape
@@ -37,7 +37,7 @@ class Rewriting:
         self.values: list[int | Increment] = []
 
     def write(self, name: str, *of: int, extra: int = 0) -> int:
-        """A line of the new tape; one that is there already is not written again."""
+        """The line of an operation on the new tape, which is appended unless it is there."""
         operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, extra)
         if operation not in self.known:
             self.known[operation] = len(self.lines)
@@ -49,7 +49,7 @@ class Rewriting:
         return self.write("constant", extra=self.precision.pattern(x))
 
     def signed(self, line: int) -> tuple[bool, int]:
-        """Whether there is a minus before a value of the old tape, and the rest of it: (|c|·factor)·x."""
+        """The sign of a value of the old tape (whether it is negated), and the line of (|c|·factor)·x."""
         value = self.values[line]
         if not isinstance(value, Increment):
             return False, value
@@ -57,19 +57,19 @@ class Rewriting:
         return value.c < 0.0, self.write("multiply", factor, value.x)
 
     def plain(self, line: int) -> int:
-        """The new line of a value of the old tape."""
+        """The line on the new tape of a value of the old tape."""
         is_minus, rest = self.signed(line)
         return self.write("negate", rest) if is_minus else rest
 
     def weighted(self, line: int) -> tuple[int, int] | None:
-        """Of a product what is known before the step, and what is of the state."""
+        """The factor of a product that is known before the step, and the factor that depends on the state."""
         name, of, _ = self.tape[line]
         if name != "multiply" or self.of_state[of[0]] == self.of_state[of[1]]:
             return None
         return (of[1], of[0]) if self.of_state[of[0]] else (of[0], of[1])
 
     def times(self, increment: Increment, p: int) -> Increment:
-        """An increment times what is known before the step: numbers go to c, all else to the factor."""
+        """An increment times a value known before the step: numbers multiply c, other values the factor."""
         name, _, extra = self.tape[p]
         if name == "constant":
             return increment._replace(c=increment.c * self.precision.constant(extra))
@@ -85,7 +85,7 @@ class Rewriting:
                 return self.times(value, p)
             if self.of_step[p]:
                 increment = Increment(1.0, self.plain(p), 0)
-                # What nothing else reads of x and is known before the step goes to the factor.
+                # A part of x that is known before the step and read by nothing else goes to the factor.
                 while self.reads[x] == 1 and (split := self.weighted(x)):
                     increment, x = self.times(increment, split[0]), split[1]
                 return increment._replace(x=self.plain(x))
@@ -119,7 +119,7 @@ class Rewriting:
         return self.write(name, *(self.plain(each) for each in of), extra=extra)
 
     def value(self, line: int) -> int | Increment:
-        """What a line of the old tape is on the new one."""
+        """The line on the new tape, or the increment, that replaces a line of the old tape."""
         name, of, _ = self.tape[line]
         match name:
             case "multiply":
@@ -132,7 +132,7 @@ class Rewriting:
                 return self.same(line)
 
     def run(self) -> None:
-        """Writes all lines."""
+        """Rewrite all lines."""
         self.values = []
         for line in range(len(self.tape)):
             self.values.append(self.value(line))

@@ -1,4 +1,4 @@
-"""Events of a world: searched after each step, which is made again in parts if one changes the state."""
+"""Events of a world, searched for after each step. A step is repeated in parts if an event changes the state."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from .trials import Trials
 
 
 class Frames(Collected):
-    """Steps of a world with events, in place of the core's.
+    """Steps a world with events; used in place of the core's world.
 
     Args:
         plan: the world's plan; ``force`` is the world's array, which the user changes.
         events: the events.
-        v: the arrays that are stepped.
-        y: likewise.
+        v: velocities, stepped in place.
+        y: coordinates, stepped in place.
         loop: the core's world.
     """
 
@@ -55,7 +55,7 @@ class Frames(Collected):
         self._left: tuple[list[Array], list[Array]] | None = None
 
     def step(self, n: int = 1) -> None:
-        """Make n steps in place; ``World.events`` then has their events."""
+        """Make n steps in place. ``World.events`` returns their events."""
         n = checks.count("n", n, 0)
         self.clear()
         self._occurrences = None
@@ -75,7 +75,7 @@ class Frames(Collected):
         self._left = [each.copy() for each in self._blocks], g
 
     def _start_from(self, g: list[Array]) -> None:
-        """Begin a call with these quantities: members that the user has moved since the last call begin again."""
+        """Begin a call with these quantities. The search starts anew for members that the user moved since the last call."""
         t = np.full(len(self._all), self.plan.t0 + self._loop.step_number * self.plan.dt)
         h, (v, y) = np.full(len(self._all), self.plan.dt), self._flat(self._blocks)
         if self._left is None:
@@ -100,11 +100,11 @@ class Frames(Collected):
         return self._occurrences
 
     def _quantities(self, step: int) -> list[Array]:
-        """The quantities of all members where the world stands."""
+        """The quantities of all members at the present state."""
         t: Any = np.array(self.plan.t0 + step * self.plan.dt)
         parameters = self.members.numbers(slice(None))
         v, y = self._flat(self._blocks)
-        return [quantity(t, v, y, parameters).copy() for quantity in self.quantities]  # not views of what is stepped in place
+        return [quantity(t, v, y, parameters).copy() for quantity in self.quantities]  # copies, because the world steps in place
 
     def _flat(self, blocks: Sequence[Array]) -> tuple[Array, ...]:
         """Blocks with one axis for all members."""
@@ -116,7 +116,7 @@ class Frames(Collected):
 
     def _after_a_step(self, step: int, may: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> list[Array]:
         """Process the events of a step. Returns the quantities at its end."""
-        if self.plan.force is not None:  # the user may have changed it since the last call
+        if self.plan.force is not None:  # the user may have changed the force since the last call
             force = np.array(self.plan.force)
             self.members = Members(self.plan._replace(force=force))
             self.trials = Trials(self.plan._replace(force=force), self.members)
@@ -142,7 +142,7 @@ class Frames(Collected):
         if not len(index):
             return after
         lying = self._rests[index]
-        v, y = (each[..., index].copy() for each in states[:2])  # of members at rest that stay so
+        v, y = (each[..., index].copy() for each in states[:2])  # members at rest stay at rest
         if not lying.all():
             moves = index[~lying]
             begin, end = np.full(len(moves), t), self.plan.t0 + (step + 1) * self.plan.dt
@@ -156,7 +156,7 @@ class Frames(Collected):
         return self._quantities(step + 1)
 
     def _write(self, step: int, index: Whole, v: Array, y: Array) -> None:
-        """Write the states of these members at this step; what the method carries of others stays."""
+        """Write the states of these members at this step, and leave the carry of the others as it is."""
         carry = self._loop.carry() if self.plan.method.carry is not None else None
         for block, new in zip(self._blocks, (v, y), strict=True):
             block.reshape(*new.shape[:-1], len(self._all))[..., index] = new

@@ -28,7 +28,7 @@ def aircraft(form: AttitudeForm = "euler", roll: Any = 40.0, pitch: Any = -10.0)
         pitch: the commanded pitch angle, in degrees; below zero the nose is up.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     roll, pitch = number("roll", roll, unit="degrees"), number("pitch", pitch, unit="degrees")
     system = Aircraft(form, roll=Sinusoid(roll, 2.0 * np.pi / PERIOD), pitch=pitch)

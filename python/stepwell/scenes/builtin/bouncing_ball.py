@@ -25,20 +25,20 @@ ALONG = 0.1
 def bouncing_ball(restitution: Any = 0.8, height: Any = 1.0, gravity: Any = 9.81) -> Scene:
     """A ball is thrown sideways, falls, and bounces lower and lower, until it slides along the floor.
 
-    An impact at the speed u leaves e·u, so the times between impacts are a geometric series: with the speed u of the first impact
-    the ball comes to rest after (1 + e)/(1 − e)·u/g.
+    An impact at speed u leaves the speed e·u, so the times between impacts are a geometric series. With the speed u at the first
+    impact the ball comes to rest after the time (1 + e)/(1 − e)·u/g.
 
     Args:
         restitution: e, 0 to 1, without a unit.
-        height: from which it falls, in units of length, above zero.
+        height: the height from which it falls, in units of length, above zero.
         gravity: acceleration of free fall, above zero.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     restitution = number("restitution", restitution)
     if not 0.0 <= restitution <= 1.0:
-        raise ArgumentError(f"restitution: expected a number of 0 to 1, got {restitution:g}")
+        raise ArgumentError(f"restitution: expected a number from 0 to 1, got {restitution:g}")
     height = moderate("height", height, "units of length")
     gravity = moderate("gravity", gravity, "units of length per unit of time squared")
     speed = math.sqrt(2.0 * gravity * height)
@@ -75,7 +75,7 @@ def bouncing_ball(restitution: Any = 0.8, height: Any = 1.0, gravity: Any = 9.81
 
 
 def _impacts(speed: float, fall: float, restitution: float, gravity: float, horizon: float) -> tuple[Array, Array]:
-    """The speeds after each impact and the times of the impacts; the last speed is 0 where the ball comes to rest."""
+    """The speeds after the impacts and the times of the impacts. The last speed is 0 if the ball comes to rest."""
     leaving: list[float] = []
     times: list[float] = []
     t = fall

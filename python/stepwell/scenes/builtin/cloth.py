@@ -25,7 +25,7 @@ def cloth(n: Any = 32, shear: Any = 0.5, damping: Any = 0.0) -> Scene:
         damping: c of all springs, relative to the critical damping of the fastest mode of one alone, zero or more.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     n = count("n", n, 2)
     fits("n: the springs", 200.0 * n * n, (), "take fewer particles")

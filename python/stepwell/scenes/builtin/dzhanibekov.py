@@ -27,7 +27,7 @@ def dzhanibekov(inertia: Any = (1.0, 2.0, 3.0), tilt: Any = 0.01, spin: Any = 1.
         spin: ω₂ at the start, in rad per unit of time, 1e-6 to 1e6.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     moments = numbers("inertia", inertia, positive=True)
     if moments.shape != (3,) or not moments[0] < moments[1] < moments[2]:

@@ -37,7 +37,7 @@ def energy_control(pair: str = "matching", eps: Any = 0.01, form: ControlForm = 
         form: of the control; the document's is ``"printed"``, see ``stepwell.EnergyControl``.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     force = PAIRS[known("pair", pair, PAIRS)]
     eps = number("eps", eps, unit="units of length per unit of time")

@@ -17,18 +17,18 @@ from ..ranges import LARGEST, frequency, within
 def forced_oscillator(omega: Any = 1.0, damping: Any = 0.1, *, amplitude: Any = 1.0, drive: Any = 0.7, phase: Any = 0.5) -> Scene:
     """A damped oscillator from v = 0, y = 1, driven by amplitude·sin(drive·t + phase), over ten of its own periods.
 
-    In physical form (§3): v is the velocity. The exact solution is the steady oscillation and the dying one that joins
-    it to the start. Here the rates depend on the time and on v.
+    In physical form (§3): v is the velocity. The exact solution is the sum of the steady oscillation and of a decaying
+    one. The rates of this scene depend on the time and on v.
 
     Args:
         omega: ω₀ in radians per unit of time, above zero.
         damping: damping ratio D, above 0 and below 1.
-        amplitude: of the acceleration, in units of length per unit of time squared.
-        drive: its angular frequency, in radians per unit of time, above zero.
-        phase: in radians.
+        amplitude: amplitude of the acceleration, in units of length per unit of time squared.
+        drive: angular frequency of the acceleration, in radians per unit of time, above zero.
+        phase: phase of the acceleration, in radians.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     omega = frequency("omega", omega)
     damping = number("damping", damping, positive=True)

@@ -25,7 +25,7 @@ def gimbal_trap(form: AttitudeForm = "euler", roll: Any = 2.0, torque: Any = -1.
         torque: about the pitch axis; below zero it lifts the nose.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     roll, torque = number("roll", roll, unit="degrees"), number("torque", torque, unit="units of torque")
     system = Aircraft(form, pitch_torque=torque, controllers=False)

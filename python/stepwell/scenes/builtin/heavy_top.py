@@ -26,7 +26,7 @@ def heavy_top(spin: Any = 10.0, lean: Any = 30.0) -> Scene:
         lean: of the axis from the vertical at the start, in degrees, above 0 and below 180.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     spin = within("spin", spin, 1e-6, 1e6, "rad per unit of time")
     lean = number("lean", lean, unit="degrees")

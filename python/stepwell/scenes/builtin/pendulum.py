@@ -26,7 +26,7 @@ def pendulum(amplitude: Any = 90.0, omega: Any = 1.0) -> Scene:
         omega: ω₀ of small swings in radians per unit of time, above zero.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     amplitude = number("amplitude", amplitude, unit="degrees")
     if not 0.0 < amplitude < 180.0:

@@ -13,25 +13,25 @@ from ...errors import ArgumentError
 from ...model.systems import NBody
 from ..base import Scene
 
-#: The share of the mass that is sampled: the outermost thousandth would be far away.
+#: The share of the mass that is sampled; the outermost thousandth would be too far away.
 INNER = 0.999
 
 
 def plummer(n: Any = 64, seed: Any = 1, softening: Any = 0.05) -> Scene:
     """Equal stars at random in Plummer's sphere, over ten of Hénon's units of time.
 
-    Hénon's units: G = 1, mass 1 and energy −1/4 in all, half as much kinetic energy as potential but for the sign, the centre of
-    mass at rest in the origin. The stars are drawn as Aarseth, Hénon and Wielen do (Astronomy and Astrophysics 37, 1974), then
-    moved and scaled so that these hold for them and not for the average only. The motion is chaotic: no solution is
-    exact for long.
+    In Hénon's units G = 1, the total mass is 1 and the energy −1/4; the potential energy is −2 times the kinetic energy, and
+    the centre of mass rests at the origin. The stars are drawn as Aarseth, Hénon and Wielen do (Astronomy and Astrophysics 37,
+    1974), then moved and scaled, so that these values hold exactly and not only on average. The motion is chaotic: no solution is
+    accurate for long.
 
     Args:
-        n: how many stars, two or more.
-        seed: of the random numbers, a whole number of zero or more; the same seed gives the same stars.
+        n: number of stars, two or more.
+        seed: seed of the random numbers, a whole number of zero or more; the same seed gives the same stars.
         softening: length ε of the force, in Hénon's units of length, zero or more. With 0 close pairs need a very small step.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     n, seed = count("n", n, 2), count("seed", seed, 0)
     fits("n: the pairs", 4 * n * n, (), "take fewer stars")
@@ -60,7 +60,7 @@ def plummer(n: Any = 64, seed: Any = 1, softening: Any = 0.05) -> Scene:
 
 
 def _drawn(random: np.random.Generator, n: int) -> tuple[Array, Array]:
-    """Places and velocities of n stars in a sphere of radius, mass and G of 1; shape (n, 3) each."""
+    """Positions and velocities of n stars in a sphere with radius, mass and G of 1; shape (n, 3) each."""
     radius = ((INNER * (1.0 - random.random(n))) ** (-2.0 / 3.0) - 1.0) ** -0.5
     # The share q of the escape velocity has the density q²·(1 − q²)^(7/2), at most 0.0923; drawn and rejected.
     share = np.empty(n)
@@ -75,20 +75,20 @@ def _drawn(random: np.random.Generator, n: int) -> tuple[Array, Array]:
 
 
 def _directions(random: np.random.Generator, n: int) -> Array:
-    """Unit vectors, all directions alike, shape (n, 3)."""
+    """Unit vectors in directions of equal probability, shape (n, 3)."""
     z, angle = 1.0 - 2.0 * random.random(n), 2.0 * math.pi * random.random(n)
     across = np.sqrt(1.0 - z * z)
     return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=-1)
 
 
 def _scale(masses: Array, y: Array, softening: float) -> float:
-    """The factor of all places at which the potential energy is −1/2, by bisection."""
+    """The factor of all positions that makes the potential energy −1/2, by bisection."""
     i, j = np.triu_indices(len(masses), 1)
     square = ((y[i] - y[j]) ** 2).sum(axis=-1)
     product = masses[i] * masses[j]
 
     def depth(scale: float) -> float:
-        with np.errstate(divide="ignore"):  # the square of a softening may be nothing
+        with np.errstate(divide="ignore"):  # the square of a softening may underflow to zero
             return float((product / np.sqrt(scale * scale * square + softening * softening)).sum())
 
     low, high = 0.0, 1.0

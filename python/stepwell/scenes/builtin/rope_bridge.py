@@ -16,14 +16,14 @@ def rope_bridge(planks: Any = 15, load: Any = 5.0) -> Scene:
     """A bridge of two ropes, ten units of length long, falls from a level position with a load on one side of its middle plank.
 
     Each plank is a spring across, between particles of mass 1; crossed springs keep the meshes square. Gravity is 9.81. The
-    bridge bounces and sways without damping, at the ends of the planks by different amounts.
+    bridge bounces and sways without damping, and its two ropes do so by different amounts.
 
     Args:
-        planks: how many, one or more.
-        load: mass that lies on one end of the middle plank, above zero.
+        planks: number of planks, one or more.
+        load: mass on one end of the middle plank, above zero.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     planks, load = count("planks", planks, 1), moderate("load", load)
     fits("planks: the springs", 300.0 * planks, (), "take fewer planks")

@@ -20,7 +20,7 @@ def sliding_block(friction: Any = 0.5 * 9.81, speed: Any = 3.0) -> Scene:
         speed: v₀ in units of length per unit of time, above zero.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     friction = moderate("friction", friction)
     speed = moderate("speed", speed)

@@ -62,7 +62,7 @@ def symmetric_top(axial: Any = 1.6, spin: Any = 2.0, wobble: Any = 1.0) -> Scene
         wobble: ω₁ at the start, in rad per unit of time, 1e-6 to 1e6.
 
     Raises:
-        ArgumentError: what is wrong with which argument.
+        ArgumentError: if an argument is wrong.
     """
     axial = number("axial", axial)
     if not 0.0 < axial <= 2.0:

@@ -1,7 +1,7 @@
-"""A step as source code of another language, for use in an engine.
+"""A step as source code of another language, for games and other programs.
 
-``tapes`` traces a step and splits it, ``names`` makes names that every language accepts, ``written`` writes both in a
-``language``, each of which has a file; ``result`` is the exported text.
+``tapes`` traces a step and splits it. ``names`` makes names that every language accepts. ``written`` writes the step in a
+``language``, each of which has a file. ``result`` is the exported text.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ def export(
 ) -> ExportedStep:
     """Export a step of a system by a method as source code: one file without dependencies.
 
-    The file has a structure of the parameters, which users may change, a structure of the state, and functions: preparation from
-    the parameters, the state at the start, one step. Compiled and run it gives the numbers of ``integrate``, to the last bit.
+    The file has a structure of the parameters, which users may change, and a structure of the state. Its functions prepare the
+    parameters, set the initial state and make a step. Compiled and run, it gives the numbers of ``integrate`` to the last bit.
 
     Args:
         system: the system; one trajectory of it.
@@ -73,13 +73,13 @@ def export(
             energy of v and y.
         y: coordinates of the example, likewise; 1, 2, 3, … if None.
         member: which trajectory of a batch, by its index, or by a tuple of one index for each axis of the batch.
-        start: how a method with a choice starts; see ``method(…).starts``.
+        start: the start of a method that has several; see ``method(…).starts``.
         control: the control of the energy, as in ``integrate``.
         force: True for a step with an argument ``force``, which is added to v̇ in every stage and may differ from step to step, as
             in ``World``. An array of the shape of v, or of v with the batch, is the force of the example at the head of the file.
             A method that carries something other than v needs the force in its start and finish, too.
         fused: whether to use fused multiply-adds, as in ``integrate``. JavaScript has none, Python has them from 3.13 on.
-        name: the name of functions and types, or its beginning; made from the system and the method if None.
+        name: the name or prefix of functions and types; None for one made from the system and the method.
         dtype: ``"float64"`` or ``"float32"``, as in ``integrate``. In float32 the numbers are C's ``float`` and Rust's ``f32``;
             JavaScript rounds each operation by ``Math.fround``, and Python needs NumPy.
 
@@ -87,7 +87,7 @@ def export(
         An ``ExportedStep``: ``.source`` is its text, ``.save(path)`` writes it.
 
     Raises:
-        ArgumentError: what was given and what was expected.
+        ArgumentError: if an argument is wrong.
         UnsupportedError: if the method cannot step the system, if the language has no fused multiply-add, or if the step has too
             many operations.
 
@@ -136,7 +136,7 @@ def _member(member: Any, batch: Shape) -> Shape:
         raise ShapeError(f"member: expected {len(batch)} indices for the batch of shape {batch}, got {len(indices)}")
     for each, n in zip(indices, batch, strict=True):
         if n == 0:
-            raise ShapeError(f"member: there is none in a batch of shape {batch}")
+            raise ShapeError(f"member: the batch of shape {batch} has no members")
         checks.count("member", each, 0, n - 1)
     return tuple(checks.count("member", each, 0, n - 1) for each, n in zip(indices, batch, strict=True))
 

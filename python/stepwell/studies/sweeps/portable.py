@@ -1,4 +1,4 @@
-"""Tasks for other processes: by cloudpickle, with own equations of a script or a notebook by their code and not by name."""
+"""Tasks for other processes, pickled by cloudpickle. Own equations of a script or a notebook are pickled by their code."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REMEMBERED_TASKS = 4
 
 
 def packed(task: Task) -> bytes:
-    """A task for other processes.
+    """Pickle a task for other processes.
 
     Raises:
         ArgumentError: if a part of it cannot be pickled.
@@ -40,8 +40,8 @@ def packed(task: Task) -> bytes:
         Pickler(file).dump(task)
     except (pickle.PicklingError, TypeError, AttributeError) as error:
         raise ArgumentError(
-            f"engine: system and outcomes go to other processes by pickle, and one of them cannot: {error}; threads, "
-            f"the default, need none"
+            f"engine: the system and the outcomes must be pickled for other processes, but one of them cannot be: {error}; "
+            f"threads, the default, need no pickling"
         ) from None
     return file.getvalue()
 
@@ -59,7 +59,7 @@ def _found_by_name(definition: Definition) -> bool:
 def _defined(
     function: Callable[..., Any], options: tuple[Any, ...], module: str, qualified: str, invariants: list[Invariant]
 ) -> Definition:
-    """A definition, created again in another process."""
+    """Create a definition again, in another process."""
     definition = Definition(function, *options)
     definition.__module__, definition.__qualname__ = module, qualified
     definition.invariants = {each.name: each for each in invariants}
@@ -68,7 +68,7 @@ def _defined(
 
 @lru_cache(REMEMBERED_TASKS)
 def _task(package: bytes) -> Task:
-    """A task, unpacked once in each process, so that its system is traced and its kernels are compiled only once."""
+    """Unpickle a task. Each process does so only once, so its system is traced and its kernels are compiled only once."""
     task = pickle.loads(package)
     assert isinstance(task, Task)
     return task

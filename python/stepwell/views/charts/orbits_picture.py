@@ -1,4 +1,4 @@
-"""The orbits of bodies in the picture of a run: where each went, beside the exact motion or the run without control."""
+"""The orbits of bodies in the picture of a run, with the exact orbits or those of the run without control."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from .run_panels import Points, on_plane
 from .runs import LARGEST, RunPicture
 from .style import BOTTOM, EXACT, FAMILIES, GREY, LONG_CURVE, TOP, Axes, Figure
 
-#: Hues, lines and marks of bodies. The hues are those of ``FAMILIES``, which differ in grey, too. Further bodies look alike.
+#: Colours, line styles and markers of bodies; further bodies repeat them. The colours are those of ``FAMILIES``, which differ in
+#: grey, too.
 BODIES: tuple[dict[str, Any], ...] = (
     {"color": FAMILIES["Runge-Kutta"], "linestyle": "-", "marker": "o"},
     {"color": FAMILIES["Heun"], "linestyle": (0, (6, 2)), "marker": "s"},
@@ -30,14 +31,14 @@ CROWDED = 20.0
 #: Curves closer to each other than this fraction of their size are one.
 ONE_CURVE = 0.01
 
-#: The view of the run without control is at most this many times as wide as the run with it.
+#: The view of the run without control is at most so many times as wide as that of the run with it.
 BEFORE_FACTOR = 2.5
 
 
 def draw_orbits(figure: Figure, chart: RunPicture) -> list[str]:
-    """One panel for points in a plane; two projections side by side, on one scale, for points in space. Returns notes.
+    """Draw one panel for points in a plane, or two projections to the same scale for points in space. Return notes.
 
-    Under a control there are the run without it and the run with it instead, seen along z.
+    With a control, draw the run without it and the run with it instead, seen along z.
     """
     if chart.before is not None:
         return _before_and_after(figure, chart, chart.before)
@@ -56,7 +57,7 @@ def draw_orbits(figure: Figure, chart: RunPicture) -> list[str]:
 
 
 def _before_and_after(figure: Figure, chart: RunPicture, before: RunPicture) -> list[str]:
-    """The run without its control beside the run with it, on one scale."""
+    """Draw the run without its control and the run with it, to the same scale."""
     old, new = on_plane(before), on_plane(chart)
     size = min(max(old.half, new.half), BEFORE_FACTOR * new.half)
     notes = []
@@ -140,7 +141,7 @@ def crowded(chart: RunPicture, size: float) -> bool:
 
 
 def square(axes: Axes, view: Points, half: float, plane: tuple[int, int] = (0, 1)) -> None:
-    """Equal scales, and the name of the view."""
+    """Set equal scales and the title of the view."""
     (x, y) = view.centre
     axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half))
     axes.set_aspect("equal", adjustable="box", anchor="N")
@@ -152,7 +153,7 @@ def square(axes: Axes, view: Points, half: float, plane: tuple[int, int] = (0, 1
 
 
 def exact(axes: Axes, curve: Array, *, above: bool = False) -> None:
-    """The exact curve: broad and grey below the others, or dashed above them where they would hide it."""
+    """Draw the exact curve: broad and grey below the others, or dashed above them where they would hide it."""
     if above:
         axes.plot(*curve, color="white", linewidth=3.6, zorder=3)
         axes.plot(*curve, zorder=3, **DASHED)
@@ -161,12 +162,12 @@ def exact(axes: Axes, curve: Array, *, above: bool = False) -> None:
 
 
 def body(chart: RunPicture, i: int) -> dict[str, Any]:
-    """Colour, line and mark of a body."""
+    """The colour, line style and marker of a body."""
     return BODIES[i] if chart.places.shape[1] <= len(BODIES) else BODIES[0]
 
 
 def fixed(axes: Axes, view: Points) -> None:
-    """The bodies, and the ends of rods, that do not move."""
+    """Draw the bodies and the ends of rods that do not move."""
     for name, (x, y), _ in view.fixed:
         axes.plot([x], [y], linestyle="", marker="o", markersize=9.0 if name else 5.0, color=GREY, zorder=4)
         low, high = axes.get_xlim()
@@ -176,7 +177,7 @@ def fixed(axes: Axes, view: Points) -> None:
 
 
 def _paths(axes: Axes, chart: RunPicture, view: Points) -> None:
-    """Where each point went, with its start and its end."""
+    """Draw the path of each point, with its start and its end."""
     y, bodies = view.places, view.places.shape[1]
     fixed(axes, view)
     if (joined := chart.links).size:
@@ -208,7 +209,7 @@ def _paths(axes: Axes, chart: RunPicture, view: Points) -> None:
 
 
 def _legend(axes: Axes, chart: RunPicture, long: bool, *, above: bool) -> None:
-    """Names of the bodies, where no orbit can be: above the panel, or below it where its title is above."""
+    """Draw the names of the bodies where there are no orbits: above the panel, or below it if its title is above."""
     from matplotlib.lines import Line2D
 
     bodies = chart.places.shape[1]

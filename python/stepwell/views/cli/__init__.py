@@ -1,6 +1,6 @@
 """The command ``stepwell``.
 
-A command is one file here: its docstring is its help, ``arguments`` says what it takes, and ``command`` does it.
+Each command is a file here: its docstring is its help text, ``arguments`` adds its arguments to a parser, ``command`` runs it.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ COMMANDS = (
     *("figures", "paper"),
 )
 
-#: What a newcomer may type.
-FIRST = "  stepwell run clover --method false_euler -o clover.png\n  stepwell explore"
+#: The commands that the help shows to newcomers.
+EXAMPLES = "  stepwell run clover --method false_euler -o clover.png\n  stepwell explore"
 
-#: Exit codes: what was asked for cannot be done; Ctrl-C, by the custom of shells.
+#: Exit codes: an error; Ctrl-C, as shells have it.
 FAILED, INTERRUPTED = 2, 130
 
 
@@ -35,12 +35,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Args:
-        argv: the words after ``stepwell``; those of the process if None.
+        argv: the words after ``stepwell``; None for those of this process.
 
     Returns:
         0, 2 after an error, 130 after Ctrl-C.
 
-    Without a word it lists the commands.
+    Without arguments it prints the list of commands.
     """
     parser = _parser()
     words = sys.argv[1:] if argv is None else list(argv)
@@ -54,12 +54,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         args.command(args)
         sys.stdout.flush()
     except BrokenPipeError:
-        # The reader of the pipe has seen enough. What is left goes nowhere, and Python's exit finds nothing to flush.
+        # The reader closed the pipe. The rest of the output is discarded, or Python would fail to flush it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (StepwellError, OSError) as error:
         print(_wrapped(f"stepwell: {error}"), file=sys.stderr)
         return FAILED
-    except MemoryError as error:  # of an allocation that no check has counted
+    except MemoryError as error:  # an allocation that no check foresaw
         print(_wrapped(f"stepwell: there is not enough memory for this: {error}".rstrip(": ")), file=sys.stderr)
         return FAILED
     except KeyboardInterrupt:
@@ -69,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _wrapped(message: str) -> str:
-    """A message in lines of the terminal, between words."""
+    """The message, wrapped between words to the width of the terminal."""
     width = width_of_terminal(sys.stderr)
     if len(message) <= width:
         return message
@@ -85,8 +85,8 @@ def _parser() -> argparse.ArgumentParser:
         prog="stepwell",
         usage="stepwell [--version] COMMAND …",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Simple integration algorithms: what each method costs, how wrong\nit is and where it becomes unstable.",
-        epilog=f"commands:\n{listed}\n\nstepwell COMMAND --help says what a command takes. To begin with:\n{FIRST}",
+        description="Simple integration methods: the cost and the error of each, and where\nit becomes unstable.",
+        epilog=f"commands:\n{listed}\n\nstepwell COMMAND --help lists the options of a command. To begin with:\n{EXAMPLES}",
     )
     parser.add_argument("--version", action="version", version=f"stepwell {__version__}")
     commands = parser.add_subparsers(prog="stepwell", required=True, metavar="COMMAND", help=argparse.SUPPRESS)

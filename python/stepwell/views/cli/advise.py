@@ -1,6 +1,6 @@
-"""Advise on a scene: the cheapest method and step.
+"""Find the cheapest method and step for a scene.
 
-That is, of those that are accurate enough; and how far they are from blowing up.
+Ranks the steps of all methods that are accurate enough by their cost, and shows how far each is from instability.
 """
 
 from __future__ import annotations
@@ -24,15 +24,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--frame",
         default="1/60",
         metavar="TIME",
-        help="units of time into which a whole number of steps must fit, such as 0.02 or 1/60; any for any step (default: 1/60)",
+        help="time of a frame, into which a whole number of steps fits, such as 0.02 or 1/60; any for no frame (default: 1/60)",
     )
-    parser.add_argument("--tolerance", type=float, default=1e-2, metavar="E", help="largest state error allowed (default: 0.01)")
-    parser.add_argument("--budget", type=float, metavar="S", help="seconds of computing in a frame (default: the frame)")
+    parser.add_argument(
+        "--tolerance", type=float, default=1e-2, metavar="E", help="the largest state error allowed (default: 0.01)"
+    )
+    parser.add_argument("--budget", type=float, metavar="S", help="seconds of computing time for a frame (default: the frame)")
     options.methods(parser)
-    parser.add_argument("--cost", default="time", metavar="COST", help=f"what to rank by: {' or '.join(COSTS)} (default: time)")
-    parser.add_argument("--fixed", action="store_true", help="fixed steps only, none adaptive")
-    parser.add_argument("--float32", action="store_true", help="also fixed steps in float32, beside float64")
-    options.file(parser, "write all of it: .json")
+    parser.add_argument("--cost", default="time", metavar="COST", help=f"rank by {' or '.join(COSTS)} (default: time)")
+    parser.add_argument("--fixed", action="store_true", help="try fixed steps only")
+    parser.add_argument("--float32", action="store_true", help="also try fixed steps in float32")
+    options.file(parser, "write the full result: .json")
     options.json(parser)
 
 
@@ -56,7 +58,7 @@ def command(args: argparse.Namespace) -> None:
 
 
 def _frame(text: str) -> float | None:
-    """The frame from what is typed: a number, a fraction, or any."""
+    """Parse a number, a fraction, or ``any``: None."""
     if text == "any":
         return None
     numerator, slash, denominator = text.partition("/")

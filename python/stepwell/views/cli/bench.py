@@ -1,7 +1,7 @@
 """Time the methods on this machine.
 
-A step of one member of a batch, on one thread, and what it costs against the others. The methods take turns, and the least time
-of some repeats counts, since whatever else the machine does only adds to it.
+Times a step of one member of a batch, on one thread, and compares the methods. They take turns, and for each the least time of
+several repeats counts: whatever else the machine does only adds to it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     options.methods(parser)
     parser.add_argument(
-        "--members", type=int, metavar="N", help="trajectories in the batch; 1 for a single one (default: some hundreds)"
+        "--members",
+        type=int,
+        metavar="N",
+        help="members (trajectories) of the batch; 1 for a single one (default: some hundreds)",
     )
     options.fused(parser)
     options.file(parser, show.TABLE_TEXT)
@@ -66,14 +69,14 @@ def command(args: argparse.Namespace) -> None:
         ],
         timed,
         notes=[
-            f"± is by how much the median of {CHARTS.repeats} repeats is above their least, which is what is listed.",
+            f"The times are the least of {CHARTS.repeats} repeats; ± is by how much their median is above it.",
             *(f"{name} is refused: {why}" for name, why in refused.items()),
         ],
     )
 
 
 def rows(one: Scene, chosen: list[Method], members: int, fused: bool) -> list[dict[str, Any]]:
-    """A row for each method, the cheapest step first; shares are of the time of one step by each."""
+    """A row for each method, the cheapest step first. ``share`` is relative to the sum of one step by every method."""
     times = step_times(one, chosen, 0 if members == 1 else members, fused)
     least = min(each.low for each in times.values())
     whole = sum(each.low for each in times.values())

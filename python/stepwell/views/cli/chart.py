@@ -1,6 +1,6 @@
 """Chart the error of methods against their cost.
 
-A picture and a table of numbers for each scene, or one for all, and a summary.
+Prints a summary of each scene, and writes its picture and its table of numbers.
 """
 
 from __future__ import annotations
@@ -21,15 +21,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     options.scene(parser, "scenes", "kepler:e=0.5", nargs="+")
     options.folder(parser, here=True)
     options.methods(parser)
-    parser.add_argument("--panel", action="store_true", help="one picture and one table of all scenes")
-    parser.add_argument("--fused", action="store_true", help="also with fused multiply-adds, a second curve of each method")
-    parser.add_argument("--float32", action="store_true", help="also in float32, a further curve of each method")
-    parser.add_argument("--error", choices=ERRORS, default=ERRORS[0], help="which error the pictures show (default: %(default)s)")
+    parser.add_argument("--panel", action="store_true", help="write one picture and one table of all scenes")
+    parser.add_argument("--fused", action="store_true", help="add a curve of each method with fused multiply-adds")
+    parser.add_argument("--float32", action="store_true", help="add a curve of each method in float32")
+    parser.add_argument(
+        "--error", choices=ERRORS, default=ERRORS[0], help="the error that the pictures show (default: %(default)s)"
+    )
     options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
-    # All names and requirements are checked before any work.
+    # Check every name and requirement before any work.
     chosen = [scene(name) for name in args.scenes]
     methods = options.chosen(args)
     names = ["panel"] if args.panel else [one.name for one in chosen]
@@ -98,7 +100,7 @@ def _summary(chart: WorkPrecision, files: list[str]) -> None:
 
 
 def _best(chart: WorkPrecision) -> list[str]:
-    """Which is the cheapest for each of three errors."""
+    """The cheapest method for each target error, in one line."""
     rows = [(error, row) for error in TARGETS if (row := chart.best(error)) is not None]
     text = "; ".join(f"for {error:g} {row['method']} ({_step(row)})" for error, row in rows)
     return [f"cheapest: {text}"] if text else []

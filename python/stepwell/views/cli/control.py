@@ -1,6 +1,6 @@
-"""Chart what a control does, over its gain.
+"""Chart the errors of a controlled system over the gain.
 
-To what it keeps and to the motion: the energy of bodies, or the lengths of rods.
+The controlled quantity is the energy of bodies or the lengths of rods. Charts its error and the state error.
 """
 
 from __future__ import annotations
@@ -12,20 +12,27 @@ from ...errors import ArgumentError
 from ...model.methods import method
 from ...scenes import scene
 from ..charts import ControlSweep, control
+from ..charts.control import METHODS
 from ..charts.picture import title_of
 from . import options, show
 
-#: The columns of the summary that the table shows.
+#: The numbers of the summary that the table shows.
 LEAST = ("least_state_error", "state_at_relative", "least_energy_error", "diverged_from")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", help="a scene of bodies or rods, or a Python file that makes one")
     options.folder(parser, here=True)
-    parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: four)")
-    parser.add_argument("--gains", metavar="A,B,…", help="which gains: h·C·K at the start of bodies, c of rods")
-    parser.add_argument("--evaluations", metavar="N,M,…", help="function evaluations of a run; each number is another step")
-    parser.add_argument("--horizon", type=float, metavar="T", help="the time of each run (default: the scene's)")
+    parser.add_argument("--methods", metavar="A,B,…", help=f"methods, separated by commas (default: {','.join(METHODS)})")
+    parser.add_argument("--gains", metavar="A,B,…", help="gains, separated by commas: h·C·K at the start for bodies, c for rods")
+    parser.add_argument(
+        "--evaluations",
+        metavar="N,M,…",
+        help="function evaluations of a run, separated by commas; each number gives another step",
+    )
+    parser.add_argument(
+        "--horizon", type=float, metavar="T", help="the duration of each run in units of time (default: the scene's)"
+    )
     options.json(parser)
 
 
@@ -68,16 +75,13 @@ def _summary(chart: ControlSweep, files: list[str]) -> None:
             title_of(row["method"]),
             row["kind"],
             f"{row['dt']:.4g}",
-            *(
-                show.number(row[name])
-                for name in ("least_state_error", "state_at_relative", "least_energy_error", "diverged_from")
-            ),
+            *(show.number(row[name]) for name in LEAST),
         )
         for row in chart.summary()
     ]
     show.table(
         f"{chart.title}: the least errors over the gains",
-        ("method", "kept by", "dt>", "state error>", "at gain>", "energy error>", "diverged from gain>"),
+        ("method", "control", "dt>", "state error>", "at gain>", "energy error>", "diverged from gain>"),
         rows,
         ([chart.answer] if chart.answer else [])
         + [f"{title_of(name)}, {kind}, is refused: {why}" for (name, kind), why in chart.refused.items()]

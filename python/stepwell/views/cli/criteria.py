@@ -1,6 +1,6 @@
 """Judge methods by the four criteria of Hoffmann (2002).
 
-They are stability, frequency, operations and the largest step (§1).
+The criteria are stability, error of the frequency, operations per step and the largest stable step (§1).
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     options.method_words(parser)
     default = ",".join(f"{phi:g}" for phi in PHI)
     parser.add_argument(
-        "--phi", default=default, metavar="A,B,…", help=f"Φ = ω₀·dt at which errors are shown (default: {default})"
+        "--phi", default=default, metavar="A,B,…", help=f"values of Φ = ω₀·dt at which errors are shown (default: {default})"
     )
-    parser.add_argument("--markdown", action="store_true", help="print one table in Markdown")
-    options.file(parser, "write it: .json or .md")
+    parser.add_argument("--markdown", action="store_true", help="print a single table in Markdown")
+    options.file(parser, "write the result: .json or .md")
     options.json(parser)
 
 
@@ -50,7 +50,7 @@ def command(args: argparse.Namespace) -> None:
 
 
 def _tables(answers: Criteria, notes: list[str]) -> None:
-    """The one table would be too wide for a screen; its columns in three, each with the methods' names."""
+    """Print three tables: a single one is too wide for a screen. Each begins with the names of the methods."""
     head, rows = answers.table()
     series, costs = 1 + head.index("Ψ/Φ − 1"), head.index("+>")
     parts: tuple[tuple[str, range, list[str]], ...] = (

@@ -1,6 +1,6 @@
 """Explain a step: every operation, by name.
 
-With how often each is computed, and its machine code.
+Shows how often each is computed, and the machine code of the step.
 """
 
 from __future__ import annotations
@@ -20,13 +20,18 @@ from . import options, show
 def arguments(parser: argparse.ArgumentParser) -> None:
     options.system(parser)
     parser.add_argument("method", metavar="METHOD", help="a method; see stepwell methods")
-    parser.add_argument("--members", type=int, metavar="N", help="how many trajectories go together (default: 1)")
+    parser.add_argument("--members", type=int, metavar="N", help="members (trajectories) of the batch (default: 1)")
     options.numbers(parser)
-    parser.add_argument("--attempt", action="store_true", help="an attempt at an adaptive step")
-    parser.add_argument("--form", default="direct", choices=("direct", "matrix"), help="a step by the transition matrix, or not")
+    parser.add_argument("--attempt", action="store_true", help="explain a trial step of adaptive step-size control")
+    parser.add_argument(
+        "--form",
+        default="direct",
+        choices=("direct", "matrix"),
+        help="step by the method's formulas (direct) or by the transition matrix",
+    )
     options.start(parser)
-    parser.add_argument("--record", action="append", default=[], metavar="NAME", help="a quantity to list, too, such as energy")
-    options.file(parser, "write it: .json, .html or .txt")
+    parser.add_argument("--record", action="append", default=[], metavar="NAME", help="also list this quantity, such as energy")
+    options.file(parser, "write the explanation: .json, .html or .txt")
     options.json(parser)
 
 
@@ -60,7 +65,7 @@ def command(args: argparse.Namespace) -> None:
 
 
 def system_and_control(name: str) -> tuple[System, AnyControl | None]:
-    """A scene's system and control, or a system of that class as it is by default."""
+    """The system and the control of a scene, or the system of a class with its default parameters."""
     kind = getattr(systems, name, None)
     if isinstance(kind, type) and issubclass(kind, System) and kind is not System:
         try:

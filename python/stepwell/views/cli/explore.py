@@ -1,6 +1,6 @@
 """Show scenes in the browser, by two methods side by side.
 
-The page has sliders for the step and the parameters, and needs no server; -o writes it to a file.
+The page has sliders for the step and the parameters, and needs no server.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from . import options, show
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--scene", metavar="SCENE", help="the scene that is shown first, or a Python file that makes one (default: clover)"
+        "--scene", metavar="SCENE", help="the scene to show first, or a Python file that makes one (default: clover)"
     )
     parser.add_argument("--only", action="store_true", help="leave out all other scenes")
-    options.file(parser, "write the page there instead of opening it: .html")
+    options.file(parser, "write the page to a file instead of opening it: .html")
     options.json(parser)
 
 

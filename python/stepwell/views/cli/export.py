@@ -1,6 +1,6 @@
 """Write a step as C, JavaScript, Python or Rust.
 
-For use in an engine.
+The source file needs nothing else, so that games and other programs can use it.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from .explain import system_and_control
 def arguments(parser: argparse.ArgumentParser) -> None:
     options.system(parser)
     parser.add_argument("--method", required=True, metavar="METHOD", help="a method; see stepwell methods")
-    parser.add_argument("--language", required=True, metavar="LANGUAGE", help=f"{', '.join(LANGUAGES)}")
+    parser.add_argument("--language", required=True, metavar="LANGUAGE", help=f"one of {', '.join(LANGUAGES)}")
     parser.add_argument(
-        "--dt", type=float, metavar="H", help="the step that the file begins with (default: the scene's, or 0.01)"
+        "--dt", type=float, metavar="H", help="the initial value of the step in the file (default: the scene's, or 0.01)"
     )
     options.start(parser)
     options.numbers(parser)
-    parser.add_argument("--name", metavar="NAME", help="what functions and types are called, or begin with")
-    options.file(parser, "write it there instead of printing it")
+    parser.add_argument("--name", metavar="NAME", help="the name or prefix of functions and types")
+    options.file(parser, "write the source to a file instead of printing it")
     options.json(parser)
 
 

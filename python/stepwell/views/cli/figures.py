@@ -1,6 +1,6 @@
 """Draw the figures of Hoffmann (2002).
 
-The samples of each method on the undamped oscillator (§5 to §11), and the harmonic cases of §4.
+Draws the samples of each method on the undamped oscillator (§5 to §11), and the harmonic cases of §4.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     options.method_words(parser)
     options.folder(parser, here=True)
     parser.add_argument("--phi", type=float, default=0.5, metavar="RAD", help="Φ = ω₀·dt (default: 0.5)")
-    parser.add_argument("--periods", type=float, default=4.0, metavar="N", help="how many periods (default: 4)")
+    parser.add_argument("--periods", type=float, default=4.0, metavar="N", help="number of periods (default: 4)")
     options.json(parser)
 
 

@@ -1,4 +1,4 @@
-"""Arguments that several commands take, and the values that they stand for."""
+"""Arguments that several commands have in common, and the values that they stand for."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from ...base.pictures import new_figure
 from ...model.methods import Method
 from ...model.methods import method as find_method
 
-PRINTED = "energy_control:pair=printed"
+#: A scene with an argument, as the help shows it.
+WITH_ARGUMENT = "energy_control:pair=printed"
 
 
-def scene(parser: argparse.ArgumentParser, name: str = "scene", example: str = PRINTED, **options: Any) -> None:
-    text = f"a scene (see stepwell scenes), with arguments as in {example}, or a Python file that makes one"
+def scene(parser: argparse.ArgumentParser, name: str = "scene", example: str = WITH_ARGUMENT, **options: Any) -> None:
+    text = f"a scene (see stepwell scenes), with arguments as in {example}; or a Python file that makes one"
     parser.add_argument(name, metavar="SCENE", help=text, **options)
 
 
@@ -30,14 +31,14 @@ def method_words(parser: argparse.ArgumentParser) -> None:
 
 
 def methods(parser: argparse.ArgumentParser, default: str = "all") -> None:
-    parser.add_argument("--methods", metavar="A,B,…", help=f"which methods (default: {default})")
+    parser.add_argument("--methods", metavar="A,B,…", help=f"methods, separated by commas (default: {default})")
 
 
 def chosen(args: argparse.Namespace) -> list[Method] | None:
-    """The methods of ``method_words`` or ``methods``, or None.
+    """The methods named on the command line; None for the default.
 
     Raises:
-        UnknownNameError: if there is none of such a name.
+        UnknownNameError: if there is no method of a name.
     """
     words = args.methods.split(",") if isinstance(args.methods, str) else args.methods
     return [find_method(word.strip()) for word in words] if words else None
@@ -45,11 +46,11 @@ def chosen(args: argparse.Namespace) -> list[Method] | None:
 
 def numbers(parser: argparse.ArgumentParser) -> None:
     fused(parser)
-    parser.add_argument("--float32", action="store_true", help="in float32, with half the digits")
+    parser.add_argument("--float32", action="store_true", help="compute in float32 instead of float64")
 
 
 def fused(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
+    parser.add_argument("--fused", action="store_true", help="use fused multiply-adds")
 
 
 def dtype(args: argparse.Namespace) -> Any:
@@ -57,11 +58,11 @@ def dtype(args: argparse.Namespace) -> Any:
 
 
 def start(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--start", metavar="HOW", help="how a method with a choice starts; see stepwell methods NAME")
+    parser.add_argument("--start", metavar="HOW", help="how to start a method that has several starts; see stepwell methods NAME")
 
 
 def json(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 # ---- files
@@ -72,19 +73,19 @@ def file(parser: argparse.ArgumentParser, text: str) -> None:
 
 
 def check_file(args: argparse.Namespace, endings: Iterable[str]) -> None:
-    """Raise if the file cannot be written, before any work is done."""
+    """Raise an error before any work if the file cannot be written."""
     if args.output is not None:
         checks.file("-o", args.output, tuple(endings))
 
 
 def folder(parser: argparse.ArgumentParser, text: str = "", *, here: bool = False) -> None:
-    """A folder for pictures and numbers; the one where the command runs by default, or none."""
-    text = text or "a folder for what is drawn and written (default: this one)"
+    """Add the option of a folder for pictures and tables; its default is the current folder (``here``), or None."""
+    text = text or "a folder for pictures and tables (default: the current one)"
     parser.add_argument("-o", "--output", type=Path, default=Path() if here else None, metavar="DIR", help=text)
 
 
 def check_folder(args: argparse.Namespace, names: Iterable[str] = ()) -> None:
-    """Raise if these files or no pictures can be made there, before any work is done."""
+    """Raise an error before any work if these files or pictures cannot be written there."""
     if args.output is not None:
         checks.folder("-o", args.output, list(names))
-        new_figure(1.0, 1.0)  # raises if there can be no picture
+        new_figure(1.0, 1.0)  # raises an error without matplotlib

@@ -1,6 +1,6 @@
-"""Run the document (Hoffmann 2002), section by section.
+"""Check the statements of Hoffmann (2002) one by one.
 
-Every statement, what it finds here, and every figure.
+Runs each statement and prints the numbers that confirm or correct it; -o draws the figures, too.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from . import options, show
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("section", nargs="?", metavar="SECTION", help='one section, such as 7 or "App. C" (default: all)')
-    options.folder(parser, "a folder: draw the figures into it, too")
+    options.folder(parser, "draw the figures into this folder")
     options.json(parser)
 
 
@@ -39,7 +39,7 @@ def command(args: argparse.Namespace) -> None:
     else:
         show.table(
             "The document, section by section",
-            ("section", "statement", "right instead", "found here", ""),
+            ("section", "statement", "correction", "numbers here", ""),
             [
                 (entry.section, entry.says, plain(entry.corrected), run.numbers, "✓" if run.holds else "✗ not reproduced")
                 for entry, run in zip(chosen, runs, strict=True)
@@ -52,5 +52,5 @@ def command(args: argparse.Namespace) -> None:
 
 
 def plain(text: str) -> str:
-    """Text without the marks of code."""
+    """The text without the backticks of code."""
     return text.replace("`", "")

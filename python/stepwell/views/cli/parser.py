@@ -1,16 +1,16 @@
-"""The parser of the command line, whose messages say what was expected."""
+"""The parser of the command line. Its messages say what was expected."""
 
 from __future__ import annotations
 
 import argparse
 from typing import Any, NoReturn
 
-#: Exit code of words that cannot be understood.
+#: Exit code after a wrong argument.
 WRONG = 2
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors say what it expected, and where to find help."""
+    """An argument parser whose errors say what was expected, and where the help is."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -18,16 +18,16 @@ class Parser(argparse.ArgumentParser):
         self.register("type", int, whole)
 
     def error(self, message: str) -> NoReturn:
-        """End with the message and a hint at the help."""
-        text = message.removeprefix("argument ").replace("the following arguments are required", "still needed")
-        self.exit(WRONG, f"{self.prog}: {text}\n{self.prog} --help says what it takes.\n")
+        """Print the message and how to get help, and exit."""
+        text = message.removeprefix("argument ").replace("the following arguments are required", "missing")
+        self.exit(WRONG, f"{self.prog}: {text}\n{self.prog} --help lists the options.\n")
 
 
 def number(text: str) -> float:
-    """A number.
+    """Parse a number.
 
     Raises:
-        argparse.ArgumentTypeError: what was expected.
+        argparse.ArgumentTypeError: if the text is no number.
     """
     try:
         return float(text)
@@ -36,10 +36,10 @@ def number(text: str) -> float:
 
 
 def whole(text: str) -> int:
-    """A whole number, as 1000 or 1e3.
+    """Parse a whole number, such as 1000 or 1e3.
 
     Raises:
-        argparse.ArgumentTypeError: what was expected.
+        argparse.ArgumentTypeError: if the text is no whole number.
     """
     try:
         return int(text)

@@ -1,6 +1,6 @@
 """Run a scene by a method.
 
-Shows its end and its errors, and writes numbers, a picture or an animation.
+Prints the last state and the errors; -o writes the saved states, a picture or an animation.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from . import options, show
 from .settings import scene_with
 from .verdict import verdict
 
-#: About how many states are saved without --every; more for a picture, whose curves should be smooth.
-KEPT, KEPT_TO_DRAW = 1000, 20_000
+#: The number of states that are saved without --every; more for a picture, whose curves should be smooth.
+SAVED, SAVED_TO_DRAW = 1000, 20_000
 
-#: With a tolerance the state is saved so often; more for a picture.
-ADAPTIVE, ADAPTIVE_TO_DRAW = 100, 2000
+#: The number of states that are saved with a tolerance; more for a picture.
+SAVED_ADAPTIVE, SAVED_ADAPTIVE_TO_DRAW = 100, 2000
 
-#: Digits of a number on the screen, and the most numbers of a block there.
+#: Digits of a number and of an error on the screen, and the most numbers of a block there.
 DIGITS, DIGITS_OF_AN_ERROR, MOST_SHOWN = 8, 3, 12
 
-#: Names of numbers of the report on the screen that differ from those in JSON.
-NAMES = {"kept": "saved states"}
+#: What the screen calls numbers of the report, where JSON has another name.
+SCREEN_NAMES = {"kept": "saved states"}
 
 NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")
 
@@ -47,21 +47,24 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     options.scene(parser)
     parser.add_argument("--method", required=True, metavar="NAME", help="a method; see stepwell methods")
     parser.add_argument("--dt", type=float, metavar="TIME", help="the step (default: the scene's)")
-    parser.add_argument("--steps", type=int, metavar="N", help="how many steps (default: up to the scene's horizon)")
-    parser.add_argument("--every", type=int, metavar="N", help=f"keep every Nth state (default: about {KEPT} in all)")
+    parser.add_argument("--steps", type=int, metavar="N", help="number of steps (default: up to the scene's horizon)")
+    parser.add_argument("--every", type=int, metavar="N", help=f"save every Nth state (default: about {SAVED} in all)")
     parser.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter or the start, as omega=3 or y=2"
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="set a parameter or the start, such as omega=3 or y=2"
     )
-    parser.add_argument("--tolerance", type=float, metavar="E", help="adaptive steps, whose estimated error stays below this")
+    parser.add_argument("--tolerance", type=float, metavar="E", help="take adaptive steps with an estimated error below this")
     options.start(parser)
     parser.add_argument(
-        "--form", default="direct", choices=FORMS, help="step directly, by the transition matrix, or by its powers"
+        "--form",
+        default="direct",
+        choices=FORMS,
+        help="step by the method's formulas (direct), by the transition matrix, or by its powers",
     )
     parser.add_argument(
         "--control",
         metavar="CONTROL",
-        help="what keeps the energy of bodies: a gain and a form, such as 0.3 or 0.3:printed; a projection, scaling or nacozy; "
-        "off for none (default: the scene's)",
+        help="control of the energy of bodies: a gain with or without a form (0.3:printed, 0.3), a projection (scaling, nacozy), "
+        "or off (default: the scene's)",
     )
     options.numbers(parser)
     parser.add_argument(
@@ -71,15 +74,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write the saved states (.csv, .npz), a picture (.png, .svg, .pdf) or an animation (.gif, .mp4, .html)",
     )
-    parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="how long an animation lasts (default: 10)")
-    parser.add_argument("--fps", type=float, default=20.0, metavar="N", help="frames a second of an animation (default: 20)")
+    parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="duration of an animation (default: 10)")
+    parser.add_argument("--fps", type=float, default=20.0, metavar="N", help="frames per second of an animation (default: 20)")
     options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     chosen = scene_with(args.scene, args.set)
     ending = "" if args.output is None else args.output.suffix
-    _ready(args.output, args.seconds, args.fps)
+    _check_output(args.output, args.seconds, args.fps)
     to_draw = ending in (*PICTURES, *ANIMATIONS)
     options: dict[str, Any] = {"control": chosen.control if args.control is None else _control(args.control)}
     options |= {"record": list(chosen.system.quantities)[:1]}
@@ -112,24 +115,24 @@ def command(args: argparse.Namespace) -> None:
     else:
         for name, value in report.items():
             if value is not None:
-                print(f"{NAMES.get(name, name.replace('_', ' ')):21} {_shown(name, value)}")
+                print(f"{SCREEN_NAMES.get(name, name.replace('_', ' ')):21} {_shown(name, value)}")
     written.close()
 
 
 def _fixed(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: dict[str, Any]) -> Run:
-    """The run with steps of one length."""
+    """Run with fixed steps."""
     dt = chosen.dt if args.dt is None else args.dt
     steps = chosen.steps_for(dt) if args.steps is None else args.steps
-    every = max(1, steps // (KEPT_TO_DRAW if to_draw else KEPT)) if args.every is None else args.every
+    every = max(1, steps // (SAVED_TO_DRAW if to_draw else SAVED)) if args.every is None else args.every
     return _noticing(chosen, args, dt=dt, steps=steps, every=every, **options)
 
 
 def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: dict[str, Any]) -> Run:
-    """The run with adaptive steps over the horizon, at equidistant times."""
+    """Run with adaptive steps over the horizon; the states are saved at equidistant times."""
     for option in ("steps", "every"):
         if getattr(args, option) is not None:
             raise ArgumentError(f"--{option}: goes with fixed steps only; with --tolerance the steps follow the error")
-    at = np.linspace(0.0, chosen.horizon, 1 + (ADAPTIVE_TO_DRAW if to_draw else ADAPTIVE))
+    at = np.linspace(0.0, chosen.horizon, 1 + (SAVED_ADAPTIVE_TO_DRAW if to_draw else SAVED_ADAPTIVE))
     return _noticing(chosen, args, dt=args.dt, tolerance=args.tolerance, at=at, **options)
 
 
@@ -138,7 +141,7 @@ def _noticing(chosen: Scene, args: argparse.Namespace, **options: Any) -> Run:
 
 
 def _shown(name: str, value: Any) -> str:
-    """A value in a few digits; --json and files have all."""
+    """The value as the screen shows it, in a few digits; --json and files have all."""
     if isinstance(value, float):
         return f"{value:.{DIGITS_OF_AN_ERROR if name.endswith('error') else DIGITS}g}"
     if isinstance(value, list):
@@ -151,8 +154,8 @@ def _shown(name: str, value: Any) -> str:
     return str(value)
 
 
-def _ready(path: Path | None, seconds: float, fps: float) -> None:
-    """Raise before any work if the file cannot be written, for want of a format, a program or a place."""
+def _check_output(path: Path | None, seconds: float, fps: float) -> None:
+    """Raise an error before any work if the file cannot be written: an unknown format, a missing program or folder."""
     if path is None:
         return
     checks.file("-o", path, (*NUMBERS, *PICTURES, *ANIMATIONS))
@@ -163,7 +166,7 @@ def _ready(path: Path | None, seconds: float, fps: float) -> None:
 
 
 def _control(text: str) -> AnyControl | None:
-    """The control that ``GAIN[:FORM]``, the way of a projection or ``off`` says."""
+    """Parse ``GAIN[:FORM]``, the name of a projection, or ``off``: None."""
     if text == "off":
         return None
     if text in WAYS:

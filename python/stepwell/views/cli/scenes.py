@@ -1,6 +1,6 @@
 """List the scenes.
 
-A scene is a system with its start, a step and, where there is one, the exact solution.
+A scene is a system with an initial state, a step and, where it is known, the exact solution.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What ``--set NAME=VALUE`` changes: an argument of the scene, a parameter of its system, or its start."""
+"""``--set NAME=VALUE``: change an argument of the scene, a parameter of its system, or its start."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ...errors import ArgumentError
 from ...model.systems import System
 from ...scenes import FILE, Scene, _arguments_of, scene
 
-#: The start of a scene.
+#: The blocks of the initial state.
 BLOCKS = ("v", "y")
 
 
 def scene_with(name: str, settings: Sequence[str]) -> Scene:
-    """The scene of that name with what was set.
+    """The scene of a name, changed by the settings.
 
-    An argument of the scene is set as by ``scene:NAME=VALUE``, so that its exact solution is that of the new value. Anything else
-    is set in its system, or at its start; the exact solution is then not known.
+    An argument of the scene is changed as by ``scene:NAME=VALUE``, so its exact solution changes with it. Other settings change
+    the system or the start; the exact solution is then unknown.
 
     Raises:
-        ArgumentError: if it is no setting, or the scene and the system have nothing of that name.
+        ArgumentError: if a text is not NAME=VALUE, or neither the scene nor its system has such a name.
     """
     pairs = [_pair(text) for text in settings]
     known = () if FILE.fullmatch(name) else _arguments_of(name.partition(":")[0])
@@ -61,7 +61,7 @@ def _changed(scene: Scene, key: str, text: str, known: Sequence[str]) -> Scene:
 
 
 def _parameters(system: System) -> dict[str, Any]:
-    """The arguments that make an equal system, by name; none if there are no such arguments."""
+    """The arguments by which the class makes an equal system, by name; empty if attributes do not tell them."""
     names = inspect.signature(type(system)).parameters
     if not all(hasattr(system, name) for name in names):
         return {}
@@ -74,7 +74,7 @@ def _parameters(system: System) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """A number, numbers with commas between them, or a word."""
+    """Parse a number, numbers separated by commas, or a word."""
     try:
         numbers = [float(word) for word in text.strip("[]").split(",")]
     except ValueError:

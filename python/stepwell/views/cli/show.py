@@ -1,4 +1,4 @@
-"""What the commands print and write: tables, or JSON for programs."""
+"""The output of commands: tables, JSON and files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def print_json(value: Any) -> None:
     print(json_text(value))
 
 
-#: The files into which the table of a list is written.
+#: The endings of files to which a list is written.
 TABLE_FILES = (".csv", ".json", ".md")
 TABLE_TEXT = f"write the table: {', '.join(TABLE_FILES)}"
 
@@ -34,7 +34,7 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], not
 
 
 def paragraphs(lines: Iterable[str]) -> None:
-    """Print sentences, which a terminal's width wraps between words."""
+    """Print sentences, wrapped between words to the width of the terminal."""
     width = width_of_terminal()
     for line in lines:
         print("\n".join(textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False)) if line else "")
@@ -48,7 +48,7 @@ def listing(
     data: list[dict[str, Any]],
     notes: Sequence[str] = (),
 ) -> None:
-    """Print a list as a table or as JSON, and write it if a file is asked for; ``data`` has all of it for programs."""
+    """Print a list as a table, or ``data`` as JSON (``--json``), and write it to the file of ``-o``."""
     options.check_file(args, TABLE_FILES)
     written = Written()
     written.write(args.output, lambda path: _write(path, columns, rows, data))
@@ -72,46 +72,46 @@ def _write(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]], da
 
 
 def _cell(value: Any) -> Any:
-    """A value in a file of commas: the parts of a list with semicolons between them."""
+    """A value in a CSV file: lists are joined by semicolons."""
     return "; ".join(map(str, value)) if isinstance(value, (list, tuple)) else value
 
 
 class Written:
-    """Files that a command writes. An error in writing is raised after all other output, so that no result is lost."""
+    """The files that a command writes. Errors are raised by ``close``, after all other output, so that no result is lost."""
 
     def __init__(self) -> None:
         self.files: list[str] = []
         self.error: Exception | None = None
 
     def write(self, path: Path | None, writer: Callable[[Path], Any]) -> Any:
-        """Return the result of ``writer``, or keep its error for ``close``; without a path there is nothing to write."""
+        """Call ``writer`` with the path and return its result; store its error for ``close``. Without a path, do nothing."""
         if path is None:
             return None
         try:
             result = writer(path)
-        except Exception as error:  # whatever it is, it is raised in the end
+        except Exception as error:  # close() raises it
             self.error = self.error or error
             return None
         self.files.append(str(path))
         return result
 
     def notes(self) -> list[str]:
-        """The notes below a table."""
+        """The note on written files, for the end of a table."""
         return [f"written: {', '.join(self.files)}"] if self.files else []
 
     def close(self) -> None:
-        """Raise the stored error."""
+        """Raise the first error of ``write``, if there was one."""
         if self.error is not None:
             raise self.error
 
 
 def progress(title: str, args: argparse.Namespace) -> AbstractContextManager[Callable[[float], object] | None]:
-    """A progress bar, and the function that takes the share that is done; none beside JSON."""
+    """A progress bar, as a function that takes the share of the work that is done; no bar with ``--json``."""
     from ...base.progress import bar
 
     return nullcontext() if args.json else bar(title)
 
 
 def number(value: float) -> str:
-    """A number in the digits that are looked at."""
+    """A number in three digits; a dash if it is not finite."""
     return f"{value:.3g}" if math.isfinite(value) else "–"

@@ -1,6 +1,6 @@
 """Chart where methods are stable.
 
-The eigenvalues of a step, how much it grows or damps, and the largest stable steps.
+Prints the largest stable steps; -o draws the eigenvalues of a step, its growth or damping, and stability maps.
 """
 
 from __future__ import annotations
@@ -16,26 +16,28 @@ from ..charts import Stability, powers, stability, stability_map
 from ..charts.zplane import KINDS, ladder, within
 from . import options, show
 
-#: The default drawings: the pictures of all methods, and the map of each. Powers are drawn if asked for.
+#: The default charts: those of all methods, and the map of each. Powers are drawn only if --charts names them.
 USUAL = (*KINDS, "map")
 CHARTS = (*USUAL, "powers")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     options.method_words(parser)
-    options.folder(parser, "a folder for pictures and numbers")
-    parser.add_argument("--charts", metavar="A,B,…", help=f"which of {', '.join(CHARTS)} to draw (default: all but powers)")
+    options.folder(parser, "draw the charts into this folder")
+    parser.add_argument(
+        "--charts", metavar="A,B,…", help=f"charts to draw, separated by commas: {', '.join(CHARTS)} (default: all but powers)"
+    )
     parser.add_argument("--phi", type=float, metavar="RAD", help="the largest Φ = ω₀·dt (default: past the largest limit)")
     options.json(parser)
 
 
 def command(args: argparse.Namespace) -> None:
-    # All names and requirements are checked before any work.
+    # Check every name and requirement before any work.
     methods = options.chosen(args)
     names = USUAL if args.charts is None else tuple(name.strip() for name in args.charts.split(","))
     kinds = [checks.known("--charts", name, CHARTS) for name in dict.fromkeys(names)]
     if args.charts is not None and args.output is None:
-        raise ArgumentError("-o: expected a folder for what --charts asks for")
+        raise ArgumentError("-o: expected a folder for the charts of --charts, got none")
     top = None if args.phi is None else within("--phi", checks.number("--phi", args.phi, positive=True, unit="rad"))
     options.check_folder(args, ["stability.csv", *(f"stability-{kind}.png" for kind in kinds)])
 
@@ -67,7 +69,7 @@ def command(args: argparse.Namespace) -> None:
 
 
 def _write(chart: Stability, folder: Path, kinds: list[str], top: float | None, written: show.Written) -> dict[str, str]:
-    """Write the drawings; returns the methods without a map, and why."""
+    """Write the charts; return the reasons why some methods have no map."""
     folder.mkdir(parents=True, exist_ok=True)
     for kind in kinds:
         if kind in KINDS:

@@ -1,7 +1,7 @@
-"""Tables of text that cut nothing: names, numbers and paths stay whole at any width.
+"""Text tables that keep names, numbers and paths whole at any width.
 
-Where a table does not fit, words of its prose go on in the next line. Where that is not enough, it becomes several tables, each
-with the first column. What goes into a file or a pipe is not wrapped at all.
+A table that is too wide for the terminal has its prose wrapped between words. If that is not enough, it is split into several
+tables, each with the first column. Output to a file or a pipe is not wrapped.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from unicodedata import combining, east_asian_width
 #: Between two columns.
 GAP = "   "
 
-#: A column of prose is not made narrower than this, if its text is longer.
+#: The least width of a column of prose whose text is longer.
 MIN_PROSE = 28
 
-#: No terminal: lines of any length.
+#: The width where there is no terminal: lines of any length.
 UNLIMITED = 1_000_000
 
 
 def width_of_terminal(stream: TextIO | None = None) -> int:
-    """How many characters a line may have: those of the terminal, of ``COLUMNS``, or any number in a file or a pipe."""
+    """The most characters of a line: the width of the terminal or ``COLUMNS``; unlimited in a file or a pipe."""
     if not (stream or sys.stdout).isatty() and not os.environ.get("COLUMNS", "").isdigit():
         return UNLIMITED
     return max(20, shutil.get_terminal_size().columns)
@@ -43,12 +43,12 @@ def lines_of(
     """The lines of a table.
 
     Args:
-        title: above it.
-        columns: their names; those that end in ``>`` are flush right, and their cells are never divided.
-        rows: their cells.
-        notes: sentences below it.
-        width: the most characters of a line; a word that is longer stays whole.
-        bold: print titles in bold, and notes faint, as terminals do.
+        title: the line above the table.
+        columns: the names of the columns; those that end in ``>`` are flush right, and their cells are never wrapped.
+        rows: the cells of each row.
+        notes: sentences below the table.
+        width: the most characters of a line; a longer word stays whole.
+        bold: whether titles are bold and notes faint, by escape codes of terminals.
     """
     names = [name.removesuffix(">") for name in columns]
     right = [name.endswith(">") for name in columns]
@@ -73,12 +73,12 @@ def lines_of(
 
 
 def length(text: str) -> int:
-    """The width of a text on a terminal."""
+    """The number of places that a text takes on a terminal."""
     return sum(0 if combining(c) else 2 if east_asian_width(c) in "WF" else 1 for c in text)
 
 
 def _least(name: str, cells: Sequence[str], whole: bool) -> int:
-    """The least width of a column: its longest word; of prose, enough to be read."""
+    """The least width of a column: its longest word, and for prose at least ``MIN_PROSE``."""
     words = [length(word) for word in name.split()]
     if whole:
         return max([*words, *map(length, cells)], default=0)
@@ -87,7 +87,7 @@ def _least(name: str, cells: Sequence[str], whole: bool) -> int:
 
 
 def _parts(least: Sequence[int], width: int) -> list[list[int]]:
-    """The columns of each table: as many as fit, with the first in each."""
+    """The indices of the columns of each table: as many as fit, the first column in each."""
     parts, room = [[0]], width - least[0]
     for i in range(1, len(least)):
         needed = least[i] + len(GAP)
@@ -100,7 +100,7 @@ def _parts(least: Sequence[int], width: int) -> list[list[int]]:
 
 
 def _widths(wide: Sequence[int], least: Sequence[int], width: int) -> list[int]:
-    """The width of each column: as wide as its text if there is room; otherwise the widest give up what is missing."""
+    """The width of each column: that of its text if all fit; otherwise the widest columns shrink, not below their least."""
     widths = list(wide)
     missing = sum(widths) + len(GAP) * (len(widths) - 1) - width
     while missing > 0:
@@ -113,7 +113,7 @@ def _widths(wide: Sequence[int], least: Sequence[int], width: int) -> list[int]:
 
 
 def _row(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool], bottom: bool = False) -> list[str]:
-    """The lines of a row; a head stands at the bottom of its lines."""
+    """The lines of a row; ``bottom`` aligns the names of columns with the line below them."""
     columns = [_wrapped(cell, width) or [""] for cell, width in zip(cells, widths, strict=True)]
     height = max(map(len, columns))
     padded = [[""] * (height - len(c)) + c if bottom else c + [""] * (height - len(c)) for c in columns]
@@ -126,7 +126,7 @@ def _row(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool], bot
 
 
 def _wrapped(text: str, width: int) -> list[str]:
-    """A text in lines, divided between words only."""
+    """The lines of a text, wrapped between words only."""
     if length(text) <= width:
         return [text]
     return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False)

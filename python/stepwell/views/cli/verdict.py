@@ -1,4 +1,4 @@
-"""How a run ended, in words."""
+"""A short verdict on how a run ended."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from ..charts.runs_finding import MIN_GROWTH, MIN_GROWTH_UNKNOWN, growth_of, ten
 
 #: Why a run with a tolerance stopped.
 STOPPED = {
-    Status.DIVERGED: "left the finite numbers",
-    Status.BUDGET: "used up the most steps that are allowed",
-    Status.UNDERFLOW: "would need steps too short to change the time",
+    Status.DIVERGED: "the state is no longer finite",
+    Status.BUDGET: "reached the largest number of steps allowed",
+    Status.UNDERFLOW: "steps would be too short to change the time",
     Status.NOT_FINITE: "no step gave a finite state",
 }
 
 
 def verdict(picture: RunPicture) -> str:
-    """A word or two on whether the run followed the motion, and the number that shows it."""
+    """Whether the run followed the motion, in a few words, and the number that shows it."""
     run = picture.run
     if run.status:
         step = int(run.first_bad_step)
@@ -28,7 +28,7 @@ def verdict(picture: RunPicture) -> str:
         return f"grew by {tenfold(growth)}: unstable"
     error = picture.summary()["largest_state_error"]
     if error is None:
-        return "finite to the end; the true motion is not known, so neither is the error"
+        return "finite to the end; the error is unknown, because the true motion is unknown"
     if error > 1.0:
-        return f"bounded, but wrong: the state error is up to {error:.2g}, where 1 is as large as the solution"
+        return f"bounded, but wrong: the state error is up to {error:.2g}, where 1 is the size of the solution"
     return f"bounded; the state error is at most {error:.2g}"

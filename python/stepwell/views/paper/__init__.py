@@ -1,8 +1,8 @@
-"""The document (Hoffmann 2002), section by section: where each of its statements is in stepwell, and the statement run.
+"""The statements of the document (Hoffmann 2002), each with its place in stepwell and a check that runs it.
 
-A section is a module here. Each of its functions is one statement: an algorithm, a formula, a program, a figure, a piece of
-advice. It is run, and what it finds is compared with what the document says. ``docs/theory/paper.md`` and the command
-``stepwell paper`` are made from these entries, and the tests run them all.
+A module here is a part of the document, and a function is the check of one statement: an algorithm, a formula, a program, a
+figure, a piece of advice. It compares the numbers computed here with those of the document. ``docs/theory/paper.md`` and the
+command ``stepwell paper`` are generated from these entries, and the tests run them all.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ KINDS = ("demand", "formula", "algorithm", "program", "figure", "advice", "warni
 
 
 class Finding(NamedTuple):
-    """The result of running a statement.
+    """The result of the check of a statement.
 
     Attributes:
-        holds: whether stepwell confirms the entry, or its correction where the document is wrong.
-        numbers: the numbers that show it, in a few words.
+        holds: whether stepwell confirms the statement, or its correction where the document is wrong.
+        numbers: the numbers that show it, as a short text.
     """
 
     holds: bool
@@ -42,11 +42,11 @@ class Entry(NamedTuple):
         section: as the document numbers it: ``§7``, ``App. C``.
         kind: one of ``KINDS``.
         says: the statement, in our words.
-        here: where it is in stepwell.
-        corrected: what is right instead, where the document is wrong or says too much; empty where it holds as it stands.
-        check: runs it.
-        picture: the name of its picture, or empty.
-        draw: draws the picture to a path, or None.
+        here: the functions and commands of stepwell that it concerns.
+        corrected: the correction, where the document is wrong or claims too much; empty where the statement holds.
+        check: the function that checks it.
+        picture: the file name of its picture; empty without one.
+        draw: draws the picture into a file; None without one.
     """
 
     section: str
@@ -60,19 +60,19 @@ class Entry(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The name of the function that runs it."""
+        """The name of its check."""
         return self.check.__name__
 
     def run(self) -> Finding:
-        """Run it."""
+        """Run its check."""
         return self.check()
 
 
 class Section:
-    """Collects the entries of a section; an instance decorates the functions of a module.
+    """A decorator of checks: each becomes an entry of one section.
 
     Args:
-        section: as the document numbers it.
+        section: as the document numbers it: ``§7``, ``App. C``.
     """
 
     def __init__(self, section: str) -> None:
@@ -81,7 +81,7 @@ class Section:
     def __call__(
         self, kind: str, says: str, here: str, corrected: str = "", draw: Callable[[Path], object] | None = None
     ) -> Callable[[Callable[[], Finding]], Callable[[], Finding]]:
-        """Make an entry of a function."""
+        """The decorator of one check. The arguments are the attributes of ``Entry``."""
         assert kind in KINDS, kind
 
         def add(check: Callable[[], Finding]) -> Callable[[], Finding]:
@@ -132,14 +132,14 @@ def draw(folder: str | Path, section: str | None = None) -> list[Path]:
     """Draw every figure of the document, or those of a section, into a folder.
 
     Args:
-        folder: where to; it is made if it is not there.
-        section: as ``entries`` takes it.
+        folder: the folder; it is created if it does not exist.
+        section: as in ``entries``.
 
     Returns:
         The paths, in the order of the document.
 
     Raises:
-        ArgumentError: if nothing can be written there, or there is no such section.
+        ArgumentError: if nothing can be written there, or there is no such section, or it has no figure.
         UnsupportedError: if matplotlib is missing.
     """
     from ...base.pictures import new_figure
@@ -148,7 +148,7 @@ def draw(folder: str | Path, section: str | None = None) -> list[Path]:
     if not chosen:
         raise ArgumentError(f"section: {section} has no figure")
     place = checks.folder("folder", folder, [entry.picture for entry in chosen])
-    new_figure(1.0, 1.0)  # before the folder is made: it may be that nothing can be drawn
+    new_figure(1.0, 1.0)  # raises an error without matplotlib, before the folder is created
     place.mkdir(parents=True, exist_ok=True)
     for entry in chosen:
         assert entry.draw is not None

@@ -27,11 +27,11 @@ def _draw(path: Path) -> object:
     "first, then the Euler angles from the new ones.",
     "`sw.Aircraft(roll=…, pitch=…)`; `stepwell run aircraft`",
     "Initial state, commands and duration are not printed, and the display shows −θ and −ψ. `While φ > 180` takes very long for "
-    "large angles: here a remainder does it.",
+    "large angles; here it is a remainder.",
     draw=_draw,
 )
 def aircraft_turns() -> Finding:
-    """The steady turn for a commanded roll of 30°: the controllers have no integral part."""
+    """The steady turn under a commanded roll of 30°, which is not reached: the controllers have no integral part."""
     run = quietly(Aircraft(roll=30.0), "false_euler", v=0.0, y=0.0, dt=0.1, steps=600, every=1)
     roll, pitch, _ = run.y[-1]
     turn = float(run.y[-1, 2] - run.y[-2, 2]) / 0.1
@@ -41,13 +41,13 @@ def aircraft_turns() -> Finding:
 
 @section("program", "The switch CO turns the controllers of roll and pitch on.", "`sw.Aircraft(controllers=False)`")
 def aircraft_controllers() -> Finding:
-    """A roll of 10°, with and without controllers."""
-    left = [
+    """The rest of a roll of 10° after 20 s, with and without controllers."""
+    rolls = [
         float(quietly(Aircraft(controllers=on), "false_euler", v=0.0, y=[10.0, 0.0, 0.0], dt=0.1, steps=200).y[-1, 0])
         for on in (True, False)
     ]
     return Finding(
-        abs(left[0]) < 0.1 < abs(left[1]), f"roll after 20 s from 10°: {left[0]:.3f}° with them, {left[1]:.2f}° without"
+        abs(rolls[0]) < 0.1 < abs(rolls[1]), f"roll after 20 s from 10°: {rolls[0]:.3f}° with them, {rolls[1]:.2f}° without"
     )
 
 
@@ -58,7 +58,7 @@ def aircraft_controllers() -> Finding:
     "False Euler would be stable up to 0.436 s (roll).",
 )
 def aircraft_limit() -> Finding:
-    """The limit near level flight."""
+    """The stability limit at level flight."""
     limit = float(stability_limit(Aircraft(), "false_euler", v=np.zeros(3), y=np.zeros(3)))
     return Finding(abs(limit - 0.436357) < 1e-6, f"stable for T < {limit:.6f} s")
 
@@ -67,7 +67,7 @@ def aircraft_limit() -> Finding:
     "warning",
     "The singularity of gimbal lock is trapped: |cos θ| is at least 10⁻⁵.",
     '`sw.Aircraft("quaternion")`, with `sw.NormControl` or `sw.Projection("norm")`; `sw.scenes.gimbal_trap()`',
-    "That avoids a division by zero, but one step may jump by 10⁵·ω·T. The form with a quaternion has no such place.",
+    "That avoids a division by zero, but one step may jump by 10⁵·ω·T. The form with a quaternion has no singularity.",
 )
 def aircraft_trap() -> Finding:
     """A step at θ = 90° in both forms, without torques."""
@@ -88,7 +88,7 @@ def aircraft_trap() -> Finding:
     "formula",
     "Without torques a rigid body keeps its energy.",
     "`run.energy`",
-    "Not stated in the document, and False Euler does not keep it: it is a test of any method.",
+    "The document does not state it. False Euler does not keep the energy; so it is a test of any method.",
 )
 def aircraft_energy() -> Finding:
     """The energy over 100 s without torques."""

@@ -27,12 +27,12 @@ def _draw_clover(path: Path) -> object:
     "figure",
     "Three bodies under gravity by False Euler with T = 0.3: the first 100 steps draw a clover leaf about the true orbit.",
     "`sw.scenes.clover()`; `stepwell run clover`",
-    "The program divides by the squared distance: the force is 1/r, and the true orbit the unit circle. Its first step reads "
-    "places before they are set; the old ones are meant.",
+    "The program divides by the squared distance: the force is 1/r, and the true orbit is the unit circle. Its first step reads "
+    "positions before they are set; the old ones are meant.",
     draw=_draw_clover,
 )
 def clover() -> Finding:
-    """Radii of the first 100 steps."""
+    """The radii in the first 100 steps lie on both sides of 1."""
     run = scene("clover").run("false_euler", steps=100, every=1)
     radius = np.linalg.norm(run.y, axis=-1)
     return Finding(0.9 < radius.min() < 1 < radius.max() < 1.13, f"radii from {radius.min():.3f} to {radius.max():.3f}")
@@ -40,7 +40,7 @@ def clover() -> Finding:
 
 @section_c("advice", "The solution is not accurate but stable ad infinitum.", "`sw.scenes.clover()`")
 def clover_stays() -> Finding:
-    """Radii over 100 000 steps."""
+    """The radii stay bounded over 100 000 steps."""
     run = quiet_run(scene("clover"), "false_euler", steps=100_000, every=10)
     radius = np.linalg.norm(run.y, axis=-1)
     return Finding(
@@ -73,7 +73,7 @@ def _draw_control(path: Path) -> object:
     "Three bodies by Standard Euler, 100 000 steps of 0.01: unstable, but stable with energy control, C = 0.3.",
     '`sw.scenes.energy_control(pair="printed", form="printed")`; `sw.EnergyControl`',
     "The printed energy −1/r is not the potential of the printed force 1/r, which is ln r: "
-    '`pair="matching"` is the pair that belongs together. h·C·K above 1 overshoots: `form="limited"` does not.',
+    '`pair="matching"` uses a force and its potential. A step with h·C·K above 1 overshoots; with `form="limited"` none does.',
     draw=_draw_control,
 )
 def energy_controlled() -> Finding:
@@ -89,7 +89,7 @@ def energy_controlled() -> Finding:
     "The velocities of Appendix D are radial: with ε = 0 the three bodies meet at the centre. The circle is that of Appendix C.",
 )
 def symmetric_start() -> Finding:
-    """How near the three come to the centre within the first turn of the motion."""
+    """The least distance of the third body from the centre, up to t = 4."""
     run = quiet_run(energy_control(eps=0.0), "leapfrog", dt=1e-4, steps=40_000, every=1, control=None)
     radius = np.linalg.norm(run.y[:, 2], axis=-1)
     nearest = float(np.nanmin(radius))
@@ -100,7 +100,7 @@ def symmetric_start() -> Finding:
     "formula", "The control adds −C·ΔE·∂E/∂v to each acceleration (Baumgarte 1972).", '`sw.EnergyControl(gain, form="printed")`'
 )
 def control_term() -> Finding:
-    """One step by Standard Euler with and without the control, against the formula."""
+    """One controlled step of Standard Euler, against an uncontrolled step and the formula."""
     scene = energy_control(pair="printed", form="printed")
     control = EnergyControl(0.3, "printed", target=-2.0)
     free = quiet_run(scene, "standard_euler", steps=1, control=None)

@@ -1,4 +1,4 @@
-"""§12: which method for what, and constraints as control terms."""
+"""§12: which method suits which system, and constraints as control terms."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ section = Section("§12")
     "Below Φ = 2 of the fastest oscillation; close encounters have no bound.",
 )
 def use_false_euler() -> Finding:
-    """One oscillator of 60 Hz frames, near the limit, for an hour."""
+    """An oscillator near the stability limit of 60 steps a second, for an hour."""
     limit = 2.0 * 60.0
     run = quietly(Oscillator(0.99 * limit), "false_euler", v=0.0, y=1.0, dt=1 / 60, steps=216_000, every=1)
     largest = float(np.abs(run.y).max())
@@ -54,12 +54,12 @@ def use_heun() -> Finding:
 
 @section(
     "advice",
-    "Everything else by higher Runge-Kutta methods that choose their steps: Merson, Fehlberg.",
+    "Everything else by Runge-Kutta methods of higher order with adaptive steps: Merson, Fehlberg.",
     '`integrate(…, "merson", tolerance=…, at=…)`; `fehlberg`, `fehlberg_5`, `dop853`',
     "With small fixed steps Fehlberg adds energy to an undamped oscillator at every step; Merson does not.",
 )
 def use_runge_kutta() -> Finding:
-    """An eccentric orbit by Merson with a tolerance, and the growth of Fehlberg."""
+    """The error of an eccentric orbit by Merson with a tolerance, and the growth by Merson and by Fehlberg in fixed steps."""
     kepler = scene("kepler")
     run = quietly(kepler.system, "merson", v=kepler.v, y=kepler.y, tolerance=1e-9, at=[kepler.horizon])
     error = float(kepler.state_error(run)[-1])
@@ -78,10 +78,11 @@ def use_runge_kutta() -> Finding:
     "warning",
     "The motion of a satellite drifts away in radius and phase even by a good method: its energy needs a control.",
     "`sw.EnergyControl`, `sw.Projection`; `sw.charts.control`",
-    "A symplectic method keeps the radius without control; a control of the energy keeps the radius, and only some of the phase.",
+    "A symplectic method keeps the radius without control. A control of the energy keeps the radius, but corrects the phase only "
+    "in part.",
 )
 def satellite() -> Finding:
-    """Two bodies on a circle, 1000 turns of 30 steps, by RK4 without and with control, and by leapfrog."""
+    """Two bodies on a circle, 1000 turns of 30 steps: by RK4 without and with projection, and by leapfrog."""
     system = NBody([0.5, 0.5], force="newton")
     state: dict[str, Any] = {
         "v": np.array([[0.0, -0.5], [0.0, 0.5]]),
@@ -109,12 +110,12 @@ def _draw_rods(path: Path) -> object:
     "advice",
     "A pendulum in x, y and z: the length of the rod is a priori constant, and its deviation is the control term.",
     '`sw.Pendulum3D`, `sw.Rods`; `sw.LengthControl(c)`, `sw.Projection("length")`; `sw.charts.control`',
-    "Control is better than resetting only for False and Damped Euler. For others resetting is: control leaves them of second "
-    "order or less.",
+    "Control is better than resetting only for False and Damped Euler. For others resetting is better: control reduces them to "
+    "second order or less.",
     draw=_draw_rods,
 )
 def pendulum_in_space() -> Finding:
-    """The 90° swing over 75 units of time with T = 0.01: the largest error of the energy, by control and by resetting."""
+    """The largest energy error of a 90° swing over 75 units of time with T = 0.01, by control and by resetting."""
     errors = {}
     for method in ("false_euler", "rk4"):
         for control in (LengthControl(0.5), Projection("length")):
@@ -137,11 +138,11 @@ def _draw_norm(path: Path) -> object:
     "advice",
     "The norm of a quaternion can be stabilised; resetting it to one may work, but control is probably better.",
     '`sw.RigidBody`; `sw.NormControl(k)`, `sw.Projection("norm")`; `sw.charts.norm`',
-    "For Euler at a steady rate. Resetting changes no attitude; with methods of higher order control makes it worse.",
+    "It is better for Euler at a steady rate. Resetting does not change the attitude; control degrades methods of higher order.",
     draw=_draw_norm,
 )
 def quaternion_norm() -> Finding:
-    """Standard Euler at a steady rate with Φ = h|ω|/2 = 0.1: by how much a step's angle is wrong, relative."""
+    """The relative error of the angle of a step: Standard Euler at a steady rate, Φ = h|ω|/2 = 0.1."""
     wrong = []
     start: dict[str, Any] = {"v": [0.0, 0.0, 2.0], "y": [1.0, 0.0, 0.0, 0.0], "dt": 0.1, "steps": 2000, "every": 1}
     for control in (Projection("norm"), NormControl(5.0)):
@@ -149,7 +150,7 @@ def quaternion_norm() -> Finding:
         angle = np.unwrap(np.arctan2(run.y[:, 3], run.y[:, 0]))
         wrong.append(float(angle[-1] - angle[-2]) / 0.1 - 1.0)
     phi = 0.1
-    # All orders: atan(Φ)/Φ − 1 with resetting, asin(Φ)/Φ − 1 under control.
+    # Exactly: atan(Φ)/Φ − 1 with resetting, asin(Φ)/Φ − 1 under control.
     wanted = math.atan(phi) / phi - 1.0, math.asin(phi) / phi - 1.0
     holds = all(abs(error - exact) < 1e-9 for error, exact in zip(wrong, wanted, strict=True))
     return Finding(holds, f"Φ = 0.1: {wrong[0]:+.2e} a step with resetting (−Φ²/3), {wrong[1]:+.2e} under control (+Φ²/6)")
@@ -164,11 +165,11 @@ def _draw_springs(path: Path) -> object:
     "advice",
     "Mass and spring systems by False Euler.",
     "`sw.Springs`, `sw.Chain`; `Springs.safe_step(method)`; `sw.scenes.cloth()`, `rope_bridge()`, `jelly_cube()`",
-    "The limit of a net is known before it is run: h²·ω² < 4 for its fastest oscillation.",
+    "The limit of a net is known before the run: h²·ω² < 4 for its fastest oscillation.",
     draw=_draw_springs,
 )
 def spring_nets() -> Finding:
-    """Ten masses on a line at 99 % of the safe step, and at one and a half of it."""
+    """Ten masses on a line, stepped by 99 % and by 150 % of the safe step."""
     net = Springs([(i, i + 1) for i in range(9)], stiffness=100.0, rest=1.0, dim=2)
     y = np.stack([np.arange(10.0), np.zeros(10)], axis=1) + 0.01 * np.random.default_rng(1).normal(size=(10, 2))
     safe = float(net.safe_step("false_euler"))
@@ -185,7 +186,10 @@ def spring_nets() -> Finding:
     "Which method a scene needs is a question of cost and error.",
     "`sw.advise`; `stepwell advise`; `sw.charts.work_precision`",
 )
-def asks() -> Finding:
-    """Advice for the clover leaf; which method is fastest depends on the machine, that it is accurate does not."""
+def method_advice() -> Finding:
+    """The best method for the clover leaf is accurate. Which method that is depends on the machine."""
     best = advise("clover", tolerance=1e-2).best
-    return Finding(best is not None and best.error <= 1e-2, "the method and the step that it names keep the clover leaf to 1 %")
+    return Finding(
+        best is not None and best.error <= 1e-2,
+        "the advised method and step have a state error of at most 1 % on the clover leaf",
+    )

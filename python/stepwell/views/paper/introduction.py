@@ -1,4 +1,4 @@
-"""§1 to §3: what a method is judged by, the names, and how a system is written."""
+"""§1 to §3: the criteria of a method, the symbols, and the forms of a system."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ section_1, section_2, section_3 = Section("§1"), Section("§2"), Section("§3")
     "The last is a limit from above: the longest step that is stable.",
 )
 def four_criteria() -> Finding:
-    """Every method has the four answers."""
+    """Every method has an answer to each of the four."""
     answers = criteria()
     whole = all(c.operations.additions + c.operations.multiplications > 0 and len(c.at) > 0 and c.limit >= 0 for c in answers)
     best = max(answers, key=lambda c: float(c.limit) / c.method.evaluations)
     return Finding(
-        whole, f"{len(answers)} methods; the longest step per function evaluation has {best.method.title}: Φ < {best.limit:.4g}"
+        whole, f"{len(answers)} methods; {best.method.title} has the longest step per function evaluation: Φ < {best.limit:.4g}"
     )
 
 
@@ -44,12 +44,12 @@ def _draw_reflection(path: Path) -> object:
     "demand",
     "An elastic reflection may have a wrong frequency, but must not add energy, even if the step is not small.",
     "`sw.Floor`, `sw.Sphere`: `Particles(floor=…)`; `sw.scenes.bouncing_ball()`",
-    "A one-sided spring, and a velocity that is turned over, do not hold that for every phase, step and method; the default of "
+    "A one-sided spring and a reversed velocity do not ensure that for every phase, step and method; the default of "
     "`Floor` does.",
     draw=_draw_reflection,
 )
 def elastic_reflection() -> Finding:
-    """The largest energy after an impact over that before it, over a hundred phases, by a spring and by the default."""
+    """The largest ratio of the energies after and before an impact, of 100 phases: with a spring and with the default."""
     heights = np.linspace(0.0, 1.0, 100, endpoint=False)
     grown = []
     for floor in (Floor(way="spring", omega=1.5), Floor()):
@@ -70,7 +70,7 @@ def elastic_reflection() -> Finding:
     "`analyse(…).true_angle`, `.angle`, `.omega`",
 )
 def angles() -> Finding:
-    """Both angles of False Euler at Φ = 1."""
+    """Φ and Ψ of a step by False Euler at ω₀ = 2, T = 0.5."""
     step = analyse(Oscillator(omega=2.0), "false_euler", dt=0.5)
     holds = math.isclose(step.true_angle, 1.0) and math.isclose(step.angle, step.omega * 0.5)
     return Finding(holds, f"ω₀ = 2, T = 0.5: Φ = {step.true_angle:.4f}, Ψ = {step.angle:.4f}, Ω₀ = {step.omega:.4f}")
@@ -82,22 +82,22 @@ def angles() -> Finding:
     "`sw.LinearSystem(A, B, C, D, x=…)`, `run.z`",
 )
 def state_space() -> Finding:
-    """A lead element, whose transfer function (1 + 2s)/(1 + s) has numerator and denominator of the same degree."""
+    """The step response of (1 + 2s)/(1 + s), where x acts on z at once (D is not zero)."""
     system = LinearSystem([[-1.0]], [[1.0]], [[-1.0]], [[2.0]], x=[1.0], velocities=0)
     run = quietly(system, "rk4", v=0.0, y=0.0, dt=0.01, steps=100, every=100)
     z = np.asarray(run.z).ravel()
     first, last = float(z[0]), float(z[-1])
     holds = first == 2.0 and abs(last - (1.0 + math.exp(-1.0))) < 1e-9
-    return Finding(holds, f"a unit step in at (1 + 2s)/(1 + s): z = {first:.4f} at once, {last:.6f} at t = 1")
+    return Finding(holds, f"unit step response of (1 + 2s)/(1 + s): z = {first:.4f} at once, {last:.6f} at t = 1")
 
 
 @section_3(
     "formula",
-    "The oscillator in physical form and in canonical form, with the scaled velocity v/ω₀, is one and the same.",
+    "The oscillator's physical form and its canonical form, whose velocity is v/ω₀, describe the same motion.",
     '`Oscillator(omega, damping, form="physical")`, `form="canonical"`',
 )
 def forms() -> Finding:
-    """Both forms, from the same start."""
+    """Both forms have the same y, from the same start."""
     canonical = quietly(Oscillator(2.0, 0.1), "rk4", v=0.5, y=1.0, dt=0.01, steps=500)
     physical = quietly(Oscillator(2.0, 0.1, form="physical"), "rk4", v=1.0, y=1.0, dt=0.01, steps=500)
     apart = abs(float(canonical.y[-1] - physical.y[-1]))
@@ -110,7 +110,7 @@ def forms() -> Finding:
     "`Oscillator(damping=…, x=…)`",
 )
 def overshoot() -> Finding:
-    """The largest y of the step response; exact is exp(−π·D/√(1 − D²)) = exp(−π)."""
+    """The overshoot of the step response is exp(−π·D/√(1 − D²)), here exp(−π)."""
     system = Oscillator(damping=math.sqrt(0.5), x=1.0)
     y = quietly(system, "rk4", v=0.0, y=0.0, dt=0.001, steps=8000, every=1).y
     over = float(y.max()) - 1.0
@@ -123,7 +123,7 @@ def overshoot() -> Finding:
     "`Oscillator(damping=…)`; `damped_euler`",
 )
 def two_dampings() -> Finding:
-    """Standard Euler on an undamped oscillator grows; with D = Φ/2 its amplitude stays."""
+    """By Standard Euler an undamped oscillator grows; with D = Φ/2 its amplitude is constant."""
     phi = 0.1
     plain = analyse(Oscillator(), "standard_euler", dt=phi).radius
     damped = analyse(Oscillator(damping=0.5 * phi), "standard_euler", dt=phi).radius
@@ -138,7 +138,7 @@ def two_dampings() -> Finding:
     "`Oscillator(x=…, a=…)` with numbers, `sw.Sinusoid` or `sw.Sampled`",
 )
 def inputs() -> Finding:
-    """A held input moves the oscillator as a constant does while it lasts."""
+    """A sampled input of equal samples moves the oscillator as a constant does."""
     sampled = Oscillator(x=Sampled([1.0, 1.0], 100.0))
     one, other = (float(quietly(each, "rk4", v=0.0, y=0.0, dt=0.01, steps=300).y[-1]) for each in (sampled, Oscillator(x=1.0)))
     exact = 1.0 - math.cos(3.0)

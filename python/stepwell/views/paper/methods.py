@@ -20,24 +20,24 @@ from . import Finding, Section
 #: The angles per step at which closed forms are compared.
 ANGLES = np.linspace(0.05, 1.95, 39)
 
-#: The largest difference between closed forms and analysis: some roundings of numbers of the size of Φ⁴.
+#: The largest allowed difference between closed forms and analysis: some rounding errors of numbers as large as Φ⁴.
 ROUNDING = 1e-13
 
 
 def at(name: str, phi: Any = ANGLES) -> Analysis:
-    """A method on the undamped oscillator."""
+    """The analysis of a method on the undamped oscillator."""
     return analyse(Oscillator(), name, dt=phi)
 
 
 def characteristic(name: str, p: Callable[[Any], Any], q: Callable[[Any], Any], formulas: str) -> Finding:
-    """Whether z² − 2pz + q is the characteristic equation of a method, for Φ from 0.05 to 1.95."""
+    """Check that z² − 2pz + q = 0 is the characteristic equation of a method, for Φ from 0.05 to 1.95."""
     analysis = at(name)
     off = max(float(np.abs(analysis.p - p(ANGLES)).max()), float(np.abs(analysis.q - q(ANGLES)).max()))
     return Finding(off < ROUNDING, f"{formulas}, to rounding")
 
 
 def figure(section: Section, name: str, says: str, kind: str) -> None:
-    """Make an entry of the figure of a method, whose samples are of that kind."""
+    """Add the entry of a method's figure; its check is that the samples are of that kind."""
 
     def check() -> Finding:
         samples = figures([name]).samples[0]
@@ -57,7 +57,7 @@ section_9, section_10, section_11 = (Section(f"§{n}") for n in (9, 10, 11))
 # ---- §5 Standard Euler
 
 
-@section_5("algorithm", "All new values from old ones: v − Φy, y + Φv.", "`standard_euler`")
+@section_5("algorithm", "Both new values are computed from the old ones: v − Φy, y + Φv.", "`standard_euler`")
 def standard_euler() -> Finding:
     """One step by hand and by the method, bit for bit."""
     run = quietly(Oscillator(), "standard_euler", v=0.3, y=0.7, dt=0.1, steps=1)
@@ -67,7 +67,7 @@ def standard_euler() -> Finding:
 
 @section_5("formula", "z² − 2z + (1 + Φ²) = 0; r₁² = 1 + Φ²: always an unstable oscillation.", "`analyse(…).q`")
 def standard_euler_equation() -> Finding:
-    """The equation."""
+    """The coefficients p and q, and a stability limit of 0."""
     result = characteristic("standard_euler", np.ones_like, lambda phi: 1 + phi**2, "p = 1, q = 1 + Φ²")
     return Finding(result.holds and stability_limit(Oscillator(), "standard_euler") == 0, result.numbers)
 
@@ -85,7 +85,7 @@ figure(section_5, "standard_euler", "The samples grow.", "unstable")
     "It is False Euler with the blocks exchanged, so it needs no ω₀ and runs on every system.",
 )
 def damped_euler() -> Finding:
-    """Its samples against those of Standard Euler with that damping."""
+    """The samples of `damped_euler` and of Standard Euler with D = Φ/2."""
     phi = 0.3
     options: dict[str, Any] = {"v": 0.3, "y": 0.7, "dt": 0.3, "steps": 200}
     own = quietly(Oscillator(), "damped_euler", **options)
@@ -100,7 +100,7 @@ def damped_euler() -> Finding:
     '`analyse(Oscillator(damping=D), "standard_euler", …)`',
 )
 def damped_euler_equation() -> Finding:
-    """Both for D = 0.1, and q for D = Φ/2."""
+    """The coefficients for D = 0.1, and q = 1 for D = Φ/2."""
     step = analyse(Oscillator(damping=0.1), "standard_euler", dt=ANGLES)
     off = max(np.abs(step.p - (1 - 0.1 * ANGLES)).max(), np.abs(step.q - (1 - 0.2 * ANGLES + ANGLES**2)).max())
     harmonic = np.abs(at("damped_euler").q - 1).max()
@@ -114,7 +114,7 @@ def damped_euler_equation() -> Finding:
     "At Φ = 1.414 the angle is 1.5706 (not quite the printed 1.570); at √2 it is π/2.",
 )
 def damped_euler_frequency() -> Finding:
-    """The table."""
+    """The four numbers of the document's table."""
     psi = [float(at("damped_euler", phi).angle) for phi in (1.0, 1.414)]
     series = [phi * (1 + phi**2 / 24) for phi in (1.0, 1.414)]
     close = [abs(computed - printed) < 1e-3 for computed, printed in zip(psi + series, (1.047, 1.570, 1.042, 1.532), strict=True)]
@@ -139,7 +139,7 @@ def false_euler() -> Finding:
     "formula", "z² − 2(1 − Φ²/2)z + 1 = 0: always a harmonic oscillation.", "`analyse(…).p`, `.q`", "Below the limit Φ = 2."
 )
 def false_euler_equation() -> Finding:
-    """The equation."""
+    """The coefficients p and q against the closed forms."""
     return characteristic("false_euler", lambda phi: 1 - phi**2 / 2, np.ones_like, "p = 1 − Φ²/2, q = 1")
 
 
@@ -158,7 +158,7 @@ def false_euler_frequency() -> Finding:
     "`sw.stability_limit`",
 )
 def false_euler_limit() -> Finding:
-    """The limit in angle and in steps per period."""
+    """The limit as an angle and as steps per period."""
     limit = stability_limit(Oscillator(), "false_euler")
     steps = 2 * math.pi / float(limit)
     return Finding(
@@ -178,7 +178,7 @@ figure(section_7, "false_euler", "Harmonic samples, a little too fast.", "harmon
     '`verlet`, with `start="first_order"`',
 )
 def verlet() -> Finding:
-    """The samples of both methods from the same start."""
+    """The samples and p of Verlet and of False Euler."""
     options: dict[str, Any] = {"v": 0.4, "y": 1.0, "dt": 0.3, "steps": 200, "every": 1}
     one = quietly(Oscillator(), "verlet", start="first_order", **options).y
     other = quietly(Oscillator(), "false_euler", **options).y
@@ -189,12 +189,12 @@ def verlet() -> Finding:
 
 @section_8(
     "warning",
-    "Verlet has no v, which makes trouble for the initial velocity and for forces that depend on v.",
+    "Verlet has no v. That is a problem for the initial velocity and for forces that depend on v.",
     "`verlet`: `start=`; systems with a velocity term are refused",
-    'The start with ½T²·a₀ more, `start="second_order"`, has v and is of second order.',
+    '`start="second_order"` adds ½T²·a₀. It uses the initial v and is of second order.',
 )
 def verlet_start() -> Finding:
-    """The error of both starts, with the step halved."""
+    """The observed order of both starts, from runs with a step and with half of it."""
 
     def error(start: str, steps: int) -> float:
         run = quietly(Oscillator(), "verlet", v=0.4, y=1.0, dt=5.0 / steps, steps=steps, start=start)
@@ -206,12 +206,12 @@ def verlet_start() -> Finding:
 
 @section_8(
     "formula",
-    "Two multiplications and two additions a step, as False Euler.",
+    "A step has two multiplications and two additions, as with False Euler.",
     "`sw.criteria()`; `sw.explain`",
     "Verlet has a third product, 2·y.",
 )
 def verlet_cost() -> Finding:
-    """Operations of a step on the undamped oscillator."""
+    """The products and sums of a step on the undamped oscillator."""
     counts = {c.method.name: c.operations for c in criteria(["verlet", "false_euler"])}
     text = "; ".join(f"{method(name).title}: {o.multiplications} products, {o.additions} sums" for name, o in counts.items())
     fits = [o.multiplications for o in counts.values()] == [3, 2] and all(o.additions == 2 for o in counts.values())
@@ -226,11 +226,11 @@ def _draw_friction(path: Path) -> object:
     "warning",
     "Forces that depend on the velocity, such as viscous drag and Coulomb friction, are a big problem for Verlet.",
     "`Oscillator(drag=…, friction=…)`; `sw.charts.verlet_friction()`, `sw.scenes.sliding_block()`",
-    "Verlet refuses such systems. With the velocity of its secant, which only this figure has, a block never comes to rest.",
+    "Verlet refuses such systems. With the secant as the velocity, which only this figure uses, a block never comes to rest.",
     draw=_draw_friction,
 )
 def verlet_and_friction() -> Finding:
-    """Where a sliding block is after 5 s: by Verlet's secant, by False Euler, and exactly."""
+    """The position of a sliding block after 5 s: by Verlet with the secant, by False Euler, and exactly."""
     chart = verlet_friction()
     slides = chart.blocks[0]
     secant, right = float(slides.verlet[-1]), float(slides.false_euler[-1])
@@ -260,7 +260,7 @@ figure(section_8, "verlet", "Harmonic samples.", "harmonic")
     "The rates are printed v̇ = −ω₀v, ẏ = ω₀y; they are v̇ = −ω₀y, ẏ = ω₀v.",
 )
 def standard_heun() -> Finding:
-    """P as printed."""
+    """P at Φ = 0.4 as printed."""
     P = at("standard_heun", 0.4).P
     wanted = np.array([[1 - 0.08, -0.4], [0.4, 1 - 0.08]])
     return Finding(bool(np.allclose(P, wanted, rtol=0, atol=1e-15)), "P = [1 − Φ²/2, −Φ; Φ, 1 − Φ²/2]")
@@ -270,7 +270,7 @@ def standard_heun() -> Finding:
     "formula", "z² − 2(1 − Φ²/2)z + (1 + Φ⁴/4) = 0; r₁² = 1 + Φ⁴/4: always unstable, weakly for small steps.", "`analyse(…).q`"
 )
 def standard_heun_equation() -> Finding:
-    """The equation."""
+    """The coefficients p and q against the closed forms."""
     return characteristic("standard_heun", lambda phi: 1 - phi**2 / 2, lambda phi: 1 + phi**4 / 4, "p = 1 − Φ²/2, q = 1 + Φ⁴/4")
 
 
@@ -302,7 +302,7 @@ figure(section_9, "standard_heun", "The samples grow slowly.", "unstable")
     "The lower right element of P is printed 1 − Φ²/2; it is 1 − Φ² + Φ⁴/2, as in Appendix B.",
 )
 def false_heun() -> Finding:
-    """P with the right element."""
+    """P at Φ = 0.4 with the corrected element."""
     phi = 0.4
     P = at("false_heun", phi).P
     off = phi * (1 - phi**2 / 2)
@@ -312,7 +312,7 @@ def false_heun() -> Finding:
 
 @section_10("formula", "z² − 2(1 − ¾Φ² + Φ⁴/4)z + (1 − Φ²/2) = 0; r₁² = 1 − Φ²/2.", "`analyse(…).p`, `.q`")
 def false_heun_equation() -> Finding:
-    """The equation."""
+    """The coefficients p and q against the closed forms."""
     return characteristic(
         "false_heun", lambda phi: 1 - 0.75 * phi**2 + phi**4 / 4, lambda phi: 1 - phi**2 / 2, "p = 1 − ¾Φ² + Φ⁴/4, q = 1 − Φ²/2"
     )
@@ -325,7 +325,7 @@ def false_heun_equation() -> Finding:
     "From Φ = 1.2695 to √2 they are monotonic and stable.",
 )
 def false_heun_kinds() -> Finding:
-    """The behaviour of the samples in the three ranges."""
+    """The kinds of samples in the three ranges of Φ, and the limit."""
     kinds = [str(at("false_heun", phi).kind) for phi in (1.2, 1.35, 1.45)]
     limit = float(stability_limit(Oscillator(), "false_heun"))
     holds = kinds == ["damped oscillation", "monotonic stable", "monotonic unstable"] and abs(limit - math.sqrt(2)) < 1e-9
@@ -340,7 +340,7 @@ figure(section_10, "false_heun", "The samples are damped.", "damped")
 
 @section_11("algorithm", "Heun with the new v in the second rate of y only.", "`semi_false_heun`")
 def semi_false_heun() -> Finding:
-    """P as printed."""
+    """P at Φ = 0.4 as printed."""
     phi = 0.4
     P = at("semi_false_heun", phi).P
     wanted = np.array([[1 - phi**2 / 2, -phi], [phi * (1 - phi**2 / 2), 1 - phi**2 / 2]])
@@ -354,7 +354,7 @@ def semi_false_heun() -> Finding:
     "Stable for Φ < √(2√5 − 2) = 1.5723, where an eigenvalue passes −1.",
 )
 def semi_false_heun_equation() -> Finding:
-    """The equation, and the limit."""
+    """The coefficients p and q against the closed forms, and the limit."""
     result = characteristic(
         "semi_false_heun", lambda phi: 1 - phi**2 / 2, lambda phi: 1 - phi**4 / 4, "p = 1 − Φ²/2, q = 1 − Φ⁴/4"
     )

@@ -1,4 +1,4 @@
-"""The pictures of the document that no chart draws."""
+"""The document's pictures for which there is no chart."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from ...base.arrays import Array
 from ...base.pictures import drawn
 from ..charts.style import GREY, Figure, page
 
-#: Of three bodies: hues that differ in lightness, too, so that they survive grey.
+#: The colours of three bodies. They differ in lightness, too, so that they can be told apart in grey.
 BODIES = ("#0072b2", "#e69f00", "#222222")
 
 
 def paths(path: Path, title: str, about: str, panels: Sequence[tuple[str, Array]], reach: float) -> object:
-    """Paths of bodies in the plane, panels side by side to the same scale.
+    """Draw paths of bodies in the plane, in panels side by side with the same scale.
 
     Args:
-        path: the file.
-        title: its title.
-        about: how it was made.
-        panels: for each its title and the places, shape (saved, bodies, 2).
-        reach: how far from the middle a panel shows.
+        path: the file to write.
+        title: the title of the picture.
+        about: the line below it: method, steps and forces.
+        panels: for each panel its title and the positions, shape (saved, bodies, 2).
+        reach: half the width of a panel, in units of length.
     """
 
     def draw() -> Figure:
@@ -39,7 +39,7 @@ def paths(path: Path, title: str, about: str, panels: Sequence[tuple[str, Array]
             figure.text(0.015, 1.0 - 0.5 / height, title, size=20, weight="bold")
             figure.text(0.015, 1.0 - 0.9 / height, about, size=13, color=GREY)
             figure.text(
-                0.015, 0.2 / height, "Dots: the start. One colour a body; lengths in units of the start's.", size=12, color=GREY
+                0.015, 0.2 / height, "Dots: the start. One colour per body; lengths in units of the start's.", size=12, color=GREY
             )
         return figure
 

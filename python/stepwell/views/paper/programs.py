@@ -1,4 +1,4 @@
-"""Appendix B: each method as a program, direct and by its transition matrix."""
+"""Appendix B: each method as a program that steps by its formulas or by its transition matrix."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from . import Finding, Section
 
 section = Section("App. B")
 
-#: The methods of the seven programs, in their order.
+#: The methods of the seven programs, in the order of the appendix.
 METHODS = ("standard_euler", "damped_euler", "false_euler", "verlet", "standard_heun", "false_heun", "semi_false_heun")
 
 
 @section(
     "program",
-    "Seven programs, each able to integrate directly or to step by its transition matrix.",
+    "Seven programs. Each integrates directly or steps by its transition matrix.",
     '`integrate(…, form="direct")`, `form="matrix"`; `form="power"` makes many steps at once',
 )
 def both_forms() -> Finding:
-    """Both forms of each method with ω₀ = 2, T = 0.1, over 200 steps from v = 0, y = 1."""
+    """The samples of both forms of each method: ω₀ = 2, T = 0.1, 200 steps from v = 0, y = 1."""
     options: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 200, "every": 1}
     apart = [
         float(
@@ -30,7 +30,7 @@ def both_forms() -> Finding:
         )
         for name in METHODS
     ]
-    return Finding(max(apart) < 1e-12, "both forms of all seven give the same samples, to rounding")
+    return Finding(max(apart) < 1e-12, "both forms of all seven methods give the same samples, to rounding")
 
 
 @section(
@@ -40,7 +40,7 @@ def both_forms() -> Finding:
     "That start is of first order; y₋₁ = y₀ − T·v₀ + ½T²·a₀ is of second order.",
 )
 def verlet_program() -> Finding:
-    """The printed recursion beside the method."""
+    """The printed recursion against the method."""
     phi, now, before, y = 0.5, 1.0, 1.0, [1.0]
     for _ in range(50):
         now, before = 2 * now - before + phi**2 * -now, now

@@ -1,4 +1,4 @@
-"""§4: the transition matrix, its eigenvalues, and what they say of the samples."""
+"""§4: the transition matrix, its eigenvalues, and the behaviour of the samples that follows from them."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def transition_matrix() -> Finding:
 
 @section(
     "formula",
-    "z² − 2pz + q = 0 is met again and again; of a conjugate pair r₁² = q, so q = 1 is the harmonic case.",
+    "The characteristic equation is z² − 2pz + q = 0. A conjugate pair has r₁² = q, so q = 1 is the harmonic case.",
     "`analyse(…).p`, `.q`, `.radius`",
 )
 def p_and_q() -> Finding:
-    """Both for six methods at Φ = 0.5, where all have a pair."""
+    """r₁² = q for six methods at Φ = 0.5, where each has a conjugate pair."""
     names = ("standard_euler", "damped_euler", "false_euler", "standard_heun", "false_heun", "semi_false_heun")
     steps = [analyse(Oscillator(), name, dt=0.5) for name in names]
     worst = max(abs(a.q - a.radius**2) for a in steps)
@@ -52,12 +52,12 @@ def p_and_q() -> Finding:
 
 @section(
     "formula",
-    "By the eigenvalues samples are monotonic or oscillate, and are stable, constant or unstable.",
+    "The eigenvalues decide whether samples are monotonic or oscillate, and whether they are stable, constant or unstable.",
     "`analyse(…).kind`; `stepwell.stability.KINDS`",
-    "A single negative eigenvalue and a double pair are listed here, too.",
+    "stepwell has two further kinds: a single negative eigenvalue, and a double pair.",
 )
 def kinds() -> Finding:
-    """One growing, one constant and one decaying mode by Standard Euler."""
+    """A decaying, a constant and a growing mode by Standard Euler."""
     kinds = [analyse(LinearSystem([[rate]]), "standard_euler", dt=0.1).kind for rate in (-1.0, 0.0, 1.0)]
     wanted = ["monotonic stable", "constant", "monotonic unstable"]
     return Finding(kinds == wanted and set(wanted) <= set(KINDS), ", ".join(kinds))
@@ -70,7 +70,7 @@ def kinds() -> Finding:
     "The arctan of the quotient is wrong past π/2; atan2(b₁, a₁) is right.",
 )
 def angle() -> Finding:
-    """False Euler at the Φ at which Ψ is 150°."""
+    """The angle of False Euler where Ψ is 150°, by atan2 and by arctan."""
     step = analyse(Oscillator(), "false_euler", dt=phi_of(math.radians(150.0)))
     z = step.eigenvalues[0]
     wrong = math.degrees(math.atan(abs(z.imag) / z.real))
@@ -88,7 +88,7 @@ def _draw_harmonic(path: Path) -> object:
     draw=_draw_harmonic,
 )
 def harmonic_cases() -> Finding:
-    """False Euler, whose samples are harmonic for every Φ below 2."""
+    """The samples per period of False Euler, which is harmonic for every Φ below 2."""
     steps = [analyse(Oscillator(), "false_euler", dt=phi_of(math.radians(psi))) for psi in HARMONIC]
     samples = [f.samples_per_period for f in steps]
     holds = all(abs(s - 360.0 / psi) < 1e-9 for s, psi in zip(samples, HARMONIC, strict=True))
@@ -99,7 +99,7 @@ def harmonic_cases() -> Finding:
     "warning",
     "A double eigenvalue +1 or −1 is unstable: a pair that meets at −1 on the unit circle does not end as a harmonic one.",
     "`analyse(…).kind`",
-    "Only if the two have one eigenvector in common; RK-Merson at Φ = 2√3 has two, and is bounded.",
+    "Only if the two have a single eigenvector. RK-Merson at Φ = 2√3 has two, and stays bounded.",
 )
 def double_eigenvalue() -> Finding:
     """False Euler at Φ = 2 grows linearly; Merson at 2√3 does not grow."""
@@ -120,7 +120,7 @@ def double_eigenvalue() -> Finding:
     "`sw.stability_limit`, against runs in `sw.charts.stability_map`",
 )
 def eigenvalues_predict() -> Finding:
-    """Samples just inside and just outside False Euler's limit."""
+    """The largest sample just inside and just outside the limit of False Euler."""
     largest = [float(np.abs(figures(["false_euler"], phi=phi, periods=300).samples[0].y).max()) for phi in (1.999, 2.001)]
     return Finding(
         largest[0] < 100.0 < 1e6 < largest[1], f"largest |y|: {largest[0]:.3g} at Φ = 1.999, {largest[1]:.3g} at 2.001"

@@ -13,25 +13,26 @@ pub(crate) trait InstructionSet: Sized {
     /// Whether the numbers of one member may be lanes of vectors.
     const PACKS: bool = false;
 
-    /// The instruction of an operation. Changes of sign and choices are not asked for.
+    /// The instruction of an operation, which is no change of sign and no selection.
     fn instruction(&self, op: Op) -> Self::Instruction;
 
-    /// A change of sign, and the bits of a constant that is its second operand, if it has one.
+    /// A change of sign; and the bits of its second operand, if that is a constant.
     fn negate(&self) -> (Self::Instruction, Option<u64>);
 
-    /// By the bits of the first, of the second and the third. Whether the first is surely a mask: all bits of a number or none.
+    /// A selection between the second and the third operand by the bits of the first. `is_mask`: each number of the first has
+    /// all bits set, or none.
     fn select(&self, is_mask: bool) -> Self::Instruction;
 
-    /// A comparison of the first two that chooses of the third and the fourth; None where that takes two instructions anyway.
+    /// A comparison of the first two operands that selects the third or the fourth; None if that takes two instructions.
     fn pick(&self, comparison: Op) -> Option<Self::Instruction>;
 
-    /// The lesser of two numbers, or the greater: `a` if a < b, or if a > b, and else `b`, as where one is a NaN. None where that
-    /// takes more than one instruction.
+    /// The minimum of two numbers (`a` if a < b, else `b`) or the maximum (`a` if a > b, else `b`); so `b` if one is NaN. None
+    /// if that takes more than one instruction.
     fn min_or_max(&self, _is_greater: bool) -> Option<Self::Instruction> {
         None
     }
 
-    /// What moves numbers of one member between lanes. Asked for only if it [packs](InstructionSet::PACKS).
+    /// Moves numbers of one member between lanes. Called only if [`InstructionSet::PACKS`].
     fn moving(&self, _to: Move) -> Self::Instruction {
         self.instruction(Op::Copy(0))
     }

@@ -1,5 +1,4 @@
-//! Contact of the points of a large system: the same as [`crate::model::around::contact`], over rows, member by member and point
-//! by point.
+//! Contact of the points of a large system: [`crate::model::around::contact`] over rows, member by member and point by point.
 
 use std::sync::Arc;
 
@@ -26,14 +25,14 @@ pub(crate) struct RowContacts {
     dim: usize,
     /// The slots before the step.
     before: [Vec<f64>; 2],
-    /// The slots after it, and the velocities at both ends, where a method carries something else.
+    /// The slots after the step, and the velocities at both ends; used if the method carries something other than v.
     after: [Vec<f64>; 2],
     velocities: [Vec<f64>; 2],
-    /// Numbers of points that met a surface.
+    /// Whether each number belongs to a point that met a surface.
     touched: Vec<bool>,
 }
 
-/// One row of numbers as points, whose numbers are `lanes` apart.
+/// The point of each row at a place (point, lane). Numbers of a point are `lanes` apart.
 fn point<const N: usize>(rows: [&[f64]; N], dim: usize, lanes: usize, at: (usize, usize)) -> [[f64; 3]; N] {
     let (i, lane) = at;
     rows.map(|row| {
@@ -44,7 +43,8 @@ fn point<const N: usize>(rows: [&[f64]; N], dim: usize, lanes: usize, at: (usize
 }
 
 impl RowContacts {
-    /// For the members from `first`; lanes past the `count`-th repeat the last one. None if no surface acts after a step.
+    /// The surfaces of the members from `first`; lanes past the `count`-th repeat the last one. None if no surface acts after a
+    /// step.
     pub(crate) fn new(spec: &Spec, h: f64, lanes: usize, first: usize, count: usize) -> Option<RowContacts> {
         let member = |lane: usize| first + lane.min(count.saturating_sub(1));
         let lanes = (0..lanes).map(|lane| Contacts::new(&parameters(spec, h, member(lane)))).collect::<Option<_>>()?;
@@ -58,7 +58,7 @@ impl RowContacts {
         copy(&mut self.before, [v, y]);
     }
 
-    /// Each point and lane.
+    /// The index of every point in every lane.
     fn points(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
         let lanes = self.lanes.len();
         let points = self.before[1].len() / (self.dim * lanes);
@@ -89,7 +89,7 @@ impl RowContacts {
         })
     }
 
-    /// Changes the points that met a surface, of states whose velocities are known.
+    /// Changes the points that met a surface. `v` and `v0` are velocities.
     fn resolve(&mut self, v0: &[f64], v: &mut [f64], y: &mut [f64]) {
         let (dim, lanes) = (self.dim, self.lanes.len());
         self.touched.clear();
@@ -109,7 +109,7 @@ impl RowContacts {
         }
     }
 
-    /// The state after a step from time t, in the slots.
+    /// Applies contact to the slots after a step from time t.
     pub(super) fn after(&mut self, blocks: &mut Blocks, carry: Option<[&mut Executor; 2]>, t: f64, h: f64) {
         if self.lanes.iter().any(Contacts::are_joined) {
             let (v, y) = blocks.slots_mut();
@@ -161,7 +161,7 @@ struct SprungRates {
     springs: Option<Springs<f64>>,
 }
 
-/// Rates with the springs that are given, or the rates themselves.
+/// The rates with the springs of surfaces, if there are any.
 pub(crate) fn wrap(rates: Box<dyn Rates>, asked: &RatesRequest) -> Box<dyn Rates> {
     let has_spring = ways(asked.signature).any(|way| way == "spring");
     if has_spring { Box::new(SprungRates { rates, h: asked.h, springs: None }) } else { rates }

@@ -14,7 +14,7 @@ use crate::{
 
 /// The passes of a schedule, ready for an arena.
 pub(crate) struct Executor {
-    /// Of each action its kernel, if it is a pass.
+    /// For each action its kernel, if it is a pass.
     passes: Vec<Option<PreparedStage>>,
     stride: usize,
     /// When set, the remaining actions are skipped.
@@ -23,7 +23,7 @@ pub(crate) struct Executor {
 
 const VECTOR: usize = 8;
 
-/// The length of rows of so many numbers, padded to whole vectors.
+/// The distance of rows of so many numbers: their number, padded to whole vectors.
 pub(crate) fn stride(numbers: usize) -> usize {
     // Four vectors can be interleaved if their number is a multiple of four. Short rows are padded less: they would be half
     // empty.
@@ -46,7 +46,7 @@ pub(crate) fn stride(numbers: usize) -> usize {
 }
 
 impl Executor {
-    /// For rows of so many numbers.
+    /// An executor for rows at this distance.
     pub(crate) fn new(schedule: &BlockSchedule, level: Level, stride: usize, clock: &Clock) -> Executor {
         let no_parameters = Spec::default();
         let pass = |action: &Action| match action {
@@ -58,7 +58,7 @@ impl Executor {
         Executor { passes: schedule.actions.iter().map(pass).collect(), stride, stop: Stop::default() }
     }
 
-    /// Executes it at time t, with the step h, which is also the step of an attempt.
+    /// Executes a schedule at time t with the step h; for an attempt, h is its trial step.
     pub(crate) fn run(
         &mut self,
         schedule: &BlockSchedule,

@@ -1,11 +1,11 @@
-//! Linear equations of a few unknowns whose matrix is symmetric and positive definite: elimination in a fixed order, LDLᵀ.
+//! Solves a few linear equations with a symmetric positive definite matrix by LDLᵀ, in a fixed order.
 //!
-//! Nothing is exchanged by its size, so that a step has no branch; a matrix of this kind does not need it. A matrix is given by
-//! the rows of its lower triangle. `None` is an entry that is zero whatever the state is, and its terms are left out.
+//! There is no pivoting, so a step has no branch; such a matrix needs none. A matrix is passed as the rows of its lower triangle.
+//! An entry `None` is zero in every state, and its terms are left out.
 
 use crate::tape::number::Number;
 
-/// L without its ones, and D.
+/// L without its unit diagonal, and D.
 pub(crate) struct Factors<N: Number> {
     /// The entries of each row left of the diagonal.
     below: Vec<Vec<Option<N>>>,
@@ -13,7 +13,7 @@ pub(crate) struct Factors<N: Number> {
 }
 
 impl<N: Number> Factors<N> {
-    /// Of a matrix: of each row the entries left of the diagonal, and the diagonal.
+    /// The factors of a matrix: `rows` has the entries left of the diagonal, `pivots` the diagonal.
     pub(crate) fn new(mut rows: Vec<Vec<Option<N>>>, mut pivots: Vec<N>) -> Self {
         let n = pivots.len();
         let mut below: Vec<Vec<Option<N>>> = (0..n).map(|i| vec![None; i]).collect();
@@ -35,12 +35,12 @@ impl<N: Number> Factors<N> {
         Factors { below, pivots }
     }
 
-    /// The unknowns, from the right-hand sides.
+    /// Solves for right-hand sides.
     pub(crate) fn solve(&self, x: Vec<N>) -> Vec<N> {
         self.solve_some(x.into_iter().map(Some).collect()).into_iter().flatten().collect()
     }
 
-    /// The same. `None` is 0 whatever the state is, on either side.
+    /// Solves for right-hand sides of which some are `None`: zero in every state. So are unknowns that are `None`.
     pub(crate) fn solve_some(&self, mut x: Vec<Option<N>>) -> Vec<Option<N>> {
         let n = x.len();
         let less = |x: &mut [Option<N>], from: usize, factor: Option<N>, known: usize| {

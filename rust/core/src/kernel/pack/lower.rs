@@ -1,8 +1,8 @@
-//! From operations that are lanes of one vector to vectors, with what moves numbers between lanes.
+//! Lowers packs (operations that are lanes of one vector) to vectors and moves between lanes.
 //!
-//! An operation may need numbers that are in other vectors, or in another order. Then they are moved; or, where that is asked for
-//! and the numbers are there sooner so, they are made a second time in that order. So the places of bodies as pairs have them are
-//! kept beside the places themselves, from step to step, and nothing is moved before distances are known.
+//! An operation may need numbers that are in other vectors, or in another order. Then they are moved; or, with `again` and if
+//! that is sooner, they are computed a second time in that order. So the positions of bodies are kept from step to step in the
+//! order of the pairs, too, and the distances of pairs need no moves.
 
 use std::{
     cmp::Reverse,
@@ -16,9 +16,9 @@ use super::{
 };
 use crate::tape::{Id, Op, split::Body};
 
-/// So many operations are gone back to see when numbers would be there if they were made a second time.
+/// How many operations back the search goes that estimates when a second computation of numbers would be ready.
 const DEPTH: usize = 6;
-/// Operations may be made a second time as long as they are not more than this share of all.
+/// The largest share of operations that may be computed a second time.
 const MOST_AGAIN: f64 = 0.5;
 
 /// The vectors of a body; None if they depend on each other in a circle, which operations of the same height do not.
@@ -53,18 +53,18 @@ pub(crate) fn lower(body: &Body, packs: &Packs, again: bool) -> Option<Packed> {
 struct Lower<'a> {
     body: &'a Body,
     packs: &'a Packs,
-    /// Of each number of the state the operations that are it.
+    /// For each number of the state, the operations that read it.
     leaves: Vec<Vec<Id>>,
-    /// Of each operation the vector and lane in which it was made first.
+    /// For each operation, the vector and the lane in which it was computed first.
     places: Vec<Option<(u32, u8)>>,
     /// Vectors by their lanes.
     known: HashMap<Vec<Id>, u32>,
     moved: HashMap<(Move, u32, u32), u32>,
     halves: HashMap<u32, u32>,
-    /// Of each vector when it is there, in cycles from the start of the step.
+    /// For each vector, when it is ready, in cycles from the start of the step.
     times: Vec<u64>,
     out: Packed,
-    /// How many operations may still be made a second time.
+    /// How many more operations may be computed a second time.
     again: usize,
 }
 
@@ -90,7 +90,7 @@ impl Lower<'_> {
         }
     }
 
-    /// The number of the state that a leaf is, if it changes.
+    /// The number of the state that a leaf reads, if that changes in the step.
     fn state(&self, id: Id) -> Option<u32> {
         match self.body.ops[id as usize] {
             Op::State(s) if !self.body.keeps(s as usize) => Some(s),
@@ -98,7 +98,7 @@ impl Lower<'_> {
         }
     }
 
-    /// The state is kept as its next values are made, so that nothing is moved at the end of a step.
+    /// Keeps the state in the order in which its next values are computed, so that nothing is moved at the end of a step.
     fn state_of_next(&mut self) {
         let mut number: HashMap<Id, u32> = HashMap::new();
         for s in (0..self.body.next.len()).filter(|s| !self.body.keeps(*s)) {
@@ -138,7 +138,7 @@ impl Lower<'_> {
         vector
     }
 
-    /// Vectors and single operations, each after what it needs, else as the body has them.
+    /// Packs and single operations in the order of the body, each after its operands.
     fn in_order(&self) -> Option<Vec<Vec<Id>>> {
         let ops = &self.packs.ops;
         let mut units: Vec<Vec<Id>> = self.packs.packs.clone();
@@ -198,7 +198,7 @@ impl Lower<'_> {
 
     /// A vector with these numbers in its first lanes.
     fn gather(&mut self, ids: &[Id]) -> u32 {
-        // What is the same in all lanes and does not change is there in four copies.
+        // A fixed number that all lanes share is in a vector of four copies.
         let ids = if self.is_fixed(ids[0]) && ids.iter().all(|id| *id == ids[0]) { &ids[..1] } else { ids };
         if let Some(vector) = self.known.get(ids) {
             return *vector;
@@ -221,11 +221,11 @@ impl Lower<'_> {
         vector
     }
 
-    /// When these numbers can be there, in cycles from the start of the step, if they are moved and if they are made a second
+    /// When these numbers are ready, in cycles from the start of the step: if they are moved, and if they are computed a second
     /// time.
     fn times(&self, ids: &[Id], depth: usize) -> (u64, Option<u64>) {
         let places: Option<Vec<(u32, u8)>> = ids.iter().map(|id| self.places[*id as usize]).collect();
-        // Each a lane of a vector, which is only needed in another order.
+        // Only numbers that are lanes of vectors, needed in another order.
         let Some(places) = places.filter(|places| places.iter().all(|(at, _)| self.out.vectors[*at as usize].width > 1)) else {
             return (0, None);
         };
@@ -280,7 +280,7 @@ impl Lower<'_> {
             return if low.0 == high.0 && (low.1, high.1) == (0, 1) { low.0 } else { self.pick(low, high) };
         }
         if from_one {
-            // What fills up stays where it is.
+            // Lanes that are not needed stay where they are.
             let lanes = (0..4).map(|at| places.get(at).map_or(at as u8, |(_, lane)| *lane) << (2 * at));
             return self.shift(Move::Permute(lanes.fold(0, |all, lane| all | lane)), 4, first, None);
         }
@@ -333,7 +333,7 @@ impl Lower<'_> {
         vector
     }
 
-    /// The next value of each vector of the state; that may need further ones, in another order.
+    /// Sets the next value of each vector of the state. That may add vectors of the state, in other orders.
     fn replace_state(&mut self) {
         let mut at = 0;
         let mut taken: Vec<u32> = Vec::new();
@@ -350,7 +350,7 @@ impl Lower<'_> {
         }
     }
 
-    /// Without vectors that nothing is made of.
+    /// Removes vectors that no other vector needs.
     fn needed(mut self) -> Packed {
         let count = self.out.vectors.len();
         let mut needed = vec![false; count];

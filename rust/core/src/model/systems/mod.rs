@@ -5,7 +5,7 @@ use crate::error::Error;
 
 include!(concat!(env!("OUT_DIR"), "/systems.rs"));
 
-/// The kind of system that is given.
+/// The kind of system that a signature names.
 pub fn kind(signature: &Signature) -> Result<&'static Kind, Error> {
     let known = || KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
     let kind = KINDS.iter().copied().find(|kind| kind.name == signature.system);

@@ -1,13 +1,13 @@
-//! Controls and projections, which keep the energy near its target (§12, Appendix D).
+//! Controls and projections, which hold the energy near a target (§12, Appendix D).
 //!
 //! A *control* is a push −g·v on the velocities. It is added to the increment h·v̇ in every stage, so it works with every method
 //! in whose stages v and y belong to one time; with others it comes between steps. A *projection* returns the state to the target
 //! energy after the step. Both wrap any system that has an energy, and are a system themselves. Energies are scaled to the step,
 //! as everything is.
 //!
-//! Given: the word `control` is `energy`, with the word `control.form`, the `control.gain` and the `control.target`, and the word
-//! `control.when`, `between`, if it comes between steps; or it is
-//! `projection`, with the word `control.way` and the `control.target`.
+//! Parameters: the word `control` is `energy` or `projection`. A control has the word `control.form`, the numbers `control.gain`
+//! and `control.target`, and the word `control.when`, which is `between` if it acts between steps. A projection has the word
+//! `control.way` and the number `control.target`.
 
 pub(crate) mod energy;
 pub(crate) mod projection;
@@ -23,22 +23,22 @@ use crate::{
     tape::number::Number,
 };
 
-/// Whether a system is given any control.
+/// Whether a system has a control or a projection.
 pub(crate) fn is_given(signature: &Signature) -> bool {
     !signature.word("control").is_empty()
 }
 
-/// Whether it pushes velocities in the stages of a step, and is no projection.
+/// Whether it is a control that acts in the stages of a step.
 pub fn pushes(signature: &Signature) -> bool {
     signature.word("control") == "energy" && !is_between(signature)
 }
 
-/// Whether it acts on the state after a step alone, and not in its stages.
+/// Whether it acts only on the state after a step.
 pub(crate) fn is_after_the_step(signature: &Signature) -> bool {
     signature.word("control") == "projection" || is_between(signature)
 }
 
-/// The part.
+/// Controls and projections as a part around a system.
 pub(crate) fn part<N: Number>() -> Part<N> {
     Part {
         name: "control",
@@ -60,7 +60,7 @@ pub(crate) fn part<N: Number>() -> Part<N> {
     }
 }
 
-/// An error if the control is wrong.
+/// Checks the parameters.
 fn check(kind: &Kind, signature: &Signature, _: Shape) -> Result<(), Error> {
     let name = match signature.word("control") {
         "energy" => "control.form",

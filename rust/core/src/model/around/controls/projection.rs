@@ -1,5 +1,5 @@
-//! Projection onto the target energy after a step: all velocities by one factor, or the least change of the state (Nacozy 1971),
-//! which is along the gradient of the energy, in velocities and coordinates.
+//! Projection onto the target energy after a step: `scaling` multiplies all velocities by one factor; `nacozy` (Nacozy 1971) is
+//! the least change of the state, which is along the gradient of the energy.
 
 use std::cell::Cell;
 
@@ -17,21 +17,21 @@ pub(crate) struct Projected<N: Number> {
     system: Box<dyn System<N>>,
     h: N,
     nacozy: bool,
-    /// h times the energy to keep.
+    /// h times the target energy.
     target: N,
     work: Cell<N>,
 }
 
-/// The factor of all velocities, and the energy that it adds; from h times the error of the energy and h times the kinetic
-/// energy. At rest there is nothing to scale: the factor is 1.
+/// The factor of all velocities, and h times the energy that it adds, from h times the error of the energy and h times the
+/// kinetic energy. At rest the factor is 1.
 pub(crate) fn scaling<N: Number>(off: N, kinetic: N) -> (N, N) {
     let one = N::of(1.0);
     let factor = N::choose(kinetic.at_most(N::of(0.0)), one, factor(one - off / kinetic));
     (factor, (factor * factor - one) * kinetic)
 }
 
-/// The step along the gradient of the energy, from the square of its length, and the energy that it takes away. Where the
-/// gradient is zero, both are.
+/// The length of the step along the gradient of the energy, in gradients, and h times the energy that it removes; `square` is the
+/// square of the gradient. Where the gradient is zero, both are zero.
 pub(crate) fn nacozy<N: Number>(off: N, h: N, square: N) -> (N, N) {
     let zero = N::of(0.0);
     let flat = square.at_most(zero);
@@ -39,7 +39,7 @@ pub(crate) fn nacozy<N: Number>(off: N, h: N, square: N) -> (N, N) {
 }
 
 impl<N: Number> Projected<N> {
-    /// A system under the projection that is given.
+    /// A system with the projection of these parameters.
     pub(crate) fn new(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Self {
         let (nacozy, target) = (p.signature.word("control.way") == "nacozy", p.h * p.number("control.target"));
         Projected { system, h: p.h, nacozy, target, work: Cell::new(tally) }
