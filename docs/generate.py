@@ -1,7 +1,7 @@
 """Writes the tables of README.md and of the pages in docs that are made from the methods' records.
 
 A table stands between ``<!-- generated: NAME -->`` and ``<!-- end generated -->``. After a change to a record run
-``.venv/bin/python docs/generate.py``; the tests fail while a table is stale.
+``.venv/bin/python docs/generate.py``, with the names of pages for these alone; the tests fail while a table is stale.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ def pages() -> list[Path]:
 
 
 if __name__ == "__main__":
-    for page in pages():
+    for page in [Path(name).resolve() for name in sys.argv[1:]] or pages():
         old = page.read_text(encoding="utf-8")
         if (new := current(old)) != old:
             page.write_text(new, encoding="utf-8")

@@ -10,7 +10,8 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, UnknownNameError
 from stepwell.runs import engine
 from stepwell.studies.measuring import data, known, measure, peers, timing
-from support.charted import LADDER, METHODS, SCENES, the_charts, the_small, the_whole  # noqa: F401
+from stepwell.views.charts import style
+from support.charted import LADDER, METHODS, SCENES, read, the_charts, the_small, the_whole  # noqa: F401
 
 UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None]
 
@@ -389,3 +390,71 @@ def test_the_front_is_in_the_table_and_the_best_is_of_it(charts):
     assert chart.best(0.0) is None
     with pytest.raises(UnknownNameError, match="did you mean 'batch'"):
         chart.front(cost="bach")
+
+
+# ---- files and pictures of these charts, which take time to make
+
+
+def test_the_csv_reads_back_as_the_same_numbers(charts, tmp_path):
+    for name, chart in charts.items():
+        chart.to_csv(tmp_path / f"{name}.csv")
+        found_rows = read(tmp_path / f"{name}.csv")
+        rows = chart.rows()
+        assert len(found_rows) == len(rows) == sum(len(c.points) for c in chart.curves) + len(chart.refused)
+        for row, wanted in zip(found_rows, rows, strict=True):
+            assert list(row) == list(wanted)
+            for key, value in wanted.items():
+                if value is None or row[key] == "":
+                    assert row[key] == ("" if value is None else value)
+                    continue
+                kind = bool if isinstance(value, bool) else type(value)
+                assert {"True": True, "False": False}[row[key]] is value if kind is bool else kind(row[key]) == value
+
+
+def test_the_summary_is_what_the_points_say(charts):
+    for chart in charts.values():
+        for row, curve in zip(chart.summary(), chart.curves, strict=True):
+            assert row["least_error"] == min((p.state_error for p in curve.dependable()), default=math.inf)
+            for error in data.TARGETS:
+                cost = row[f"cost_at_error_{error:g}"]
+                better = [p.cost for p in curve.dependable() if p.state_error <= error]
+                assert cost == (min(better) if better else math.inf)
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda s: s.name)
+def test_nothing_in_the_picture_is_cut_off_or_covered(charts, scene, tmp_path):
+    chart = charts[scene.name]
+    figure = chart.plot(tmp_path / "chart.png")
+    width, height = np.frombuffer((tmp_path / "chart.png").read_bytes()[16:24], ">u4")
+    assert (width, height) == (1600, 900)
+
+    page = figure.bbox
+    panels = [axes.get_tightbbox() for axes in figure.axes]
+    texts = [text for text in figure.texts if text.get_text()]
+    beside = [text.get_window_extent() for text in texts]
+    for box in (*panels, *beside):
+        assert page.x0 <= box.x0 < box.x1 <= page.x1
+        assert page.y0 <= box.y0 < box.y1 <= page.y1
+    for i, box in enumerate(beside):
+        assert not any(box.overlaps(other) for other in (*panels, *beside[:i]))
+
+
+def test_every_point_is_in_the_picture(charts):
+    """Below 1 as a point of a curve, or above it as a mark; each unstable method's own marker where it falls off."""
+    chart = charts["oscillator"]
+    figure = chart.plot()
+    curves, marks = figure.axes[0], figure.axes[2]
+    words = " ".join(text.get_text() for text in (*curves.texts, *figure.texts)).replace("\n", ", ")
+    assert all(curve.title in words for curve in chart.curves)  # beside its curve, or among those for which there is no room
+    assert marks.get_position().height == pytest.approx(0.1 * (marks.get_position().height + curves.get_position().height))
+    for row, curve in enumerate(chart.curves):
+        line = curves.lines[row]
+        shown = [(x, y) for x, y in line.get_xydata().tolist() if math.isfinite(y)]
+        assert shown == [(p.cost, p.state_error) for p in curve.points if p.usable]
+        of_row = [mark for mark in marks.lines if len(mark.get_ydata()) and set(mark.get_ydata()) == {row}]
+        crosses = [x for mark in of_row if mark.get_marker() == "x" for x in mark.get_xdata()]
+        assert crosses == [p.cost for p in curve.points if p.unstable]
+        if curve.by == "tolerance":
+            continue
+        own = [mark.get_xdata()[0] for mark in of_row if mark.get_marker() == style.look(curve.method)["marker"]]
+        assert curve.method.evaluations / curve.largest_stable_step in own

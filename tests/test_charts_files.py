@@ -1,6 +1,5 @@
-"""Work-precision charts: peers, the panel, what is refused, files and the picture."""
+"""Work-precision charts: peers, the panel, what is refused, files and the picture; of all scenes in test_charts.py."""
 
-import csv
 import json
 import math
 import sys
@@ -10,15 +9,9 @@ import pytest
 import stepwell as sw
 from stepwell.base import tables
 from stepwell.errors import ArgumentError, DTypeError, UnknownNameError, UnsupportedError
-from stepwell.studies.measuring import data, peers, timing
+from stepwell.studies.measuring import peers, timing
 from stepwell.views.charts import style
-from support.charted import METHODS, SCENES, the_charts, the_small  # noqa: F401
-
-
-def read(path):
-    with path.open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
+from support.charted import METHODS, read, the_small  # noqa: F401
 
 # ---- peers
 
@@ -168,22 +161,6 @@ def test_what_cannot_be_charted_is_said(arguments, error, message):
 # ---- files
 
 
-def test_the_csv_reads_back_as_the_same_numbers(charts, tmp_path):
-    for name, chart in charts.items():
-        chart.to_csv(tmp_path / f"{name}.csv")
-        found_rows = read(tmp_path / f"{name}.csv")
-        rows = chart.rows()
-        assert len(found_rows) == len(rows) == sum(len(c.points) for c in chart.curves) + len(chart.refused)
-        for row, wanted in zip(found_rows, rows, strict=True):
-            assert list(row) == list(wanted)
-            for key, value in wanted.items():
-                if value is None or row[key] == "":
-                    assert row[key] == ("" if value is None else value)
-                    continue
-                kind = bool if isinstance(value, bool) else type(value)
-                assert {"True": True, "False": False}[row[key]] is value if kind is bool else kind(row[key]) == value
-
-
 def test_the_measured_columns_are_those_of_the_counted_step(small):
     for curve in small.curves:
         rows = [row for row in small.rows() if row["method"] == curve.name]
@@ -207,16 +184,6 @@ def test_the_json_is_strict_and_whole(small, tmp_path):
     assert tables.finite({"a": [math.inf, 1.0], "b": math.nan}) == {"a": [None, 1.0], "b": None}
 
 
-def test_the_summary_is_what_the_points_say(charts):
-    for chart in charts.values():
-        for row, curve in zip(chart.summary(), chart.curves, strict=True):
-            assert row["least_error"] == min((p.state_error for p in curve.dependable()), default=math.inf)
-            for error in data.TARGETS:
-                cost = row[f"cost_at_error_{error:g}"]
-                better = [p.cost for p in curve.dependable() if p.state_error <= error]
-                assert cost == (min(better) if better else math.inf)
-
-
 # ---- the picture
 
 
@@ -226,45 +193,6 @@ def test_methods_are_told_apart_without_colour():
     assert {look["color"] for look in looks} == set(style.FAMILIES.values())
     orders = {method.order for method in METHODS if method.order in {1, 2, 3, 4, 5, 8}}  # others are drawn solid
     assert len({str(look["linestyle"]) for look in looks}) == len(orders)
-
-
-@pytest.mark.parametrize("scene", SCENES, ids=lambda s: s.name)
-def test_nothing_in_the_picture_is_cut_off_or_covered(charts, scene, tmp_path):
-    chart = charts[scene.name]
-    figure = chart.plot(tmp_path / "chart.png")
-    width, height = np.frombuffer((tmp_path / "chart.png").read_bytes()[16:24], ">u4")
-    assert (width, height) == (1600, 900)
-
-    page = figure.bbox
-    panels = [axes.get_tightbbox() for axes in figure.axes]
-    texts = [text for text in figure.texts if text.get_text()]
-    beside = [text.get_window_extent() for text in texts]
-    for box in (*panels, *beside):
-        assert page.x0 <= box.x0 < box.x1 <= page.x1
-        assert page.y0 <= box.y0 < box.y1 <= page.y1
-    for i, box in enumerate(beside):
-        assert not any(box.overlaps(other) for other in (*panels, *beside[:i]))
-
-
-def test_every_point_is_in_the_picture(charts):
-    """Below 1 as a point of a curve, or above it as a mark; each unstable method's own marker where it falls off."""
-    chart = charts["oscillator"]
-    figure = chart.plot()
-    curves, marks = figure.axes[0], figure.axes[2]
-    words = " ".join(text.get_text() for text in (*curves.texts, *figure.texts)).replace("\n", ", ")
-    assert all(curve.title in words for curve in chart.curves)  # beside its curve, or among those for which there is no room
-    assert marks.get_position().height == pytest.approx(0.1 * (marks.get_position().height + curves.get_position().height))
-    for row, curve in enumerate(chart.curves):
-        line = curves.lines[row]
-        shown = [(x, y) for x, y in line.get_xydata().tolist() if math.isfinite(y)]
-        assert shown == [(p.cost, p.state_error) for p in curve.points if p.usable]
-        of_row = [mark for mark in marks.lines if len(mark.get_ydata()) and set(mark.get_ydata()) == {row}]
-        crosses = [x for mark in of_row if mark.get_marker() == "x" for x in mark.get_xdata()]
-        assert crosses == [p.cost for p in curve.points if p.unstable]
-        if curve.by == "tolerance":
-            continue
-        own = [mark.get_xdata()[0] for mark in of_row if mark.get_marker() == style.look(curve.method)["marker"]]
-        assert curve.method.evaluations / curve.largest_stable_step in own
 
 
 def test_an_unknown_kind_of_picture_is_refused(small, tmp_path):

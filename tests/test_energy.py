@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import itertools
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from stepwell import _core
 from stepwell.errors import UnsupportedError
 from stepwell.reference.traced import Tracer
 from support.cases import SYSTEMS, drawn, fits
+from support.families import family
 from support.graphs import assert_one_graph, model
 from support.tracing import METHODS, made
 
@@ -26,6 +28,12 @@ KINDS = {
 }  # fmt: skip
 #: Kinds whose energy is that of a step, divided by its length: at another length it may differ in its last bit.
 OF_A_STEP = ("nbody", "springs")
+
+
+def alternating(*values: Any) -> list[Any]:
+    """Parameters: each system with one of the values, in turns; in the long run with the others."""
+    pairs = itertools.product(ENERGETIC, values)
+    return family(pairs, lambda name, value: values.index(value) == ENERGETIC.index(name) % len(values))
 
 
 def of_state(system: sw.System, run: sw.Run) -> Any:
@@ -67,13 +75,10 @@ def test_fixed_steps(name: str) -> None:
         assert_energy(system, core, sw.integrate(system, method, **options))
 
 
-@pytest.mark.parametrize("every", [None, 1])
-@pytest.mark.parametrize("name", ENERGETIC)
+@pytest.mark.parametrize(("name", "every"), alternating(None, 1))
 def test_adaptive_steps(name: str, every: int | None) -> None:
     system, v, y = made(name)
-    options: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-5, "at": [0.05, 0.1] if every is None else 0.1, "every": every}
-    if every is not None:
-        options["at"] = [0.1]
+    options: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-5, "at": [0.05, 0.1] if every is None else [0.1], "every": every}
     try:
         plain = sw.integrate(system, "merson", **options)
     except UnsupportedError:
@@ -85,8 +90,7 @@ def test_adaptive_steps(name: str, every: int | None) -> None:
     np.testing.assert_array_equal(core.recorded["energy"], plain.energy)
 
 
-@pytest.mark.parametrize("tolerance", [None, 1e-3])
-@pytest.mark.parametrize("name", ENERGETIC)
+@pytest.mark.parametrize(("name", "tolerance"), alternating(None, 1e-3))
 def test_float32(name: str, tolerance: float | None) -> None:
     """It is the energy of the states as they were saved, in float64."""
     system, v, y = made(name)

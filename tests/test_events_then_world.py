@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from support.events_then import GRAVITY, U, ball, ground
+from support.families import family
 
 METHODS = ["rk4", "leapfrog", "verlet", "false_euler", "standard_heun"]
 
@@ -29,7 +30,7 @@ def test_frames_have_the_states_of_a_run(method: str, n: int) -> None:
     np.testing.assert_array_equal(heard, run.events["ground"].count)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", family(METHODS, lambda method: method in ("rk4", "leapfrog")))  # one carries v at another time
 def test_none_of_many_balls_ends_below_the_ground(method: str) -> None:
     """After ten seconds of frames all lie at the ground, and stay there.
 

@@ -9,50 +9,15 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, TraceError, UnsupportedError
-from support.cases import SYSTEMS, Case, assert_same, cases, thinned
+from support.cases import Case, assert_same
 
 F = np.float32
-SOME = {"direct": 1, "matrix": 1}
 
-
-DIRECT = [case for case in cases() if case.form == "direct"]
-FORMS = [case for case in cases() if case.form != "power"]
-
-
-# ---- the same bits
-
-
-@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
-@pytest.mark.parametrize("case", thinned(FORMS, SOME, "float32 equals the reference"))
-@pytest.mark.parametrize("fused", [False, True])
-def test_equals_the_reference(case: Case, fused: bool) -> None:
-    if why := case.refused_in_float32():
-        assert "dtype: " in why
-        return
-    for b in (33,) if fused else (1, 33):
-        run, again = (case.run(b, dtype="float32", fused=fused, backend=backend) for backend in ("rust", "numpy"))
-        assert run.y.dtype == run.v.dtype == again.y.dtype == again.v.dtype == F
-        assert_same(run, again)
-
-
-@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
-@pytest.mark.parametrize("case", thinned(FORMS, SOME, "float32 does not depend on the kernels"))
-def test_machine_code_equals_the_interpreter(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By so many steps that machine code is written; saved at every step and at some."""
-    if case.refused_in_float32():
-        return
-    for b, every in ((1, 7), (37, 1), (300, 7)):
-        options = {"steps": 410, "every": every, "dtype": "float32", "dt": 0.02}
-        runs = []
-        for level in sw.isa_levels():
-            monkeypatch.setenv("STEPWELL_KERNELS", level)
-            runs.append(case.run(b, **options))
-        for run in runs[1:]:
-            assert_same(run, runs[0])
+# ---- the same bits: test_bits.py and test_adaptive.py have every system and method
 
 
 def test_it_does_not_depend_on_threads_company_or_pieces() -> None:
-    case = next(case for case in DIRECT if (case.method, case.system) == ("verlet", "pendulum, sinusoid a"))
+    case = Case("verlet", "pendulum, sinusoid a", "direct", "second_order")
     together = case.run(700, dtype="float32", threads=1, every=1)
     assert_same(case.run(700, dtype="float32", threads=7, every=1), together)
     system, arguments = case.make(700)
@@ -60,16 +25,6 @@ def test_it_does_not_depend_on_threads_company_or_pieces() -> None:
     run = sw.integrate(system, case.method, resume=run, steps=14, every=1)
     np.testing.assert_array_equal(run.y[-1], together.y[-1])
     np.testing.assert_array_equal(run.v[-1], together.v[-1])
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 0}, "float32 diverges alike"))
-@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
-def test_diverging_members_too(case: Case) -> None:
-    """In the long run only: the next test has a few members that diverge."""
-    if not case.refused_in_float32():
-        options = {"dt": 60.0, "steps": 60, "every": 20, "dtype": "float32"}
-        assert_same(case.run(40, **options), case.run(40, **options, backend="numpy"))
 
 
 @pytest.mark.parametrize("method", ["false_euler", "verlet", "rk4"])
@@ -85,15 +40,6 @@ def test_members_diverge_where_the_range_of_float32_ends(method: str) -> None:
     assert (bad > 0).any()
     assert (bad[wide.first_bad_step > 0] > 0).all()
     assert (bad[bad > 0] != wide.first_bad_step[bad > 0]).any()
-
-
-def test_small_and_large_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    for level in sw.isa_levels():
-        monkeypatch.setenv("STEPWELL_KERNELS", level)
-        for scale in (1e-45, 1e-38, 1e-30, 1e30, 3e37):
-            arguments = {"v": scale * np.linspace(-1, 1, 50), "y": scale, "dt": 0.1, "steps": 50, "every": 1, "dtype": "float32"}
-            run = sw.integrate(sw.Oscillator(1.3, 0.1), "rk4", **arguments)
-            assert_same(run, sw.integrate(sw.Oscillator(1.3, 0.1), "rk4", **arguments, backend="numpy"))
 
 
 @pytest.mark.filterwarnings("ignore:.*did not follow the motion")  # of 300 members that begin anywhere
@@ -204,27 +150,6 @@ def assert_same_paces(a: sw.Run, b: sw.Run) -> None:
     assert_same(a, b)
     for mine, theirs in zip(a.paces, b.paces, strict=True):
         np.testing.assert_array_equal(mine, theirs)
-
-
-@pytest.mark.parametrize("name", SYSTEMS)
-@pytest.mark.parametrize("method", ABLE)
-@pytest.mark.filterwarnings("ignore")
-def test_adaptive_steps_equal_the_reference(method: str, name: str) -> None:
-    rng = np.random.default_rng(3)
-    system = SYSTEMS[name](rng, 6)
-    v, y = 0.3 * rng.normal(size=(*system.v_shape, 6)), rng.normal(size=(*system.y_shape, 6))
-    options: dict[str, Any] = {"max_steps": 60, "at": [0.3, 0.5]}
-    try:
-        paced(system, method, v, y, **options, dtype="float64")
-    except UnsupportedError:  # friction that sticks, and surfaces
-        return
-    try:
-        run = paced(system, method, v, y, **options)
-    except ArgumentError as error:
-        if "is too long" in str(error):
-            return
-        raise
-    assert_same_paces(run, paced(system, method, v, y, **options, backend="numpy"))
 
 
 PENDULA = sw.Pendulum(np.linspace(0.5, 2.0, 37))

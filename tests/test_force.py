@@ -16,7 +16,7 @@ from stepwell.errors import ArgumentError, DTypeError, FixedError, ShapeError, U
 from stepwell.reference import around
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from support.cases import ADAPTIVE, SYSTEMS, fits
+from support.cases import ADAPTIVE, SOME, SYSTEMS, drawn, fits
 from support.graphs import assert_one_graph, methods
 from support.tracing import made
 
@@ -39,11 +39,17 @@ def able(system: sw.System, method: str) -> bool:
 # ---- the reference, and the core
 
 
+def tried(system: sw.System, some: int | None, name: str) -> list[sw.Method]:
+    """By default four methods of each system: without a force test_graphs.py compares all."""
+    return drawn(list(methods(system)), some and 2 * some, "force", name)
+
+
+@SOME
 @pytest.mark.parametrize("name", PUSHED)
-def test_one_graph(name: str) -> None:
+def test_one_graph(name: str, some: int | None) -> None:
     """For every input: the core's step and the reference's are one graph of operations, and so is what a method carries."""
     system, v, _ = made(name)
-    for method in methods(system):
+    for method in tried(system, some, name):
         plan = engine.Plan(system, method, system.batch, 0.1, force=np.ones_like(v))
         tape = _core.Tape()
         tracer = Tracer(system, tape, plan.force)
@@ -65,11 +71,12 @@ def otherwise(name: str) -> bool:
     )
 
 
+@SOME
 @pytest.mark.parametrize("name", [name for name in PUSHED if not otherwise(name)])
-def test_without_a_force_the_step_is_the_one_before(name: str) -> None:
+def test_without_a_force_the_step_is_the_one_before(name: str, some: int | None) -> None:
     """With one, each rate evaluation takes an addition more for each number of v, and nothing else is done in a step."""
     system, _, _ = made(name)
-    for method in methods(system):
+    for method in tried(system, some, name):
         plan = engine.Plan(system, method, system.batch, 0.1)
         counts = []
         for force in (None, np.ones((*system.v_shape, *system.batch))):

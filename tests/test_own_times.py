@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import pickle
 import re
 import warnings
@@ -401,13 +402,19 @@ def _told(run: sw.Run) -> dict[str, Any]:
     return {name: getattr(run, name) for name in ("t", "v", "y", "t0")}
 
 
+@functools.cache
+def made(which: str) -> sw.Run:
+    """The run of that name, which no use changes."""
+    return OF_OWN_TIMES[which]()
+
+
 @pytest.mark.parametrize("use", USES)
 @pytest.mark.parametrize("which", OF_OWN_TIMES)
 def test_a_run_of_own_times_is_used_or_refused_in_words(which: str, use: str, tmp_path: Path) -> None:
     function, refusal = USES[use]
     words = ""
     try:
-        function(OF_OWN_TIMES[which](), tmp_path)
+        function(made(which), tmp_path)
     except sw.StepwellError as error:
         words = str(error)
     assert not words or (refusal and re.search(refusal, words)), words

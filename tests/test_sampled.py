@@ -154,7 +154,8 @@ def test_large_own_equations() -> None:
     for values in (r.normal(size=30), r.normal(size=(30, 2))):
         system = ring(push=sw.Sampled(values, 0.035))
         for method in ("dop853", "leapfrog", "verlet"):
-            start: dict[str, Any] = {"v": 0.0, "y": r.normal(size=(60, 2)), "dt": 0.01, "steps": 40, "every": 10}
+            # Past three samples: NumPy computes each of the 60 rates on its own.
+            start: dict[str, Any] = {"v": 0.0, "y": r.normal(size=(60, 2)), "dt": 0.01, "steps": 12, "every": 4}
             run, other = (sw.integrate(system, method, **start, backend=backend) for backend in ("rust", "numpy"))
             np.testing.assert_array_equal(run.y, other.y)
             np.testing.assert_array_equal(run.v, other.v)

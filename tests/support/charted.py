@@ -1,5 +1,6 @@
 """Work-precision charts that several tests look at."""
 
+import csv
 import functools
 import importlib
 
@@ -51,3 +52,8 @@ def hasty(patched):
 @pytest.fixture(scope="module", name="small")
 def the_small():
     return sw.charts.work_precision("forced_oscillator", ["verlet", "false_euler", "rk4"], [4, 40, 400])
+
+
+def read(path):
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
