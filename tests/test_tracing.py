@@ -12,7 +12,7 @@ from stepwell.model.parameters import flat
 from stepwell.reference import adaptive, contact
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from support.cases import ADAPTIVE, SYSTEMS, fits, has_branches
+from support.cases import ADAPTIVE, SOME, SYSTEMS, drawn, fits, has_branches
 from support.symbols import Symbol, Tape, evaluate
 from support.tracing import ABLE, CONTROLS, MEMBERS, METHODS, H, T, assert_computes, made
 
@@ -89,8 +89,9 @@ def test_every_quantity(name: str) -> None:
         assert_computes(numbers(system, tape, symbols, v, y), expected)
 
 
+@SOME
 @pytest.mark.parametrize("name", [name for name in ADAPTIVE if not name.startswith("thirty-five")])
-def test_every_attempt(name: str) -> None:
+def test_every_attempt(name: str, some: int | None) -> None:
     """Steps that are accepted, rejected, held because they pass the target, extra, and none at all."""
     system, v, y = made(name)
     row: Callable[..., Any] = lambda *values: np.array(values)  # noqa: E731
@@ -121,7 +122,7 @@ def test_every_attempt(name: str) -> None:
         ),
     )
     paces = [pace, pace._replace(target=row(9.0, T, 9.0), relative=row(9.0, 1.0, 9.0)), pace._replace(extra=row(0.01, 0.0, 0.02))]
-    for method in ABLE:
+    for method in drawn(ABLE, some, "attempt", name):
         tape = Tape()
         symbols = Tracer(system, tape).attempt(method)
         if method.has_series and has_branches(system):
