@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell.analysis import growth
 from stepwell.analysis.stability import limit
 from support.cases import Case
 
@@ -228,3 +230,34 @@ def test_members_with_samples_of_their_own_are_told_too() -> None:
     case = Case("merson", "top, damped, torques of its own", "direct", None)
     with pytest.warns(sw.AccuracyWarning, match="1 of 5 members grew"), pytest.warns(sw.DivergenceWarning):
         case.run(5, 0, dt=3.0, steps=9)
+
+
+def test_findings_are_the_same_whether_the_warning_is_heard_or_not() -> None:
+    runs = []
+    for action in ("always", "ignore"):
+        with warnings.catch_warnings(record=True):
+            warnings.simplefilter(action)
+            runs.append(sw.integrate(sw.Oscillator([1.0, 3.0]), "rk4", v=0.0, y=1.0, dt=1.0, steps=100))
+    assert len(runs[0].findings) == 1
+    assert runs[0].findings == runs[1].findings
+
+
+@pytest.mark.parametrize("y", [2.0, 0.0, np.linspace(-3.0, -1.0, 5), np.zeros(5), np.linspace(-1.0, 1.0, 5)])
+@pytest.mark.parametrize("v", [0.0, -4.0, np.linspace(0.5, 2.0, 5), np.zeros(5)])
+def test_no_member_is_shorter_at_the_start_than_the_bound_of_all(v: Any, y: Any) -> None:
+    """A member at rest counts as one unit long. The bound is sharp if one block is zero."""
+    start = np.broadcast_to(v, 5), np.broadcast_to(y, 5)
+    run = sw.integrate(sw.Oscillator(np.linspace(0.5, 1.0, 5)), "rk4", v=v, y=y, dt=0.1, steps=10)
+    lengths = np.hypot(*start)
+    least = float(np.where(lengths > 0.0, lengths, 1.0).min())
+    bound = growth._shortest(run, start)
+    assert 0.0 < bound <= least
+    if not np.any(v) or not np.any(y):
+        assert bound == least
+
+
+@pytest.mark.parametrize("n", [1, growth.FEW, growth.FEW + 1])
+def test_the_square_of_a_block_is_the_same_by_either_product(n: int) -> None:
+    block = np.random.default_rng(5).normal(size=n)
+    assert growth._square(block) == pytest.approx(math.fsum(block * block), rel=n * 2.0**-53)
+    assert math.isnan(growth._square(np.append(block, math.nan)))
