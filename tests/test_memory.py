@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.analysis.stability import limit
-from stepwell.base import checks
+from stepwell.base import available_memory
 from stepwell.errors import TooLargeError
 from stepwell.runs import engine
 from stepwell.runs.engine import linear
@@ -33,7 +33,7 @@ def aside(code: str) -> str:
 
 @pytest.mark.parametrize("steps", [10**9, 10**15])
 def test_more_kept_states_than_memory_are_refused_at_once(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(checks, "_bounds", lambda: iter([(20e9, "memory of this machine")]))
+    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(20e9, "memory of this machine")]))
     monkeypatch.setattr(engine, "advance", None)  # no work is begun
     with pytest.raises(sw.StepwellError, match=r"the saved states need .* GiB, but 18\.6 GiB are available \(memory of"):
         sw.integrate(sw.Oscillator(1.0), "rk4", v=0.0, y=1.0, dt=0.1, steps=steps, every=1)
@@ -190,10 +190,10 @@ def test_the_least_bound_counts(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) 
         except KeyError:
             raise FileNotFoundError(path) from None
 
-    monkeypatch.setattr(checks, "_read", read)
-    assert checks.available_memory() == (3e9, "memory limit of the control group")
+    monkeypatch.setattr(available_memory, "_read", read)
+    assert available_memory.available_memory() == (3e9, "memory limit of the control group")
     del files["/proc/self/cgroup"]
-    assert checks.available_memory() == (8e6 * 1024, "memory of this machine")
+    assert available_memory.available_memory() == (8e6 * 1024, "memory of this machine")
 
 
 def test_what_is_kept_is_counted_as_it_is() -> None:
@@ -209,7 +209,7 @@ def test_what_is_kept_is_counted_as_it_is() -> None:
 def test_the_copies_of_a_matrix_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five of 1000² numbers, 38 MiB, where there are 30; as many as a run was seen to hold of a matrix of 1500² numbers."""
     A = np.eye(1000, k=500) - np.eye(1000, k=-500)
-    monkeypatch.setattr(checks, "_bounds", lambda: iter([(30 * 2.0**20, "memory of this machine")]))
+    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(30 * 2.0**20, "memory of this machine")]))
     with pytest.raises(sw.errors.TooLargeError, match=r"A: the matrix and its copies need 38\.1 MiB, but 30 MiB"):
         sw.LinearSystem(A)
 
@@ -218,14 +218,14 @@ def test_the_copies_of_a_matrix_are_counted(monkeypatch: pytest.MonkeyPatch) -> 
 def test_transition_matrices_are_counted_before_they_are_made(form: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Eight numbers for an element of 60 000 × 60 000, and three more for a power of it."""
     monkeypatch.setattr(linear, "transition", None)  # no work is begun
-    monkeypatch.setattr(checks, "_bounds", lambda: iter([(200e9, "memory of this machine")]))
+    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(200e9, "memory of this machine")]))
     with pytest.raises(TooLargeError, match=r"the transition matrices of 60000 × 60000 numbers need (215|295) GiB.*'direct'"):
         sw.integrate(sw.Chain(30_000), "rk4", v=0.0, y=0.0, dt=0.1, steps=10, form=form)
 
 
 def test_a_search_for_limits_is_counted_before_it_begins(monkeypatch: pytest.MonkeyPatch) -> None:
     """60 numbers for an element of a matrix, of as many members as are searched at once, and 250 for a limit with its mode."""
-    monkeypatch.setattr(checks, "_bounds", lambda: iter([(100e6, "memory of this machine")]))
+    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(100e6, "memory of this machine")]))
     monkeypatch.setattr(limit, "Search", None)  # no work is begun
     with pytest.raises(TooLargeError, match=r"the limits need 172 MiB.*of fewer states"):
         sw.stability_limit(sw.LinearSystem(-np.eye(613)), "rk4")
@@ -266,7 +266,7 @@ def test_matrices_of_small_motions_are_counted_before_they_are_made(monkeypatch:
 
     163 members of 40 states and 18 of 120 are searched at once, in 0.12 GB.
     """
-    monkeypatch.setattr(checks, "_bounds", lambda: iter([(1.5e9, "memory of this machine")]))
+    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(1.5e9, "memory of this machine")]))
     monkeypatch.setattr(limit, "Search", None)  # no work is begun
     springs, y = of_springs(20_001)
     with pytest.raises(TooLargeError, match=r"the limits need 3.05e\+03 GiB"):  # 64·80 004²·8 bytes
@@ -284,7 +284,7 @@ def test_matrices_of_small_motions_are_counted_before_they_are_made(monkeypatch:
 
 def test_a_net_that_is_mostly_fixed_is_counted_by_what_moves(monkeypatch: pytest.MonkeyPatch) -> None:
     """4·(4·500)² numbers for the whole net, 0.13 GB; sixty numbers an element of all of it were 2 GB."""
-    monkeypatch.setattr(checks, "_bounds", lambda: iter([(1e9, "memory of this machine")]))
+    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(1e9, "memory of this machine")]))
     springs, y = of_springs(500, fixed=range(1, 500))
     assert sw.stability_limit(springs, "rk4", v=0.0, y=y) > 0.0
 
@@ -297,7 +297,7 @@ def test_members_that_move_are_searched_some_at_a_time(monkeypatch: pytest.Monke
         searched.append(len(search.rates[0, 0]))
         return np.zeros(searched[-1]), np.zeros(searched[-1]), np.full(searched[-1], None)
 
-    monkeypatch.setattr(checks, "_bounds", lambda: iter([(0.2e9, "memory of this machine")]))  # with all it was 0.26 GB
+    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(0.2e9, "memory of this machine")]))  # with all it was 0.26 GB
     monkeypatch.setattr(limit, "_of_some", some)
     limit.limit_of(ring().for_state_shapes(), sw.method("rk4"), np.zeros((60, 300)), np.ones((60, 300)))
     assert sum(searched) == 300

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 import stepwell as sw
-from stepwell.base import checks
+from stepwell.base import paths
 from stepwell.errors import ArgumentError, DTypeError
 from stepwell.studies.measuring import timing
 from stepwell.views import charts
@@ -180,14 +180,14 @@ def test_a_path_is_left_as_it_was(tmp_path: Path) -> None:
     old = tmp_path / "old"
     old.write_bytes(b"kept")
     os.utime(old, (1e9, 1e9))
-    assert checks.file("path", str(old)) == old
+    assert paths.file("path", str(old)) == old
     assert (old.read_bytes(), old.stat().st_mtime) == (b"kept", 1e9)
-    checks.file("path", tmp_path / "new")
+    paths.file("path", tmp_path / "new")
     (tmp_path / "link").symlink_to(tmp_path / "not yet")
-    checks.file("path", tmp_path / "link")
+    paths.file("path", tmp_path / "link")
     (tmp_path / "link").unlink()
-    checks.folder("path", tmp_path / "new" / "and" / "deep")
-    checks.folder("path", str(tmp_path), ["old", "new"])
+    paths.folder("path", tmp_path / "new" / "and" / "deep")
+    paths.folder("path", str(tmp_path), ["old", "new"])
     assert list(tmp_path.iterdir()) == [old]
     assert (old.read_bytes(), old.stat().st_mtime) == (b"kept", 1e9)
 
@@ -197,8 +197,8 @@ def test_what_is_no_file_is_not_opened_twice(tmp_path: Path) -> None:
     """A pipe would wait for its reader."""
     os.mkfifo(tmp_path / "pipe")
     begin = time.perf_counter()
-    checks.file("path", tmp_path / "pipe")
-    checks.file("path", os.devnull)
+    paths.file("path", tmp_path / "pipe")
+    paths.file("path", os.devnull)
     assert time.perf_counter() - begin < 1.0
 
 
@@ -208,6 +208,6 @@ def test_what_may_not_be_written(tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir(0o500)
     for path in (tmp_path / "file", tmp_path / "folder" / "x"):
         with pytest.raises(ArgumentError, match="Permission denied"):
-            checks.file("path", path)
+            paths.file("path", path)
     with pytest.raises(ArgumentError, match="Permission denied"):
-        checks.folder("path", tmp_path / "folder" / "deep")
+        paths.folder("path", tmp_path / "folder" / "deep")

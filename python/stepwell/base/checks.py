@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import operator
-import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence, Sized
+from collections.abc import Iterable, Sequence, Sized
 from itertools import islice
 from math import isfinite, prod
 from numbers import Real
@@ -22,7 +21,6 @@ from .reprs import counted
 
 if TYPE_CHECKING:
     from inspect import Signature
-    from pathlib import Path
 
 
 Word = TypeVar("Word", bound=str)
@@ -38,9 +36,6 @@ _FEW_BYTES = 1 << 24
 
 #: The most elements of a list of names, functions or pairs; a range or a broadcast array takes memory only as a list.
 MOST_OF_A_LIST = 1_000_000
-
-#: The most characters of a path in a message.
-PATH = 1000
 
 
 def known(argument: str, name: object, names: Iterable[Word]) -> Word:
@@ -131,11 +126,13 @@ def _room(argument: str, shape: Shape) -> None:
     needed = 8.0 * prod(shape)
     if needed <= _FEW_BYTES:
         return
+    from .available_memory import available_memory, in_bytes  # the import of stepwell does without
+
     available, bound = available_memory()
     if needed > available:
         raise TooLargeError(
-            f"{argument}: expected an array that fits in memory, got shape {shape}: {_bytes(needed)} as floats, but "
-            f"{_bytes(max(available, 0.0))} are available ({bound})"
+            f"{argument}: expected an array that fits in memory, got shape {shape}: {in_bytes(needed)} as floats, but "
+            f"{in_bytes(max(available, 0.0))} are available ({bound})"
         )
 
 
@@ -413,80 +410,12 @@ def fits(what: str, rows: float, batch: Shape, remedy: str, *, beside: float = 0
     needed = 8.0 * rows * members + beside
     if needed <= _FEW_BYTES:
         return
+    from .available_memory import available_memory, in_bytes  # the import of stepwell does without
+
     available, bound = available_memory()
     if needed > available:
-        left, of = _bytes(max(available, 0.0)), f" of {counted(members, 'member')}" if batch else ""
-        raise TooLargeError(f"{what}{of} need {_bytes(needed)}, but {left} are available ({bound}); {remedy}")
-
-
-def _bytes(n: float) -> str:
-    return f"{n / 2**30:.3g} GiB" if n >= 2**30 else f"{n / 2**20:.3g} MiB"
-
-
-def available_memory() -> tuple[float, str]:
-    """How many bytes this process may still use, and what limits it: the machine, its control groups or its address space."""
-    return min(_bounds(), default=(2.0**63, "nothing is known of this system's memory"))
-
-
-def _bounds() -> Iterator[tuple[float, str]]:
-    try:
-        import resource
-
-        most = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if most != resource.RLIM_INFINITY:
-            used = int(_read("/proc/self/statm").split()[0]) * resource.getpagesize()
-            yield float(most - used), "limit of the address space, ulimit -v"
-    except (ImportError, OSError, IndexError):  # not this kind of system
-        pass
-    try:
-        yield 1024.0 * _fields("/proc/meminfo")["MemAvailable:"], "memory of this machine"
-    except (OSError, KeyError):
-        if hasattr(os, "sysconf"):
-            yield float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES")), "memory of this machine"
-    for folder, names in _control_groups():
-        try:
-            most, used = (int(_read(f"{folder}/{name}")) for name in names)
-        except (OSError, ValueError):  # there is no such group here, or "max", which is no limit
-            continue
-        try:
-            fields = _fields(f"{folder}/memory.stat")
-        except OSError:
-            fields = {}
-        # The page cache of inactive files is released when memory is needed.
-        used -= fields.get("total_inactive_file", fields.get("inactive_file", 0))
-        yield float(most - used), "memory limit of the control group"
-
-
-def _control_groups() -> Iterator[tuple[str, tuple[str, str]]]:
-    """The folders of this process's control groups and of their parents, with the names of the files of limit and usage."""
-    try:
-        lines = _read("/proc/self/cgroup").splitlines()
-    except OSError:
-        return
-    for line in lines:
-        _, controllers, path = line.split(":", 2)
-        if controllers and "memory" not in controllers.split(","):
-            continue
-        root, names = (
-            ("/sys/fs/cgroup/memory", ("memory.limit_in_bytes", "memory.usage_in_bytes"))
-            if controllers
-            else ("/sys/fs/cgroup", ("memory.max", "memory.current"))
-        )
-        path = path.strip("/")
-        while path:
-            yield f"{root}/{path}", names
-            path = path.rpartition("/")[0]
-        yield root, names
-
-
-def _read(path: str) -> str:
-    with open(path) as file:
-        return file.read()
-
-
-def _fields(path: str) -> dict[str, int]:
-    """A file of names and whole numbers, line by line."""
-    return {line[0]: int(line[1]) for line in map(str.split, _read(path).splitlines()) if len(line) > 1}
+        left, of = in_bytes(max(available, 0.0)), f" of {counted(members, 'member')}" if batch else ""
+        raise TooLargeError(f"{what}{of} need {in_bytes(needed)}, but {left} are available ({bound}); {remedy}")
 
 
 def in_place(
@@ -519,63 +448,6 @@ def in_place(
         raise ArgumentError(f"{argument}: expected a writeable array {what}, got a read-only one")
     numbers(argument, array)
     return array
-
-
-def file(argument: str, path: Any, endings: tuple[str, ...] = ()) -> Path:
-    """Return the path of a file if it has one of the endings and can be written; a trial leaves no file behind."""
-    if not isinstance(path, (str, os.PathLike)):
-        raise DTypeError(f"{argument}: expected the path of a file, got {short(path)} ({type(path).__name__})")
-    from pathlib import Path  # the import of stepwell does without
-
-    place = Path(os.fsdecode(path))
-    if endings and place.suffix not in endings:
-        *others, last = endings
-        known = f"{', '.join(others)} or {last}" if others else last
-        raise ArgumentError(f"{argument}: expected a file ending in {known}, got {short(str(path), PATH)}")
-    try:
-        if place.is_dir():
-            from errno import EISDIR  # an error alone needs it
-
-            raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
-        if place.is_file():
-            with place.open("ab"):
-                pass
-        elif not place.exists() and not place.is_symlink():  # a pipe, or /dev/null, must not be opened twice
-            with place.open("xb"):
-                pass
-            place.unlink()
-    except (OSError, ValueError) as error:
-        raise _unwritable(argument, "file", path, error) from None
-    return place
-
-
-def folder(argument: str, path: Any, names: Iterable[str] = ()) -> Path:
-    """Return the path of a folder, which need not exist yet, if files can be written there, also those of these names."""
-    if not isinstance(path, (str, os.PathLike)):
-        raise DTypeError(f"{argument}: expected the path of a folder, got {short(path)} ({type(path).__name__})")
-    from pathlib import Path  # the import of stepwell does without
-    from tempfile import TemporaryFile  # the import of stepwell may not take its time
-
-    place = Path(os.fsdecode(path))
-    try:
-        if "\0" in str(place):
-            raise ValueError("embedded null byte")
-        there = next(each for each in (place.absolute(), *place.absolute().parents) if each.exists())
-        with TemporaryFile(dir=there):
-            pass
-        if place.exists():
-            for name in names:
-                file(argument, place / name)
-    except (OSError, ValueError) as error:
-        if isinstance(error, ArgumentError):
-            raise
-        raise _unwritable(argument, "folder", path, error) from None
-    return place
-
-
-def _unwritable(argument: str, what: str, path: Any, error: Exception) -> ArgumentError:
-    why = getattr(error, "strerror", None) or error
-    return ArgumentError(f"{argument}: expected a {what} that can be written, got {short(str(path), PATH)}: {why}")
 
 
 def _in(unit: str) -> str:

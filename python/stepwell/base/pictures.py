@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from ..errors import ArgumentError, UnsupportedError
 from . import registry
-from .checks import file
+from .paths import file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

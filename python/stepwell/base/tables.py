@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from .checks import file
 from .files import replaced, write_text
+from .paths import file
 
 Columns = Mapping[str, Sequence[Any]]
 

@@ -11,7 +11,7 @@ from uuid import uuid4
 import numpy as np
 
 from .. import _core
-from ..base import checks
+from ..base import checks, paths
 from ..base.optional import imported
 from ..errors import ArgumentError, DTypeError, StepwellError
 from .parts import Arrays, Reader, Writer, is_whole
@@ -37,7 +37,7 @@ def save(run: Run, path: str | Path) -> None:
     # A new file is written beside the old one and then replaces it, so that an interruption loses nothing.
     beside = place.with_name(f"{place.stem}.{uuid4().hex}{place.suffix}")
     if place.suffix == ".npz":
-        checks.file("path", place)
+        paths.file("path", place)
         try:
             with beside.open("xb") as file:
                 about = {ABOUT: np.array(text), FORM: np.array([VERSION]), "stepwell_version": np.array(_core.__version__)}
@@ -48,7 +48,7 @@ def save(run: Run, path: str | Path) -> None:
             raise
         return
     zarr = imported("zarr", "save")
-    checks.folder("path", place.parent)
+    paths.folder("path", place.parent)
     if (replaced := place.exists()) and not _is_ours(zarr, place):
         raise ArgumentError(f"path: expected a new folder, or one with a saved run, got {checks.short(str(path))}")
     try:

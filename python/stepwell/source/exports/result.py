@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from ...base import checks, files
+from ...base import files, paths
 from ...base.arrays import Shape
 from ...base.immutable import ValueEquality
 from ...model.methods import Method
@@ -61,7 +61,7 @@ class ExportedStep(ValueEquality):
         Raises:
             ArgumentError: if it has another ending or cannot be written.
         """
-        place = checks.file("path", path, self.endings)
+        place = paths.file("path", path, self.endings)
         files.write_text(place, self.source)
         return place
 

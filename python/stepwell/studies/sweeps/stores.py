@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base import checks
+from ...base import checks, paths
 from ...base.arrays import Array, Shape
 from ...errors import ArgumentError, ShapeError, TooLargeError
 from .axes import Chunk
@@ -88,7 +88,7 @@ class Zarr:
             there = json.loads(group.attrs[SWEEP])
         except Exception as error:  # zarr raises exceptions of many kinds for a folder or a file that is no store
             raise ArgumentError(
-                f"store: expected a new path or that of a sweep, got {checks.short(str(self.path), checks.PATH)}, "
+                f"store: expected a new path or that of a sweep, got {checks.short(str(self.path), paths.PATH)}, "
                 f"which is something else ({type(error).__name__}: {error})"
             ) from None
         same_sweep(self.path, there, json.loads(self.layout.attrs[SWEEP]))
@@ -115,7 +115,7 @@ class Zarr:
 
     def _torn(self, what: str, error: Exception) -> ArgumentError:
         return ArgumentError(
-            f"store: {checks.short(str(self.path), checks.PATH)} is of this sweep, but the metadata of {what} is torn "
+            f"store: {checks.short(str(self.path), paths.PATH)} is of this sweep, but the metadata of {what} is torn "
             f"({type(error).__name__}: {error}); remove it, or give another path"
         )
 
@@ -150,7 +150,7 @@ class Zarr:
         except OSError as error:
             state = "there was nothing to keep" if self.group is None else "the chunks that are done are kept"
             raise ArgumentError(
-                f"store: {checks.short(str(self.path), checks.PATH)} cannot be written: {error.strerror or error}; {state}: "
+                f"store: {checks.short(str(self.path), paths.PATH)} cannot be written: {error.strerror or error}; {state}: "
                 f"make room and call again, or give another path"
             ) from error
         finally:
@@ -220,7 +220,7 @@ class NetCDF(Zarr):
                     sweep = json.loads(there.attrs[SWEEP])
             except Exception as error:  # exceptions of many kinds for a file that is no NetCDF file
                 raise ArgumentError(
-                    f"store: expected a new path or that of a sweep, got {checks.short(str(path), checks.PATH)}, which is "
+                    f"store: expected a new path or that of a sweep, got {checks.short(str(path), paths.PATH)}, which is "
                     f"something else ({type(error).__name__}: {error})"
                 ) from None
             same_sweep(path, sweep, json.loads(layout.attrs[SWEEP]))
@@ -256,7 +256,7 @@ def _room(path: Path, needed: int) -> None:
     free = shutil.disk_usage(path.parent).free
     if needed > free:
         raise TooLargeError(
-            f"store: {checks.short(str(path), checks.PATH)} needs {needed / 2**20:.3g} MiB, but its disk has "
+            f"store: {checks.short(str(path), paths.PATH)} needs {needed / 2**20:.3g} MiB, but its disk has "
             f"{free / 2**20:.3g} MiB left; what is done so far is kept beside it: make room and call again, or take a path that "
             f"ends in .zarr"
         )
@@ -283,7 +283,7 @@ def same_sweep(path: Path, there: dict[str, Any], wanted: dict[str, Any]) -> Non
             if name != "first steps" or len(names) == 1
         )
         raise ArgumentError(
-            f"store: {checks.short(str(path), checks.PATH)} is of another sweep and is not continued ({differences}); "
+            f"store: {checks.short(str(path), paths.PATH)} is of another sweep and is not continued ({differences}); "
             f"give another path"
         )
 
@@ -296,7 +296,7 @@ def store_of(store: Any) -> tuple[type[Zarr], Path] | None:
         path = Path(os.fsdecode(store))
         kind = {".zarr": Zarr, ".nc": NetCDF}.get(path.suffix)
         if kind is not None:
-            checks.folder("store", path.parent)
+            paths.folder("store", path.parent)
             path.parent.mkdir(parents=True, exist_ok=True)
             return kind, path
-    raise ArgumentError(f"store: expected a path that ends in .zarr or .nc, got {checks.short(store, checks.PATH)}")
+    raise ArgumentError(f"store: expected a path that ends in .zarr or .nc, got {checks.short(store, paths.PATH)}")

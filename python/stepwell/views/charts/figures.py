@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.stability import StabilityLimit, analyse, stability_limit
-from ...base import checks, registry
+from ...base import checks, paths, registry
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
@@ -181,15 +181,15 @@ class Figures(Table, ValueEquality):
         names = ["overview.png", *(samples.file for samples in self.samples)]
         others: dict[str, Any] = {HARMONIC_FILE: self.plot_harmonic} if self.harmonic else {}
         others |= {"figures.csv": self.to_csv, "figures.json": self.to_json}
-        place = checks.folder("folder", folder, [*names, *others])
+        place = paths.folder("folder", folder, [*names, *others])
         new_figure(1.0, 1.0)  # raises before the folder is created if nothing can be drawn
         place.mkdir(parents=True, exist_ok=True)
-        paths = [place / name for name in names]
-        for path, method in zip(paths, [None, *(samples.method for samples in self.samples)], strict=True):
+        places = [place / name for name in names]
+        for path, method in zip(places, [None, *(samples.method for samples in self.samples)], strict=True):
             self.plot(path, method=method)
         for name, write in others.items():
             write(place / name)
-        return paths + [place / name for name in others]
+        return places + [place / name for name in others]
 
     def summary(self) -> list[dict[str, Any]]:
         """A row for each method: what its samples do."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base import checks
+from ...base import checks, paths
 from ...base.pictures import new_figure
 from ...errors import ArgumentError, UnsupportedError
 from . import page_animation
@@ -44,7 +44,7 @@ def need(path: str | Path, seconds: float, fps: float) -> tuple[float, float]:
     fps = checks.number("fps", fps, positive=True, unit="frames a second")
     if seconds * fps > MOST_FRAMES:
         raise ArgumentError(f"seconds, fps: {seconds * fps:.3g} frames, expected {MOST_FRAMES} or fewer")
-    ending = checks.file("path", path).suffix.lower()
+    ending = paths.file("path", path).suffix.lower()
     if ending not in ENDINGS:
         raise ArgumentError(f"path: expected an ending of an animation, one of {', '.join(ENDINGS)}, got {str(path)!r}")
     if ending == ".html":

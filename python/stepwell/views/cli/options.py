@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ...base import checks
+from ...base import paths
 from ...base.pictures import new_figure
 from ...model.methods import Method
 from ...model.methods import method as find_method
@@ -75,7 +75,7 @@ def file(parser: argparse.ArgumentParser, text: str) -> None:
 def check_file(args: argparse.Namespace, endings: Iterable[str]) -> None:
     """Raise an error before any work if the file cannot be written."""
     if args.output is not None:
-        checks.file("-o", args.output, tuple(endings))
+        paths.file("-o", args.output, tuple(endings))
 
 
 def folder(parser: argparse.ArgumentParser, text: str = "", *, here: bool = False) -> None:
@@ -87,5 +87,5 @@ def folder(parser: argparse.ArgumentParser, text: str = "", *, here: bool = Fals
 def check_folder(args: argparse.Namespace, names: Iterable[str] = ()) -> None:
     """Raise an error before any work if these files or pictures cannot be written there."""
     if args.output is not None:
-        checks.folder("-o", args.output, list(names))
+        paths.folder("-o", args.output, list(names))
         new_figure(1.0, 1.0)  # raises an error without matplotlib

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ...base import checks
+from ...base import paths
 from ...base.pictures import new_figure
 from ...errors import ArgumentError
 from ...model.controls import WAYS, AnyControl, EnergyControl, Projection
@@ -158,7 +158,7 @@ def _check_output(path: Path | None, seconds: float, fps: float) -> None:
     """Raise an error before any work if the file cannot be written: an unknown format, a missing program or folder."""
     if path is None:
         return
-    checks.file("-o", path, (*NUMBERS, *PICTURES, *ANIMATIONS))
+    paths.file("-o", path, (*NUMBERS, *PICTURES, *ANIMATIONS))
     if path.suffix in PICTURES:
         new_figure(1.0, 1.0)
     elif path.suffix in ANIMATIONS:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import _core
-from ...base import checks, files
+from ...base import checks, files, paths
 from ...base.immutable import ValueEquality
 from ...errors import ArgumentError
 from ...model.methods import Method
@@ -138,7 +138,7 @@ class Explorer(ValueEquality):
         Raises:
             ArgumentError: if it has another ending or cannot be written.
         """
-        place = checks.file("path", path, (".html", ".htm"))
+        place = paths.file("path", path, (".html", ".htm"))
         files.write_text(place, self.html)
         return place
 

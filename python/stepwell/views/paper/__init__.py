@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from ...base import checks
+from ...base import checks, paths
 from ...errors import ArgumentError
 
 #: The modules, in the order of the document.
@@ -147,7 +147,7 @@ def draw(folder: str | Path, section: str | None = None) -> list[Path]:
     chosen = [entry for entry in entries(section) if entry.draw is not None]
     if not chosen:
         raise ArgumentError(f"section: {section} has no figure")
-    place = checks.folder("folder", folder, [entry.picture for entry in chosen])
+    place = paths.folder("folder", folder, [entry.picture for entry in chosen])
     new_figure(1.0, 1.0)  # raises an error without matplotlib, before the folder is created
     place.mkdir(parents=True, exist_ok=True)
     for entry in chosen:
