@@ -3,87 +3,19 @@
 use std::{ops::Range, sync::Arc};
 
 use super::{
-    Model,
-    columns::{Columns, cut},
+    adaptive_plan::{Assignment, Part, Status},
     fixed::expect,
-    waypoints::{self, WAYPOINTS},
+    waypoints::{self, WAYPOINTS, WaypointSearch},
     workers::{self, GoOn, Workers},
 };
 use crate::{
     error::Error,
     group::AdaptiveBatch,
-    model::spec::Row,
     stage::{Machine, Stop},
     step::{key::StepKind, pace::Pace, tapes::Traced},
 };
 
-/// A run to be made.
-#[derive(Clone, Debug)]
-pub struct AdaptiveRun<'a> {
-    /// What to step, and how.
-    pub model: Model<'a>,
-    /// What hot loops may use.
-    pub machine: Machine,
-    /// Times to keep the state at, ascending, by rows.
-    pub at: Vec<Row<'a>>,
-    /// The times that no step crosses, by rows: those just before each, ascending, and behind them those just after.
-    pub jumps: Vec<Row<'a>>,
-    /// The members' paces at the start, by rows, in the order of [`Pace::numbers`], and what stands behind them.
-    pub paces: Vec<Row<'a>>,
-    /// Whether the steps to try first and the lengths of the blocks are still to be found: see `Pace::begun`.
-    pub begins: bool,
-    /// The most attempts of a member.
-    pub budget: i64,
-    /// Every so manieth accepted step is kept in [`Arrays::steps`]; 0 for none. A member that has filled its rows there ends, with
-    /// a status of its own, and can go on from its pace.
-    pub every: i64,
-    /// Velocities at the start, by rows.
-    pub v: Vec<Row<'a>>,
-    /// Coordinates at the start, by rows.
-    pub y: Vec<Row<'a>>,
-    /// How many members.
-    pub members: usize,
-}
-
-/// How a member ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Status {
-    /// Its rows of [`Arrays::steps`] are full.
-    Full = -1,
-    /// At the last time.
-    Ok = 0,
-    /// Out of attempts.
-    Budget = 2,
-    /// A step no longer moves the time.
-    Underflow = 3,
-    /// As `Underflow`, because no step, however short, gave a finite state.
-    NotFinite = 4,
-}
-
-/// What a run fills: arrays of rows of one number per member.
-#[derive(Debug)]
-pub struct Arrays<'a> {
-    /// The states at the output times; NaN from where a member stopped.
-    pub saved_v: &'a mut [f64],
-    /// Likewise the coordinates.
-    pub saved_y: &'a mut [f64],
-    /// Rows of the members' states at the end, v and y: those before the step that contains the last output time.
-    pub state: &'a mut [f64],
-    /// Their paces at the end, by rows.
-    pub paces: &'a mut [f64],
-    /// One row: the status.
-    pub status: &'a mut [i64],
-    /// Empty; or for each time of [`AdaptiveRun::at`], which are then all the same, the times of the members, and behind them the
-    /// steps to try next. Then attempts are made one by one until that time is passed, and what is kept is where members stand
-    /// before the first and after each. No step is held.
-    pub attempt_log: &'a mut [f64],
-    /// The states after accepted steps that are kept, by rows: their times, velocities and coordinates; empty if none are.
-    pub steps: [&'a mut [f64]; 3],
-    /// One row: how many of them each member has.
-    pub kept_steps: &'a mut [i64],
-    /// Empty; or where members stood at their last waypoints: see `run/waypoints.rs`.
-    pub waypoints: &'a mut [f64],
-}
+pub use super::adaptive_plan::{AdaptiveRun, Arrays};
 
 /// Attempts between two checks of the lanes.
 const ATTEMPTS_BETWEEN_CHECKS: usize = 16;
@@ -93,20 +25,6 @@ const ATTEMPTS_WITH_EXTRA_STEPS: usize = 4;
 const LARGE_MEMBER_NUMBERS: usize = 1000;
 /// Members of a small system below which a second thread costs more time than it saves.
 const MIN_MEMBERS_FOR_THREADS: usize = 256;
-
-struct Part<'a> {
-    first: usize,
-    count: usize,
-    saved_v: Columns<'a, f64>,
-    saved_y: Columns<'a, f64>,
-    state: Columns<'a, f64>,
-    paces: Columns<'a, f64>,
-    status: Columns<'a, i64>,
-    attempt_log: Columns<'a, f64>,
-    steps: [Columns<'a, f64>; 3],
-    kept_steps: Columns<'a, i64>,
-    waypoints: Columns<'a, f64>,
-}
 
 /// Makes the run, and returns whether it did: where members stand at the start is not found for a system whose attempt is not one
 /// tape. The monitor is as that of [`crate::run::fixed::run`].
@@ -156,33 +74,7 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
     // Few shares, since lanes run empty at the end of each; but several, so that the others do not wait long for a slow one.
     let shares = if threads == 1 { 1 } else { b.div_ceil(lanes).min(threads * 8) };
     let shares: Vec<usize> = (0..shares).map(|i| b * (i + 1) / shares - b * i / shares).collect();
-    let mut whole = [arrays.status, arrays.kept_steps].map(|a| cut(a, b, &shares).into_iter());
-    let [t, v, y] = arrays.steps;
-    let mut rows = [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces, arrays.attempt_log, t, v, y, arrays.waypoints]
-        .map(|a| cut(a, b, &shares).into_iter());
-    let mut parts = Vec::with_capacity(shares.len());
-    let mut first = 0;
-    for count in shares {
-        if let (
-            [
-                Some(saved_v),
-                Some(saved_y),
-                Some(state),
-                Some(paces),
-                Some(attempt_log),
-                Some(t),
-                Some(v),
-                Some(y),
-                Some(waypoints),
-            ],
-            [Some(status), Some(kept_steps)],
-        ) = (rows.each_mut().map(Iterator::next), whole.each_mut().map(Iterator::next))
-        {
-            let steps = [t, v, y];
-            parts.push(Part { first, count, saved_v, saved_y, state, paces, status, attempt_log, steps, kept_steps, waypoints });
-        }
-        first += count;
-    }
+    let parts = arrays.parts(b, shares);
     let workers = Workers { threads, background: traced.is_long(lanes), total: b as f64, stop: Stop::clone(&stop) };
     workers::share(parts, &workers, monitor, mine, worker, Worker::part)?;
     Ok(true)
@@ -193,34 +85,10 @@ fn length(t: f64, h: f64, wall: f64) -> f64 {
     if wall < t + h { wall - t } else { h }
 }
 
-/// Which member of the part a lane steps, and which of the saved times is next.
-struct Assignment {
-    member: usize,
-    next: usize,
-    /// While an extra step is made: the state that it starts from, which has to be put back, and how many attempts were rejected
-    /// before.
-    origin: Option<(Vec<f64>, f64)>,
-    /// A run that goes on is held, and the coefficients of its series have to be found first.
-    held_before: bool,
-    /// How many accepted steps it had when a step was looked at last, and how many are kept of this run.
-    accepted: f64,
-    kept_steps: usize,
-    /// How many accepted steps it had when a waypoint was looked for last.
-    passed: u64,
-}
-
-impl Assignment {
-    /// Of a member of the log of attempts.
-    fn of_log(member: usize, next: usize) -> Assignment {
-        Assignment { member, next, origin: None, held_before: false, accepted: 0.0, kept_steps: 0, passed: 0 }
-    }
-}
-
 struct Worker<'a> {
     plan: &'a AdaptiveRun<'a>,
     group: Box<dyn AdaptiveBatch>,
-    /// Fewer attempts bring no lane to its next waypoint, or to a step before one.
-    attempts_to_waypoint: usize,
+    waypoints: WaypointSearch,
 }
 
 impl<'a> Worker<'a> {
@@ -229,7 +97,7 @@ impl<'a> Worker<'a> {
         let machine = Machine { threads, ..plan.machine };
         let mut group = plan.model.adaptive(traced, machine, plan.members, plan.budget as f64)?;
         group.set_stop_flag(stop);
-        Ok(Worker { plan, group, attempts_to_waypoint: 1 })
+        Ok(Worker { plan, group, waypoints: WaypointSearch::new(plan.v.len() + plan.y.len()) })
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
@@ -261,7 +129,7 @@ impl<'a> Worker<'a> {
             let numbers = self.plan.v.len() + self.plan.y.len();
             if self.group.has_terms() {
                 let attempts = if self.plan.every > 0 { 1 } else { self.attempts_by_series() };
-                self.attempt(&mut part, attempts, &mut assignments);
+                self.waypoints.attempt(&mut *self.group, &mut part, attempts, &mut assignments);
                 if self.plan.every == 0 {
                     self.group.find_running(self.plan.budget as f64, &mut runs);
                 }
@@ -285,7 +153,7 @@ impl<'a> Worker<'a> {
                 ATTEMPTS_BETWEEN_CHECKS
             };
             let attempts = attempts.min(self.attempts_to_next_kept(&assignments));
-            self.attempt(&mut part, attempts, &mut assignments);
+            self.waypoints.attempt(&mut *self.group, &mut part, attempts, &mut assignments);
             if !go_on(0) {
                 return Err(Error::Interrupted);
             }
@@ -303,56 +171,6 @@ impl<'a> Worker<'a> {
             assigned.as_ref().map(|_| every - self.group.pace(lane).accepted as i64 % every)
         };
         assignments.iter().enumerate().filter_map(left).min().unwrap_or(1) as usize
-    }
-
-    /// So many attempts of every lane, and keeps where lanes stand that come to a waypoint or to a step before one.
-    fn attempt(&mut self, part: &mut Part, attempts: usize, assignments: &mut [Option<Assignment>]) {
-        if part.waypoints.rows() == 0 {
-            self.group.attempt(attempts);
-            return;
-        }
-        let mut left = attempts;
-        while left > 0 {
-            let next = left.min(self.attempts_to_waypoint);
-            self.group.attempt(next);
-            left -= next;
-            self.attempts_to_waypoint -= next;
-            if self.attempts_to_waypoint == 0 {
-                self.attempts_to_waypoint = self.keep_waypoints(part, assignments);
-            }
-        }
-    }
-
-    /// Keeps where lanes stand that have come to a waypoint or a step before one; after how many attempts the next one may.
-    fn keep_waypoints(&self, part: &mut Part, assignments: &mut [Option<Assignment>]) -> usize {
-        let (row, mut next) = (self.accepted_of_lanes(), usize::MAX);
-        for (lane, assigned) in assignments.iter_mut().enumerate() {
-            if let Some(assigned) = assigned {
-                let accepted = self.accepted(row, lane);
-                // An extra step accepts none, so the state of a lane that has accepted one is that of the run.
-                self.keep_waypoint(part, lane, assigned, accepted as u64);
-                next = next.min(waypoints::steps_to_next(accepted));
-            }
-        }
-        next
-    }
-
-    /// How many steps all lanes have accepted, if they stand side by side.
-    fn accepted_of_lanes(&self) -> Option<&[f64]> {
-        self.group.row(self.plan.v.len() + self.plan.y.len() + Pace::<f64>::ACCEPTED)
-    }
-
-    /// How many steps a lane has accepted.
-    fn accepted(&self, row: Option<&[f64]>, lane: usize) -> f64 {
-        row.map_or_else(|| self.group.pace(lane).accepted, |accepted| accepted[lane])
-    }
-
-    /// Keeps where a lane stands if it has come to a waypoint or a step before one.
-    fn keep_waypoint(&self, part: &mut Part, lane: usize, assigned: &mut Assignment, accepted: u64) {
-        if accepted != assigned.passed && part.waypoints.rows() > 0 {
-            assigned.passed = accepted;
-            waypoints::keep(&mut part.waypoints, &*self.group, lane, assigned.member, accepted);
-        }
     }
 
     /// Keeps the state of a lane if it has made a step that is to be kept. Returns whether there is no room for another.
@@ -495,7 +313,7 @@ impl<'a> Worker<'a> {
         self.group.set_scales(lane, &scales);
         let before = &plan.jumps[..plan.jumps.len() / 2];
         let next = before.get(before.partition_point(|row| row.at(at) <= pace.t));
-        self.attempts_to_waypoint = self.attempts_to_waypoint.min(waypoints::steps_to_next(pace.accepted));
+        self.waypoints.expect_after(pace.accepted);
         self.group.set_pace(lane, Pace { target: pace.t, wall: next.map_or(f64::INFINITY, |row| row.at(at)), ..pace });
         Assignment {
             accepted: pace.accepted,
@@ -577,9 +395,9 @@ impl<'a> Worker<'a> {
         if !pace.holds() {
             self.group.set_pace(lane, Pace { held: 0.0, ..pace });
             self.group.attempt_by_terms(spec, lane, member);
-            let accepted = self.accepted(None, lane);
-            self.keep_waypoint(part, lane, assigned, accepted as u64);
-            self.attempts_to_waypoint = self.attempts_to_waypoint.min(waypoints::steps_to_next(accepted));
+            let accepted = self.group.pace(lane).accepted;
+            waypoints::keep_lane(&*self.group, part, lane, assigned, accepted as u64);
+            self.waypoints.expect_after(accepted);
             return;
         }
         pace.extra = pace.target - pace.t;

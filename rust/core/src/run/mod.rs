@@ -1,6 +1,7 @@
 //! The driver: shares members among threads, saves states, finds divergence. It does not depend on the systems that it steps.
 
 pub mod adaptive;
+mod adaptive_plan;
 mod columns;
 pub(crate) mod compiled;
 pub mod fixed;
