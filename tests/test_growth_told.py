@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from typing import Any
 
@@ -254,10 +253,3 @@ def test_no_member_is_shorter_at_the_start_than_the_bound_of_all(v: Any, y: Any)
     assert 0.0 < bound <= least
     if not np.any(v) or not np.any(y):
         assert bound == least
-
-
-@pytest.mark.parametrize("n", [1, growth.FEW, growth.FEW + 1])
-def test_the_square_of_a_block_is_the_same_by_either_product(n: int) -> None:
-    block = np.random.default_rng(5).normal(size=n)
-    assert growth._square(block) == pytest.approx(math.fsum(block * block), rel=n * 2.0**-53)
-    assert math.isnan(growth._square(np.append(block, math.nan)))

@@ -17,7 +17,7 @@ pub struct AdaptiveRun<'a> {
     pub at: Vec<Row<'a>>,
     /// The times that no step crosses, by rows: those just before each, ascending, and behind them those just after.
     pub jumps: Vec<Row<'a>>,
-    /// The members' paces at the start, by rows, in the order of [`Pace::numbers`], and what stands behind them.
+    /// The members' paces at the start, by rows, in the order of [`crate::step::pace::Pace::numbers`], and what stands behind them.
     pub paces: Vec<Row<'a>>,
     /// Whether the steps to try first and the lengths of the blocks are still to be found: see `Pace::begun`.
     pub begins: bool,
