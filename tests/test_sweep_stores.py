@@ -279,7 +279,7 @@ def test_after_a_signal_in_the_middle(sent: signal.Signals, ending: str, tmp_pat
             time.sleep(0.01)
         os.kill(process.pid, sent)
         out, error = process.communicate(timeout=60)
-        assert "finished" not in out
+        assert "finished" not in out, error
         if sent == signal.SIGINT:
             assert "KeyboardInterrupt" in error
         else:
