@@ -403,7 +403,7 @@ def _told(run: sw.Run) -> dict[str, Any]:
 
 
 @functools.cache
-def made(which: str) -> sw.Run:
+def run_of(which: str) -> sw.Run:
     """The run of that name, which no use changes."""
     return OF_OWN_TIMES[which]()
 
@@ -414,7 +414,7 @@ def test_a_run_of_own_times_is_used_or_refused_in_words(which: str, use: str, tm
     function, refusal = USES[use]
     words = ""
     try:
-        function(made(which), tmp_path)
+        function(run_of(which), tmp_path)
     except sw.StepwellError as error:
         words = str(error)
     assert not words or (refusal and re.search(refusal, words)), words
