@@ -173,7 +173,8 @@ def test_a_budget_must_hold_in_the_worst_frame(monkeypatch: pytest.MonkeyPatch) 
     assert free.best.seconds_per_frame is not None
     assert budget > 1.5 * free.best.seconds_per_frame
     tight = sw.advise("kepler", frame=0.1, tolerance=1e-2, budget=budget)
-    assert {each.kind for each in tight.rejected if each.by == "tolerance"} == {"budget"}
+    # What costs more than another way at any accuracy is out already.
+    assert {each.kind for each in tight.rejected if each.by == "tolerance"} - {"dominated"} == {"budget"}
     assert "in its worst frame of the" in str(tight)
     for row in tight.ranked:
         assert row.tolerance is None

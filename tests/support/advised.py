@@ -111,9 +111,12 @@ def assert_true(brute: Brute, advice: sw.advice.Advice) -> None:
 def assert_cheap(brute: Brute, advice: sw.advice.Advice) -> None:
     """Nothing that brute force finds costs less than two thirds, but steps that end where the system jumps, by luck.
 
-    Their error is nearly nothing, and that of one step more or one step fewer a hundred times what is allowed.
+    Their error is nearly nothing, and that of one step more or one step fewer a hundred times what is allowed. Nor does a
+    tolerance of more than a tenth count, which rejects no step: the decay of a stiff system is right whatever the steps are.
     """
     cheaper = brute.best(advice.tolerance, brute.cost(advice) / WORTH)
+    if cheaper is not None and cheaper.tolerance is not None and cheaper.tolerance > 0.1:
+        return
     if cheaper is not None and cheaper.tolerance is None:
         beside = [brute.error(cheaper.method, brute.end / n, n) for n in (cheaper.steps - 1, cheaper.steps + 1)]
         assert min(beside) > 100 * advice.tolerance

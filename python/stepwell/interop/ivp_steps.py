@@ -44,7 +44,7 @@ class Trajectory:
         acceptance = Acceptance(tuple(range(len(y))), own=of_groups)
         self._plan = engine.Plan(system, method, (), 1.0, span[0], threads=1, acceptance=acceptance)
         self._model = engine.model(self._plan)
-        self._method, self.begin, self.end = method, *span
+        self.method, self.begin, self.end = method, *span
         self._v = np.empty(0)
         self.times, self.states = [span[0]], [y]
         tolerances = engine.Tolerances(relative, absolute, of_groups)
@@ -62,7 +62,7 @@ class Trajectory:
     def evaluations(self) -> int:
         """Function evaluations so far."""
         attempts = self.pace.accepted + self.pace.rejected + self.pace.extra_steps
-        return self._method.attempt_evaluations * (int(attempts) + self.extra_steps)
+        return self.method.attempt_evaluations * (int(attempts) + self.extra_steps)
 
     def advance(self) -> bool:
         """Make one accepted step, by as many attempts as it takes. Return whether there was one."""

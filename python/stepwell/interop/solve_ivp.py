@@ -99,8 +99,9 @@ def solve_ivp(
         fun: ``fun(t, y, *args)``, which returns ẏ: a function, a method or another callable that is written in Python.
         t_span: the times (t0, tf) of start and end; tf may be earlier than t0.
         y0: the state at t0, shape (n,).
-        method: the name of a method with an ``error_order``: "dop853", "fehlberg", "fehlberg_5", "merson", by any of their names;
-            None for "dop853".
+        method: the name of a method with an ``error_order``: "dop853", "fehlberg", "fehlberg_5", "merson", and for stiff
+            equations "rosenbrock23", "rodas4", "rodas5p", by any of their names; None for "dop853". For "Radau" it is "rodas5p",
+            and for "BDF" and "LSODA" "rodas4", with a warning.
         t_eval: the times at which to return the state, in the direction of the run; None for the ends of the steps. Steps do not
             depend on them.
         dense_output: whether to return ``sol``, which gives the state at any time.
@@ -116,7 +117,7 @@ def solve_ivp(
         rtol: tolerated error of a component in a step, relative to its size before and after the step; a number, or one for each
             component, shape (n,).
         atol: the absolute error of a component that is tolerated in addition, likewise.
-        jac: for methods for stiff equations, which stepwell does not have; ignored with a warning, as in SciPy.
+        jac: ignored with a warning: methods for stiff equations take derivatives from the operations of ``fun``.
         jac_sparsity: likewise.
         lband: likewise.
         uband: likewise.
@@ -209,6 +210,8 @@ def _result(
     """The result, with SciPy's names."""
     status = 1 if ended is not None else 0 if trajectory.status == adaptive.OK else -1
     n = len(trajectory.states[0])
+    solver = trajectory.method
+    jacobians = trajectory.evaluations // solver.attempt_evaluations if solver.is_implicit else 0  # one for each attempt
     return OdeResult(
         t=t,
         y=y,
@@ -218,8 +221,8 @@ def _result(
         if events is None
         else [np.array(each.states).reshape(-1, n) if each.states else np.empty((0, n)) for each in events],
         nfev=trajectory.evaluations,
-        njev=0,
-        nlu=0,
+        njev=jacobians,
+        nlu=jacobians,
         status=status,
         message=ENDS[status] if status >= 0 else FAILURES[trajectory.status],
         success=status >= 0,
@@ -293,7 +296,7 @@ def _warn_of_useless(**arguments: Any) -> None:
     """Warn of arguments that only methods for stiff equations read."""
     if useless := [name for name, value in arguments.items() if value is not None]:
         warnings.warn(
-            f"{', '.join(useless)}: of no use, for it goes with implicit methods only, of which there are none here",
+            f"{', '.join(useless)}: of no use, for derivatives come from the operations of fun, and steps have no least length",
             UserWarning,
             stacklevel=3,
         )

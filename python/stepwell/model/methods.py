@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import re
 from functools import cache
 from typing import Any, Protocol, cast
@@ -61,6 +62,8 @@ class Method(Immutable):
     family: str
     #: Whether its steps sum the Taylor series of the solution. With a tolerance it then chooses the order that costs least.
     has_series: bool
+    #: Whether a step solves equations, of any number of unknowns, with derivatives of the rates.
+    is_implicit: bool
     #: The undamped oscillator is stable for Φ = ω₀·dt below this limit; 0 means never.
     limit: float
     #: Times within a step at which rates are evaluated, as fractions of the step.
@@ -95,6 +98,11 @@ class Method(Immutable):
         return method, (self.name,)
 
     @property
+    def has_derivatives(self) -> bool:
+        """Whether a step takes derivatives of the rates, so that it goes over symbols only."""
+        return self.has_series or self.is_implicit
+
+    @property
     def steps(self) -> Steps:
         """The NumPy reference: the module in ``stepwell.reference.steppers`` that is the method's specification."""
         return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))
@@ -108,7 +116,7 @@ class Method(Immutable):
         return self.starts.index(checks.known("start", start, self.starts))
 
     def _text(self) -> str:
-        limit = f"Φ = ω₀·dt < {self.limit:.10g}" if self.limit else "never"
+        limit = stable_for(self.limit, "Φ = ω₀·dt", 10)
         lines = [
             f"{self.title}: order {self.order}, {self._costs()} per step.",
             "",
@@ -140,7 +148,7 @@ class Method(Immutable):
             [
                 ("order", self.order),
                 ("costs", f"{self._costs()} per step"),
-                ("undamped oscillator stable", f"Φ = ω₀·dt < {self.limit:.10g}" if self.limit else "never"),
+                ("undamped oscillator stable", stable_for(self.limit, "Φ = ω₀·dt", 10)),
                 ("adaptive steps", "no" if self.error_order is None else "yes (tolerance=)"),
                 ("also called", "; ".join(self.other_names)),
                 ("not to be taken for", "; ".join(self.false_friends)),
@@ -148,6 +156,13 @@ class Method(Immutable):
             ],
             self.about,
         )
+
+
+def stable_for(limit: float, angle: str = "Φ", digits: int = 6) -> str:
+    """For which angles of a step the undamped oscillator is stable, in words."""
+    if limit == math.inf:
+        return f"every {angle}"
+    return f"{angle} < {limit:.{digits}g}" if limit else f"no {angle}"
 
 
 def _section(method: Method) -> int:

@@ -58,6 +58,17 @@ pub enum Error {
         /// What it may have.
         most: usize,
     },
+    /// A step that is too long to solve equations.
+    #[error(
+        "method: a step of this system by an implicit method has up to {operations} operations, and may have {most}; take an explicit \
+         method for a large system"
+    )]
+    TooLongToSolve {
+        /// What a step has.
+        operations: usize,
+        /// What it may have.
+        most: usize,
+    },
     /// A step that is too long for one tape, on which alone members have times of their own.
     #[error(
         "t0: a step of about {operations} operations is too long for times of its members' own, which go with steps of up to {most}; make \

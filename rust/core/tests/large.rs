@@ -201,7 +201,7 @@ fn a_program_over_rows_is_its_tape() {
     for (seed, signature) in systems().into_iter().enumerate() {
         let parameters = numbers(13 * (signature.parameters() + 9), seed as u64 + 1);
         let spec = spec(&signature, &parameters, 13);
-        for record in RECORDS.iter().filter(|record| record.program().series_order() == 0) {
+        for record in RECORDS.iter().filter(|record| !record.program().has_derivatives()) {
             let ways = record.carry.as_ref().map_or(1, |carry| carry.starts.len().max(1));
             // Of what is long to trace some methods are enough.
             if signature.count("masses") > 17 && !["rk4", "verlet", "false_euler"].contains(&record.name) {
@@ -296,7 +296,7 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
         }
         let parameters = numbers(13 * (signature.parameters() + 9), seed as u64 + 1);
         let spec = spec(&signature, &parameters, 13);
-        for record in RECORDS.iter().filter(|record| record.estimate.is_some() && record.program().series_order() == 0) {
+        for record in RECORDS.iter().filter(|record| record.estimate.is_some() && !record.program().has_derivatives()) {
             let key = key(
                 &signature,
                 StepKind::Attempts { name: record.name.to_owned(), order: 0, acceptance: Acceptance::default(), backward: false },

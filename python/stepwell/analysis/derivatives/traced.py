@@ -224,6 +224,16 @@ def matrix(
     return derivative, values
 
 
+def stepped(system: System, method: Method, v: Array, y: Array, h: Any) -> Array:
+    """The numbers of both blocks after a step from these, at time 0, by the tape of the step, shape (n, *batch)."""
+    traced = Traced(system, "step", method)
+    rows = _rows(system, v, y)
+    values = np.empty((traced.length, *np.broadcast_shapes(rows[0].shape, np.shape(h))))
+    for k, value in enumerate(traced.evaluation(traced.roots)([*rows, np.zeros(())], 0.0, h)):
+        values[k] = value
+    return values
+
+
 def together(system: System, v: Array, y: Array, **more: Any) -> Shape:
     """The shape to which states, parameters and other values broadcast."""
     batches = {"v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}

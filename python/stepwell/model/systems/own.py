@@ -63,7 +63,7 @@ class OwnSystem(System):
         self.equations: Equations | None = None
         #: The operations of the function, and those in float32.
         self._core: Any = None
-        self._single: Any = None
+        self._single: dict[bool, Any] = {}
         #: The rates ``_core``, and these rates with the derivatives of their functions, for series.
         self._with_functions: tuple[Any, Any] | None = None
         #: This system for blocks of these shapes, and for states of these shapes, which may have batch axes.
@@ -92,7 +92,7 @@ class OwnSystem(System):
         return {name: value for name, value in super()._contents().items() if name not in DERIVED}
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}
+        return vars(self) | {"_core": None, "_single": {}, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
         own = {name: copy.deepcopy(vars(self)[name], memo) for name in ("parameters_given", "around") if name in vars(self)}
@@ -189,7 +189,7 @@ class OwnSystem(System):
             for name, value in self.parameters_given.items()
         }
         equations = Equations(definition, v_shape, y_shape, shapes)
-        bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _single=None, _bounds={}, _met={})
+        bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _single={}, _bounds={}, _met={})
         bound._trace_once()
         self._bounds[v_shape, y_shape] = bound
         return bound
@@ -303,15 +303,15 @@ class OwnSystem(System):
     def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
         """The operations of the function and the parameters by name, as the core takes them; for ``series`` with derivatives."""
         bound = self._retraced()
-        rates = bound._in_single() if single else bound._series_rates() if series else bound._core
+        rates = bound._in_single(series) if single else bound._series_rates() if series else bound._core
         own = {name: value for name, value in bound.all_parameters(batch).items() if name != RATES and not callable(value)}
         return [(RATES, rates), *flat(own, batch)]
 
-    def _in_single(self) -> Any:
-        """The operations of the function in float32."""
-        if self._single is None:
-            self._single = self._rates(single=True)
-        return self._single
+    def _in_single(self, series: bool) -> Any:
+        """The operations of the function in float32; for ``series`` with derivatives."""
+        if series not in self._single:
+            self._single[series] = self._rates({} if series else None, single=True)
+        return self._single[series]
 
     @property
     def chooses(self) -> bool:
@@ -418,7 +418,7 @@ class OwnSystem(System):
         pushed = isinstance(control, Control)
         controlled = changed(
             known,
-            _single=None,
+            _single={},
             _bounds={},
             _met={},
             _free=known,

@@ -165,6 +165,11 @@ impl PassPlan {
                 // Steps with a series are refused where they are too long for one tape (`trace.rs`), so this is never executed.
                 Entry::SeriesV(_, v, y) => (Node::Ask(Rate::Dv, Time::START, of(v), of(y)), true),
                 Entry::SeriesY(_, v, y) => (Node::Ask(Rate::Dy, Time::START, of(v), of(y)), false),
+                // And so are implicit ones.
+                Entry::ImplicitV(_, v, _) => (Node::Add(of(v), of(v)), true),
+                Entry::ImplicitY(_, _, y) => (Node::Add(of(y), of(y)), false),
+                Entry::ByTimeV => (Node::Start(V), true),
+                Entry::ByTimeY => (Node::Start(Y), false),
             };
             let mut push = |node| {
                 nodes.push(node);

@@ -70,6 +70,13 @@ pub trait System<N: Number> {
     fn tally(&self) -> Option<N> {
         self.inner()?.tally()
     }
+
+    /// Sets its tally, if it has one.
+    fn set_tally(&self, tally: N) {
+        if let Some(inner) = self.inner() {
+            inner.set_tally(tally);
+        }
+    }
 }
 
 /// The result of [`System::energies`].

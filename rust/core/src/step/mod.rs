@@ -10,6 +10,7 @@ pub mod pace;
 mod properties;
 mod series_pace;
 mod sizes;
+mod sparse;
 pub mod tapes;
 pub mod trace;
 mod watch;

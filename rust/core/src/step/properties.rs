@@ -1,10 +1,11 @@
 //! What is known of a step before it is traced: sizes and approximate numbers of operations.
 
-use super::key::StepKind;
+use super::{key::StepKind, sparse};
 use crate::{
     error::Error,
     model::{
         around::{self, contact, controls},
+        program::Program,
         spec::Signature,
         steppers::method,
         system::Shape,
@@ -67,15 +68,34 @@ pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) ->
                 _ => program.series_order() as usize,
             };
             let evaluations = if order > 0 { order * (order + 1) / 2 } else { program.evaluations() };
-            (controls * rates, controls * rates * evaluations + contacts)
+            let mut solving = 0;
+            if program.is_implicit() {
+                // Of a full matrix; where ẏ is v times a number, only v is solved for. A column of the Jacobian takes about as long
+                // as the rates. Elimination has two choices and two operations for each of n³/3 entries, a solution three for n².
+                let n = if shape.v == shape.y { shape.v } else { shape.v + shape.y };
+                solving = rates * n + 4 * n * n * n / 3 + 3 * n * n * program.solutions();
+                if solving > MAX_IMPLICIT_OPERATIONS && rates <= MAX_LONG_TAPE_OPERATIONS {
+                    solving = sparse::solving_operations(signature, &program, shape)?;
+                }
+            }
+            (controls * rates, controls * rates * evaluations + contacts + solving)
         }
     })
 }
 
-/// Whether steps are made by a series of the solution.
+/// Whether steps are made by derivatives of the rates: by a series of the solution, or by solving equations.
+pub(super) fn has_derivatives(how: &StepKind) -> Result<bool, Error> {
+    of_method(how, Program::has_derivatives)
+}
+
+/// Whether they are made by a series of the solution.
 pub(super) fn has_series(how: &StepKind) -> Result<bool, Error> {
+    of_method(how, |program| program.series_order() > 0)
+}
+
+fn of_method(how: &StepKind, holds: impl Fn(&Program) -> bool) -> Result<bool, Error> {
     Ok(match how {
-        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => method(name)?.program().series_order() > 0,
+        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => holds(&method(name)?.program()),
         StepKind::Step(_) | StepKind::Matrix { .. } => false,
     })
 }
@@ -83,3 +103,6 @@ pub(super) fn has_series(how: &StepKind) -> Result<bool, Error> {
 /// The most operations, approximately, of a step that is one tape in any case: by a series, one that is given, one that is fused,
 /// or one of members that have times of their own. It takes some ten nanoseconds a byte to compile.
 pub(super) const MAX_LONG_TAPE_OPERATIONS: usize = 100_000;
+
+/// The same of a step that solves equations: to trace and compile a full matrix of 64 rows takes some three seconds.
+pub(super) const MAX_IMPLICIT_OPERATIONS: usize = 500_000;

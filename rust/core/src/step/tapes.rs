@@ -7,7 +7,10 @@ use super::{
     cache::Cache,
     key::{StepKind, TapeKey},
     leaves::BEGINS,
-    properties::{MAX_LONG_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, has_series, operations, recorded, shape},
+    properties::{
+        MAX_IMPLICIT_OPERATIONS, MAX_LONG_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, has_derivatives, has_series, operations,
+        recorded, shape,
+    },
     trace::{trace_begin, trace_by_terms, trace_judged, trace_record, trace_slot, trace_step},
     watch,
 };
@@ -80,8 +83,12 @@ impl TapeKey {
         CACHE.find(self, || {
             let shape = shape(&self.signature, &self.how)?;
             let operations = operations(&self.signature, &self.how, shape)?;
-            let series = has_series(&self.how)?;
-            if series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
+            let series = has_derivatives(&self.how)?;
+            let solves = series && !has_series(&self.how)?;
+            if solves && operations.1 > MAX_IMPLICIT_OPERATIONS {
+                return Err(Error::TooLongToSolve { operations: operations.1, most: MAX_IMPLICIT_OPERATIONS });
+            }
+            if series && !solves && operations.1 > MAX_LONG_TAPE_OPERATIONS {
                 return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
             }
             if self.fused && !series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
