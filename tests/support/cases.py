@@ -17,6 +17,7 @@ from stepwell.errors import ArgumentError, TraceError, UnsupportedError
 from stepwell.reference.series import expanded
 from stepwell.reference.traced import Tracer
 
+from support import families
 from support import own_systems as own
 from support.families import family
 
@@ -381,6 +382,12 @@ SOME = pytest.mark.parametrize("some", family([2, None], lambda some: some is no
 def drawn(methods: Sequence[sw.Method], some: int | None, *salt: Any) -> list[sw.Method]:
     """So many of these methods, always the same of the same words."""
     return sorted(methods, key=lambda method: number(method.name, *salt))[:some]
+
+
+def few_implicit(methods: Sequence[sw.Method], some: int, *salt: Any) -> list[sw.Method]:
+    """All explicit ones, and so many of the implicit ones, which are made of the same parts; in the long run all."""
+    implicit = [method for method in methods if method.is_implicit]
+    return [m for m in methods if not m.is_implicit] + drawn(implicit, None if families.LONG else some, *salt)
 
 
 def assert_same(a: sw.Run, b: sw.Run) -> None:

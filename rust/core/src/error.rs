@@ -60,14 +60,18 @@ pub enum Error {
     },
     /// A step that is too long to solve equations.
     #[error(
-        "method: a step of this system by an implicit method has up to {operations} operations, and may have {most}; take an explicit \
-         method for a large system"
+        "method: the equations of a step of this system by an implicit method have {unknowns} unknowns and up to {operations} \
+         operations, and may have {most_unknowns} and {most}; take an explicit method for a system that large"
     )]
     TooLongToSolve {
         /// What a step has.
         operations: usize,
         /// What it may have.
         most: usize,
+        /// How many numbers it solves for.
+        unknowns: usize,
+        /// How many there may be.
+        most_unknowns: usize,
     },
     /// A step that is too long for one tape, on which alone members have times of their own.
     #[error(

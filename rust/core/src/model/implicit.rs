@@ -2,6 +2,8 @@
 //!
 //! `reference/implicit.py` has the same operations in the same order.
 
+use std::ops::Range;
+
 use nalgebra::DVector;
 
 use super::{pivoting::Factors, system::System};
@@ -37,11 +39,10 @@ impl<N: Number> Implicit<N> {
         self.derivatives.by_state[number][rate].map(|derivative| N::of(gamma) * derivative)
     }
 
-    fn factor(&self, gamma: f64) -> Factors<N> {
-        let (all, of_v) = (self.derivatives.by_state.len(), self.of_v);
-        let n = if self.follows { of_v } else { all };
-        let known: Vec<Vec<usize>> =
-            (0..all).map(|rate| (0..all).filter(|k| self.derivatives.by_state[*k][rate].is_some()).collect()).collect();
+    /// The matrix of the unknowns: I − γhJ, or, where y follows from v, what is left of it for v.
+    pub(crate) fn matrix(&self, gamma: f64) -> Vec<Vec<Option<N>>> {
+        let (all, n) = (self.derivatives.by_state.len(), self.unknowns());
+        let known: Vec<Vec<usize>> = (0..all).map(|rate| (0..all).filter(|k| self.has(rate, *k)).collect()).collect();
         let less = |entry: &mut Option<N>, term: Option<N>| {
             if let Some(term) = term {
                 *entry = Some(entry.map_or(-term, |entry| entry - term));
@@ -58,7 +59,29 @@ impl<N: Number> Implicit<N> {
             }
             row
         };
-        Factors::new((0..n).map(row).collect())
+        (0..n).map(row).collect()
+    }
+
+    /// How many unknowns the equations have.
+    pub(crate) fn unknowns(&self) -> usize {
+        if self.follows { self.of_v } else { self.derivatives.by_state.len() }
+    }
+
+    /// Whether a rate depends on a number of the state.
+    fn has(&self, rate: usize, number: usize) -> bool {
+        self.derivatives.by_state[number][rate].is_some()
+    }
+
+    /// Where y follows from v: γ·h times the derivatives of rates of v by numbers of y, and of rates of y by numbers of v, by
+    /// their places in the blocks.
+    pub(crate) fn coupling(&self, gamma: f64) -> [Vec<(usize, usize, N)>; 2] {
+        let (all, of_v) = (self.derivatives.by_state.len(), self.of_v);
+        let between = |rates: Range<usize>, numbers: Range<usize>| {
+            let (first_rate, first_number) = (rates.start, numbers.start);
+            let entry = move |i: usize, j: usize| Some((i - first_rate, j - first_number, self.entry(gamma, i, j)?));
+            rates.flat_map(|i| numbers.clone().filter_map(move |j| entry(i, j))).collect()
+        };
+        if self.follows { [between(0..of_v, of_v..all), between(of_v..all, 0..of_v)] } else { [Vec::new(), Vec::new()] }
     }
 
     /// x of (I − γhJ)·x = r, for both blocks.
@@ -66,7 +89,7 @@ impl<N: Number> Implicit<N> {
         let place = match self.factored.iter().position(|(known, _)| known.to_bits() == gamma.to_bits()) {
             Some(place) => place,
             None => {
-                self.factored.push((gamma, self.factor(gamma)));
+                self.factored.push((gamma, Factors::new(self.matrix(gamma))));
                 self.factored.len() - 1
             }
         };

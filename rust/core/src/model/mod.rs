@@ -2,7 +2,7 @@
 
 pub mod around;
 mod elimination;
-mod implicit;
+pub(crate) mod implicit;
 pub mod method;
 mod newton;
 pub(crate) mod ordering;

@@ -42,7 +42,8 @@ impl Columns {
         self.0.iter().enumerate().flat_map(of)
     }
 
-    fn remove(&mut self, column: usize) {
+    /// Removes a column.
+    pub(crate) fn remove(&mut self, column: usize) {
         if let Some(word) = self.0.get_mut(column / 64) {
             *word &= !(1 << (column % 64));
         }

@@ -283,6 +283,12 @@ impl Program {
         self.entries.iter().any(|entry| matches!(entry, Entry::ImplicitV(..) | Entry::ImplicitY(..)))
     }
 
+    /// γ of the equations that it solves, all with one matrix.
+    pub(crate) fn gamma(&self) -> Option<f64> {
+        let gamma = |entry: &Entry| if let Entry::ImplicitV(gamma, ..) = entry { Some(*gamma) } else { None };
+        self.entries.iter().find_map(gamma)
+    }
+
     /// How many systems of linear equations a step solves.
     pub(crate) fn solutions(&self) -> usize {
         self.entries.iter().filter(|entry| matches!(entry, Entry::ImplicitV(..))).count()

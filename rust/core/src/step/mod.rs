@@ -10,7 +10,7 @@ pub mod pace;
 mod properties;
 mod series_pace;
 mod sizes;
-mod sparse;
+pub(crate) mod solving;
 pub mod tapes;
 pub mod trace;
 mod watch;
