@@ -94,6 +94,20 @@ def test_runs_of_random_stiff_linear_systems(method: str) -> None:
             assert np.linalg.norm(y - true) <= 3e-5 * (np.linalg.norm(s) + np.linalg.norm(true)), (A, t)
 
 
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_the_matrix_form_lacks_the_derivatives_of_inputs(method: str) -> None:
+    """Rosenbrock methods take them; the form has values of inputs only, so what it would make is refused."""
+    ramp = sw.Sampled([1.0, 2.0, 3.0, 2.5], 0.4, interpolation="linear")
+    for x in (sw.Sinusoid(0.3, 2.0, 0.1), ramp, sw.Sampled([1.0, 2.0, 3.0], 0.4)):
+        system, options = sw.Oscillator(1.0, x=x), {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 10}
+        if sw.method(method).takes_derivatives_by_time and (isinstance(x, sw.Sinusoid) or x is ramp):
+            with pytest.raises(sw.errors.UnsupportedError, match="takes the derivatives of inputs too"):
+                sw.integrate(system, method, form="matrix", **options)
+            continue
+        ends = [sw.integrate(system, method, form=form, **options).y[-1] for form in ("direct", "matrix")]
+        assert ends[0] == pytest.approx(ends[1], abs=1e-13)
+
+
 def test_a_singular_factor_stops_its_member_alone() -> None:
     """1 − h·λ = 0 by backward Euler at λ = 1/h: no solution, so the member diverges in that step, and its neighbours do not."""
     system = LinearSystem(np.array([[[-1.0, 2.0, 0.5]]]), velocities=0)

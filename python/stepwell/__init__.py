@@ -15,6 +15,8 @@ from . import _core
 from .base import registry
 
 registry.register(
+    algebraic_rates="stepwell.analysis.consistency:rates",
+    algebraic_start="stepwell.analysis.consistency:check_start",
     animate_run="stepwell.views.charts.runs_animation:animate",
     draw_advice="stepwell.views.charts.advice_picture:draw",
     draw_control="stepwell.views.charts.control_picture:draw",

@@ -330,7 +330,7 @@ def cases(methods: Iterator[str] | None = None) -> Iterator[Case]:
         if not fits(instance, record) or (record.has_series and system in DIVERGE_IN_SERIES):
             continue
         waves = any(isinstance(x, sw.Sinusoid) for x in instance.given_inputs().values())
-        forms = ["direct"] + ["matrix"] * (instance.linear and not (record.has_series and waves))
+        forms = ["direct"] + ["matrix"] * (instance.linear and not (record.takes_derivatives_by_time and waves))
         if "matrix" in forms and all(isinstance(x, sw.Sinusoid) or x.constant for x in instance.given_inputs().values()):
             forms.append("power")
         for form in forms:

@@ -103,6 +103,11 @@ class Method(Immutable):
         return self.has_series or self.is_implicit
 
     @property
+    def takes_derivatives_by_time(self) -> bool:
+        """Whether a step takes the derivatives of rates by the time, and with them those of inputs."""
+        return self.has_series or any(name == "v by time" for name, _, _ in _core.program(self.name)[0])
+
+    @property
     def steps(self) -> Steps:
         """The NumPy reference: the module in ``stepwell.reference.steppers`` that is the method's specification."""
         return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))

@@ -1,6 +1,7 @@
-"""What implicit methods need of a system: its Jacobian J at the start of a step, and the solution of (I − γhJ)·x = r.
+"""What implicit methods need of a system: its Jacobian J at the start of a step, and the solution of (M − γhJ)·x = r.
 
-The derivatives are the coefficients of first order of the rates' Taylor series along one number of the state, or along the time.
+M is the mass matrix of the system, or that of units. The derivatives are the coefficients of first order of the rates' Taylor
+series along one number of the state, or along the time.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ class Implicit:
         self.axes = getattr(s, "axes", (np.ndim(v), np.ndim(y)))
         self.v, self.y = np.asarray(v), np.asarray(y)
         self.of_v, self.of_y = len(self._rows(v, 0)), len(self._rows(y, 1))
+        #: The entries of the mass matrix by row and column; None is the matrix of units.
+        mass = getattr(s, "mass_matrix", None)
+        self.mass = None if mass is None else [dict(row) for row in mass.rows]
         work = getattr(s, "work", None)
         all_numbers = range(self.of_v + self.of_y)
         #: Of each number of the state the derivatives of all rates by it; None is zero whatever the state is.
@@ -75,20 +79,25 @@ class Implicit:
         derivative = self.by_state[number][rate]
         return None if derivative is None else gamma * derivative
 
+    def _mass(self, row: int, column: int) -> float | None:
+        if self.mass is None:
+            return 1.0 if row == column else None
+        return self.mass[row].get(column)
+
     def _factored(self, gamma: float) -> pivoting.Factors:
         everything = self.of_v + self.of_y
         n = self.of_v if self.follows else everything
         matrix: list[list[Any]] = [n * [None] for _ in range(n)]
         for i in range(n):
             for j in range(n):
-                entry = less(1.0 if i == j else None, self._entry(gamma, i, j))
+                entry = less(self._mass(i, j), self._entry(gamma, i, j))
                 for k in range(n, everything):
                     entry = less(entry, product(self._entry(gamma, i, k), self._entry(gamma, k, j)))
                 matrix[i][j] = entry
         return pivoting.factored(matrix)
 
     def solve(self, gamma: float, right_v: Array, right_y: Array) -> Blocks:
-        """X of (I − γhJ)·x = r, for both blocks."""
+        """X of (M − γhJ)·x = r, for both blocks."""
         factors, of_v = self._factored(gamma), self.of_v
         r_v, r_y = self._rows(right_v, 0), self._rows(right_y, 1)
         if not self.follows:

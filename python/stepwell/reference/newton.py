@@ -8,17 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..base.arrays import Array, Blocks
+from ..base.arrays import Array, Blocks, Scaled
+from . import mass
 from .implicit import Implicit
 
 #: How many passes there are.
 PASSES = 3
 
 
-def solved(equations: Implicit, gamma: float, at_zero: Blocks, residual: Callable[[Array, Array], Blocks]) -> Blocks:
-    """The increments of both blocks, from the residual at zero and that at any other increment: h times the rates, less it."""
+def solved(s: Scaled, t: float, blocks: Blocks, gamma: float, at_zero: Blocks, rates: Callable[[Array, Array], Blocks]) -> Blocks:
+    """The increments of both blocks, from h times the rates of the step's start and of any other increment.
+
+    The residual is those rates, less the increment times the mass matrix, if the system has one.
+    """
+    equations = Implicit(s, t, *blocks)
     dv, dy = equations.solve(gamma, *at_zero)
     for _ in range(1, PASSES):
-        more_v, more_y = equations.solve(gamma, *residual(dv, dy))
+        rate_v, rate_y = rates(dv, dy)
+        more_v, more_y = equations.solve(gamma, rate_v - dv, rate_y - mass.times(s, dy))
         dv, dy = dv + more_v, dy + more_y
     return dv, dy

@@ -1,7 +1,7 @@
 """Rosenbrock methods by their coefficients, as Hairer and Wanner print them (*Solving Ordinary Differential Equations II*, IV.7).
 
-Stage i is the solution of linear equations, (I − γhJ)·uᵢ = γ·(h·f(t + αᵢh, y + Σ aᵢⱼuⱼ) + Σ cᵢⱼuⱼ + dᵢ·h²·∂f/∂t), with the
-Jacobian J and ∂f/∂t of the start of the step.
+Stage i is the solution of linear equations, (M − γhJ)·uᵢ = γ·(h·f(t + αᵢh, y + Σ aᵢⱼuⱼ) + M·Σ cᵢⱼuⱼ + dᵢ·h²·∂f/∂t), with the
+Jacobian J and ∂f/∂t of the start of the step, and the mass matrix M of the system, or that of units.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..base.arrays import Array, Scaled
+from . import mass
 from .implicit import Implicit
-from .tableau import Increments, Weights, plus
+from .tableau import Increments, Weights, combined, plus
 
 
 class Rosenbrock(NamedTuple):
@@ -41,7 +42,8 @@ def stages(method: Rosenbrock, s: Scaled, t: float, h: float, v: Array, y: Array
         vi, yi = plus(v, y, row, solutions) if row else (v, y)
         right_v, right_y = s.dv(at, vi, yi), s.dy(at, vi, yi)
         if of_solutions:
-            right_v, right_y = plus(right_v, right_y, of_solutions, solutions)
+            sum_v, sum_y = combined(of_solutions, solutions)
+            right_v, right_y = right_v + sum_v, right_y + mass.times(s, sum_y)
         if by_time:
             time_v, time_y = equations.by_time(h)
             right_v, right_y = right_v + by_time * time_v, right_y + by_time * time_y

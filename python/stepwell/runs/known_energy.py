@@ -97,6 +97,8 @@ def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[t
 def _is_constant(run: Run, name: str) -> bool:
     """Whether an invariant is one: along the rates at the end its changes by v and by y cancel."""
     system, v, y = run.system, run.v[-1], run.y[-1]
+    if system.mass_matrix is not None:
+        return False  # algebraic equations give no rates to go along
     alone = system.reference_at_step(1.0, run.status.shape)
     t = np.broadcast_to(run.t[-1], run.status.shape)
     rates = np.broadcast_to(alone.dv(t, v, y), v.shape), np.broadcast_to(alone.dy(t, v, y), y.shape)

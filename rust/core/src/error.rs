@@ -40,6 +40,15 @@ pub enum Error {
         /// The term that depends on the velocity.
         term: &'static str,
     },
+    /// An explicit method, and a system whose mass matrix is singular.
+    #[error(
+        "method: {method} needs the rate of every number of the state, and algebraic equations give none; take an implicit method, \
+         such as rodas5p"
+    )]
+    MassMatrix {
+        /// The method's name.
+        method: &'static str,
+    },
     /// A step that is too long for one tape, which fused multiply-adds need.
     #[error("fused: a step of about {operations} operations is too long; fused multiply-adds go with steps of up to {most}")]
     TooLongToFuse {

@@ -421,6 +421,7 @@ fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<u
             Entry::ImplicitY(gamma, ..) => ("implicit y", gamma),
             Entry::ByTimeV => ("v by time", 0.0),
             Entry::ByTimeY => ("y by time", 0.0),
+            Entry::Mass(_) => ("mass", 0.0),
         };
         (name, entry.operands().into_iter().map(|block| block.index()).collect(), number)
     };

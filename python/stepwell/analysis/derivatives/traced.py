@@ -108,6 +108,11 @@ class Traced:
 def _roots(tracer: Tracer, what: str, method: Method | None) -> list[Symbol]:
     """The symbols of the rates at h = 1, of the slots after a step, or of the state that finishes a slot."""
     if method is None:
+        if what == "rates" and tracer.system.mass_matrix is not None:
+            raise UnsupportedError(
+                f"rates: the algebraic equations of {tracer.system!r} give no rate for what they determine, so there is no "
+                f"matrix of rates; steps by implicit methods and consistent_start go without"
+            )
         if tracer.system.stick_friction is not None:
             raise UnsupportedError(
                 f"rates: {tracer.system!r} has friction that sticks; what it does depends on the step, so there are no rates "
@@ -197,7 +202,8 @@ def matrix(
 
     Args:
         system: the system.
-        what: "rates", the "step" of a method from slot to slot, or its "finish" from slots to states.
+        what: "rates", or "equations", which some may be algebraic; the "step" of a method from slot to slot, or its "finish" from
+            slots to states.
         method: the method; None for rates.
         members: the shape to which states, parameters, times and steps broadcast.
         v: the velocities, or what the method carries in place of them, shape (*block, *batch).

@@ -16,6 +16,7 @@ from ...base.arrays import Array, Shape
 from ...base.immutable import changed, complete
 from ...errors import ShapeError, TraceError, UnsupportedError
 from ...reference.marks import Marks, recording
+from ...reference.mass import Mass
 from ...reference.systems.equations import Equations as Reference
 from ...reference.traced import Tracer
 from ..controls import WAYS, AnyControl, ConstraintControl, Control, EnergyControl, Projection
@@ -74,6 +75,12 @@ class OwnSystem(System):
     def keeper(self) -> AnyControl | None:
         """The control, which is a part of the rates, or the projection, which is around them."""
         return self.push if self.push is not None else self.control
+
+    @property
+    def mass_matrix(self) -> Mass | None:  # type: ignore[override]  # of other systems it is always None
+        """The mass matrix, if equations are algebraic."""
+        equations = self._known().equations
+        return None if equations is None else equations.mass_matrix
 
     @property
     def kind_name(self) -> str:
@@ -213,7 +220,8 @@ class OwnSystem(System):
             parameters = tuple((name, self._kind_of(name, value)) for name, value in self.parameters_given.items())
             invariants = tuple((each.name, each.parameters, identity(each.function)) for each in definition.invariants.values())
             function = identity(definition.function)
-            key = definition.order, definition.blocks, definition.quick_sines, self.v_shape, self.y_shape
+            mass = None if definition.mass is None else definition.mass.matrix.tobytes()
+            key = definition.order, definition.blocks, definition.quick_sines, self.v_shape, self.y_shape, mass
             return *key, function, parameters, invariants, definition.name
         except Unknown:
             return None
@@ -267,7 +275,8 @@ class OwnSystem(System):
             projected = (*tracer.flat(value), tracer.flat(along_v), tracer.flat(along_y), *tracer.flat(square))
         own_dv, own_dy = dv if equations.v_shape != (0,) else [], None if equations.second_order else dy
         functions = [] if marks is None else derivatives_of_functions(tape, marks)
-        return tape.equations(own_dv, own_dy, quantities, projected, functions)
+        rows = None if equations.mass_matrix is None else equations.mass_matrix.rows
+        return tape.equations(own_dv, own_dy, quantities, projected, functions, rows)
 
     def _known(self) -> OwnSystem:
         """This system with known shapes of its blocks."""
@@ -412,6 +421,11 @@ class OwnSystem(System):
         return checks.known("control", name, self.definition.invariants)
 
     def _keeping(self, name: str, control: Any) -> OwnSystem:
+        if self.mass_matrix is not None:
+            raise UnsupportedError(
+                f"control: {control!r} moves the state along the gradient of an invariant, and the algebraic equations of "
+                f"{self!r} do not hold there"
+            )
         known = self._known().uncontrolled  # a control replaces another
         assert isinstance(known, OwnSystem)
         assert known.equations is not None

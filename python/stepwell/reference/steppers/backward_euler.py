@@ -2,16 +2,15 @@
 
 from ...base.arrays import Array, Blocks, Scaled
 from .. import newton
-from ..implicit import Implicit
 
 
 def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """The increment is that of the rates at the end."""
     end = t + h
 
-    def residual(dv: Array, dy: Array) -> Blocks:
+    def rates(dv: Array, dy: Array) -> Blocks:
         v1, y1 = v + dv, y + dy
-        return s.dv(end, v1, y1) - dv, s.dy(end, v1, y1) - dy
+        return s.dv(end, v1, y1), s.dy(end, v1, y1)
 
-    dv, dy = newton.solved(Implicit(s, t, v, y), 1.0, (s.dv(end, v, y), s.dy(end, v, y)), residual)
+    dv, dy = newton.solved(s, t, (v, y), 1.0, (s.dv(end, v, y), s.dy(end, v, y)), rates)
     return v + dv, y + dy

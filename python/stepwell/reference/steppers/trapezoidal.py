@@ -2,7 +2,6 @@
 
 from ...base.arrays import Array, Blocks, Scaled
 from .. import newton
-from ..implicit import Implicit
 
 
 def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
@@ -13,9 +12,5 @@ def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     def both(v: Array, y: Array) -> Blocks:
         return start_v + 0.5 * s.dv(end, v, y), start_y + 0.5 * s.dy(end, v, y)
 
-    def residual(dv: Array, dy: Array) -> Blocks:
-        both_v, both_y = both(v + dv, y + dy)
-        return both_v - dv, both_y - dy
-
-    dv, dy = newton.solved(Implicit(s, t, v, y), 0.5, both(v, y), residual)
+    dv, dy = newton.solved(s, t, (v, y), 0.5, both(v, y), lambda dv, dy: both(v + dv, y + dy))
     return v + dv, y + dy

@@ -299,6 +299,12 @@ def lines_of_program(plan: Plan, attempts: bool) -> tuple[Section, ...]:
             case "dv" | "dy":
                 t = "t" if share == 0.0 else "t + h" if share == 1.0 else f"t + {share!r}·h"
                 text = Formula(f"{name}({t}, {parts[0].text}, {parts[1].text})")
+            case "implicit v" | "implicit y":
+                text = Formula(f"solve_{name[-1]}({parts[0].text}, {parts[1].text})")
+            case "v by time" | "y by time":
+                text = Formula(f"d{name[0]}_by_t")
+            case "mass":
+                text = parts[0]  # a step with a mass matrix is one tape
             case "scale":
                 text = formula("multiply", [number(_bits(share)), *parts], 0, [None, None])
             case _:

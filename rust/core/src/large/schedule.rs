@@ -181,6 +181,11 @@ impl PassPlan {
                 Entry::ImplicitY(_, v, y) => (Node::Ask(Rate::SolutionY, Time::START, of(v), of(y)), false),
                 Entry::ByTimeV => (Node::Ask(Rate::ByTimeV, Time::START, V, Y), true),
                 Entry::ByTimeY => (Node::Ask(Rate::ByTimeY, Time::START, V, Y), false),
+                // A step with a mass matrix is one tape (`tapes.rs`), so this is the matrix of units.
+                Entry::Mass(a) => {
+                    made.push(made[a.index()]);
+                    continue;
+                }
             };
             let mut push = |node| {
                 nodes.push(node);

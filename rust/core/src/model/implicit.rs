@@ -1,4 +1,5 @@
-//! What implicit methods need of a system: its Jacobian J at the start of a step, and the solution of (I − γhJ)·x = r.
+//! What implicit methods need of a system: its Jacobian J at the start of a step, and the solution of (M − γhJ)·x = r, where M is
+//! its mass matrix, or that of units.
 //!
 //! `reference/implicit.py` has the same operations in the same order.
 
@@ -7,7 +8,10 @@ use std::ops::Range;
 use nalgebra::DVector;
 
 use super::{pivoting::Factors, system::System};
-use crate::tape::number::{Derivatives, Number};
+use crate::tape::{
+    mass::Mass,
+    number::{Derivatives, Number},
+};
 
 /// The derivatives of the rates at the start of a step, and the matrices that were factored.
 pub(crate) struct Implicit<N: Number> {
@@ -15,6 +19,8 @@ pub(crate) struct Implicit<N: Number> {
     of_v: usize,
     /// Whether the rates of y do not depend on y, so that y follows from v.
     follows: bool,
+    /// The mass matrix, if the system has one; it has no v then.
+    mass: Option<Mass>,
     factored: Vec<(f64, Factors<N>)>,
 }
 
@@ -31,7 +37,7 @@ impl<N: Number> Implicit<N> {
         let of_v = v.len();
         let by_y = &derivatives.by_state[of_v..];
         let follows = of_v > 0 && !by_y.is_empty() && by_y.iter().all(|by| by[of_v..].iter().all(Option::is_none));
-        Some(Implicit { derivatives, of_v, follows, factored: Vec::new() })
+        Some(Implicit { derivatives, of_v, follows, mass: s.mass().cloned(), factored: Vec::new() })
     }
 
     /// γ·h times the derivative of a rate by a number of the state.
@@ -39,7 +45,17 @@ impl<N: Number> Implicit<N> {
         self.derivatives.by_state[number][rate].map(|derivative| N::of(gamma) * derivative)
     }
 
-    /// The matrix of the unknowns: I − γhJ, or, where y follows from v, what is left of it for v.
+    /// The entries of M in a row.
+    fn mass(&self, row: usize, n: usize) -> Vec<Option<N>> {
+        let mut entries = vec![None; n];
+        match &self.mass {
+            None => entries[row] = Some(N::of(1.0)),
+            Some(mass) => mass.row(row).for_each(|(column, entry)| entries[column] = Some(N::of(entry))),
+        }
+        entries
+    }
+
+    /// The matrix of the unknowns: M − γhJ, or, where y follows from v, what is left of it for v.
     pub(crate) fn matrix(&self, gamma: f64) -> Vec<Vec<Option<N>>> {
         let (all, n) = (self.derivatives.by_state.len(), self.unknowns());
         let known: Vec<Vec<usize>> = (0..all).map(|rate| (0..all).filter(|k| self.has(rate, *k)).collect()).collect();
@@ -49,7 +65,7 @@ impl<N: Number> Implicit<N> {
             }
         };
         let row = |i: usize| {
-            let mut row: Vec<Option<N>> = (0..n).map(|j| (i == j).then(|| N::of(1.0))).collect();
+            let mut row = self.mass(i, n);
             known[i].iter().filter(|j| **j < n).for_each(|j| less(&mut row[*j], self.entry(gamma, i, *j)));
             for &k in known[i].iter().filter(|k| **k >= n) {
                 for &j in known[k].iter().filter(|j| **j < n) {
@@ -84,7 +100,7 @@ impl<N: Number> Implicit<N> {
         if self.follows { [between(0..of_v, of_v..all), between(of_v..all, 0..of_v)] } else { [Vec::new(), Vec::new()] }
     }
 
-    /// x of (I − γhJ)·x = r, for both blocks.
+    /// x of (M − γhJ)·x = r, for both blocks.
     pub(crate) fn solve(&mut self, gamma: f64, [r_v, r_y]: [&DVector<N>; 2]) -> [DVector<N>; 2] {
         let place = match self.factored.iter().position(|(known, _)| known.to_bits() == gamma.to_bits()) {
             Some(place) => place,

@@ -8,15 +8,17 @@ use super::program::{Block, Rates};
 /// How many passes there are.
 pub(crate) const PASSES: u32 = 3;
 
-/// The increments of both blocks, from the residual at zero and that at any other increment: h times the rates, less it.
+/// The increments of both blocks, from h times the rates of the step's start and of any other increment: the residual is those,
+/// less the increment times the mass matrix, if the system has one.
 pub(crate) fn solved(
     s: Rates,
     gamma: f64,
     at_zero: (Block, Block),
-    residual: impl Fn(Block, Block) -> (Block, Block),
+    rates: impl Fn(Block, Block) -> (Block, Block),
 ) -> (Block, Block) {
     (1..PASSES).fold(s.implicit(gamma, at_zero), |(dv, dy), _| {
-        let (more_v, more_y) = s.implicit(gamma, residual(dv, dy));
+        let ((rate_v, rate_y), (mass_v, mass_y)) = (rates(dv, dy), s.mass((dv, dy)));
+        let (more_v, more_y) = s.implicit(gamma, (rate_v - mass_v, rate_y - mass_y));
         (dv + more_v, dy + more_y)
     })
 }

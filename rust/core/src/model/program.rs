@@ -83,10 +83,12 @@ pub enum Entry {
     SeriesV(u32, Block, Block),
     /// Likewise of y.
     SeriesY(u32, Block, Block),
-    /// x of (I − γhJ)·x = r, its block of v, with J of the rates at the start of the step.
+    /// x of (M − γhJ)·x = r, its block of v, with the mass matrix M and J of the rates at the start of the step.
     ImplicitV(f64, Block, Block),
     /// Likewise of y.
     ImplicitY(f64, Block, Block),
+    /// M·y, with the mass matrix of the system.
+    Mass(Block),
     /// h times the derivative of h·v̇ by the time, at the start of the step.
     ByTimeV,
     /// Likewise of y.
@@ -98,7 +100,7 @@ impl Entry {
     pub fn operands(self) -> Vec<Block> {
         match self {
             Entry::V | Entry::Y | Entry::ByTimeV | Entry::ByTimeY => vec![],
-            Entry::Velocity(a) | Entry::Scale(_, a) => vec![a],
+            Entry::Velocity(a) | Entry::Scale(_, a) | Entry::Mass(a) => vec![a],
             Entry::Dv(_, a, b) | Entry::Dy(_, a, b) | Entry::Add(a, b) | Entry::Sub(a, b) => vec![a, b],
             Entry::SeriesV(_, a, b) | Entry::SeriesY(_, a, b) => vec![a, b],
             Entry::ImplicitV(_, a, b) | Entry::ImplicitY(_, a, b) => vec![a, b],
@@ -119,6 +121,7 @@ impl Entry {
             Entry::SeriesY(k, a, b) => Entry::SeriesY(k, to(a), to(b)),
             Entry::ImplicitV(gamma, a, b) => Entry::ImplicitV(gamma, to(a), to(b)),
             Entry::ImplicitY(gamma, a, b) => Entry::ImplicitY(gamma, to(a), to(b)),
+            Entry::Mass(a) => Entry::Mass(to(a)),
         }
     }
 
@@ -139,6 +142,7 @@ impl Entry {
             Entry::ImplicitY(gamma, a, b) => (11, gamma.to_bits(), a.0, b.0),
             Entry::ByTimeV => (12, 0, 0, 0),
             Entry::ByTimeY => (13, 0, 0, 0),
+            Entry::Mass(a) => (14, 0, a.0, 0),
         }
     }
 }
@@ -205,9 +209,14 @@ impl Rates {
         (1..=order).map(|k| (write(Entry::SeriesV(k, v, y)), write(Entry::SeriesY(k, v, y)))).collect()
     }
 
-    /// x of (I − γhJ)·x = r, with J of the rates at the start of the step.
+    /// x of (M − γhJ)·x = r, with J of the rates at the start of the step.
     pub(crate) fn implicit(self, gamma: f64, (v, y): (Block, Block)) -> (Block, Block) {
         (write(Entry::ImplicitV(gamma, v, y)), write(Entry::ImplicitY(gamma, v, y)))
+    }
+
+    /// The mass matrix times an increment of the state; the increment itself, if the system has none.
+    pub(crate) fn mass(self, (v, y): (Block, Block)) -> (Block, Block) {
+        (v, write(Entry::Mass(y)))
     }
 
     /// h times the derivatives of h·v̇ and h·ẏ by the time, at the start of the step.
@@ -326,6 +335,7 @@ impl Program {
                 Entry::Dv(at, v, y) => s.dv(at.at(t, h), of(v), of(y)),
                 Entry::Dy(at, v, y) => s.dy(at.at(t, h), of(v), of(y)),
                 Entry::Velocity(d) => s.velocity(of(d)),
+                Entry::Mass(d) => s.mass().map_or_else(|| of(d).clone(), |mass| mass.times(of(d))),
                 Entry::Add(a, b) => of(a).zip_map(of(b), |a, b| a + b),
                 Entry::Sub(a, b) => of(a).zip_map(of(b), |a, b| a - b),
                 Entry::Scale(c, a) => of(a).map(|a| N::of(c) * a),

@@ -1,11 +1,11 @@
 //! Rosenbrock methods by their coefficients, as Hairer and Wanner print them (*Solving Ordinary Differential Equations II*, IV.7).
 //!
-//! Stage i is the solution of (I − γhJ)·uᵢ = γ·(h·f(t + αᵢh, y + Σ aᵢⱼuⱼ) + Σ cᵢⱼuⱼ + dᵢ·h²·∂f/∂t), with the Jacobian J and ∂f/∂t of
-//! the start of the step.
+//! Stage i is the solution of (M − γhJ)·uᵢ = γ·(h·f(t + αᵢh, y + Σ aᵢⱼuⱼ) + M·Σ cᵢⱼuⱼ + dᵢ·h²·∂f/∂t), with the Jacobian J and ∂f/∂t
+//! of the start of the step, and the mass matrix M of the system, or that of units.
 
 use super::{
     program::{Block, Length, Rates, Time},
-    tableau::plus,
+    tableau::{combined, plus},
 };
 
 /// The coefficients.
@@ -33,7 +33,8 @@ impl Rosenbrock {
             let (vi, yi) = if row.is_empty() { (v, y) } else { plus(v, y, row, &solutions) };
             let (mut right_v, mut right_y) = (s.dv(at, vi, yi), s.dy(at, vi, yi));
             if !self.of_solutions[i].is_empty() {
-                (right_v, right_y) = plus(right_v, right_y, self.of_solutions[i], &solutions);
+                let (sum_v, sum_y) = s.mass(combined(self.of_solutions[i], &solutions));
+                (right_v, right_y) = (right_v + sum_v, right_y + sum_y);
             }
             if self.by_time[i] != 0.0 {
                 let (time_v, time_y) = s.by_time();

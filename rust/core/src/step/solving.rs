@@ -56,9 +56,13 @@ pub(super) fn operations(signature: &Signature, program: &Program, shape: Shape)
     let entries = jacobian.iter().map(|row| row.len()).sum::<usize>();
     let follows = shape.v.min(shape.y) > 0 && jacobian[shape.v..].iter().all(|row| row.iter().all(|column| column < shape.v));
     let n = if follows { shape.v } else { shape.v + shape.y };
+    let mass = signature.equations.as_ref().and_then(|equations| equations.mass.as_ref());
     let row = |i: usize| {
         let mut columns: Columns = jacobian[i].iter().filter(|column| *column < n).collect();
-        columns.add(i);
+        match mass {
+            None => columns.add(i),
+            Some(mass) => mass.row(i).for_each(|(column, _)| columns.add(column)),
+        }
         jacobian[i].iter().filter(|column| *column >= n).for_each(|column| columns.join(jacobian[column]));
         columns
     };

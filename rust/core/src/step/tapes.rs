@@ -86,9 +86,13 @@ impl TapeKey {
             let operations = (rates, step);
             let own_times = self.signature.count(BEGINS) > 0;
             let mut series = has_series(&self.how)?;
+            let has_mass = self.signature.equations.as_ref().is_some_and(|equations| equations.mass.is_some());
             if !series && has_derivatives(&self.how)? {
-                let is_one =
-                    self.fused || own_times || self.precision == Precision::Single || around::is_one_tape(&self.signature);
+                let is_one = self.fused
+                    || own_times
+                    || self.precision == Precision::Single
+                    || around::is_one_tape(&self.signature)
+                    || has_mass;
                 series = is_one || step <= MAX_IMPLICIT_TAPE_OPERATIONS;
                 let long = if series { step } else { equations };
                 let unknowns = shape.v + shape.y;

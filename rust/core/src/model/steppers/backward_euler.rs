@@ -27,7 +27,7 @@ fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     let end = t + h;
     let (dv, dy) = newton::solved(s, 1.0, (s.dv(end, v, y), s.dy(end, v, y)), |dv, dy| {
         let (v, y) = (v + dv, y + dy);
-        (s.dv(end, v, y) - dv, s.dy(end, v, y) - dy)
+        (s.dv(end, v, y), s.dy(end, v, y))
     });
     (v + dv, y + dy)
 }

@@ -27,7 +27,7 @@ fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     let middle = t + 0.5 * h;
     let (dv, dy) = newton::solved(s, 0.5, (s.dv(middle, v, y), s.dy(middle, v, y)), |dv, dy| {
         let (v, y) = (v + 0.5 * dv, y + 0.5 * dy);
-        (s.dv(middle, v, y) - dv, s.dy(middle, v, y) - dy)
+        (s.dv(middle, v, y), s.dy(middle, v, y))
     });
     (v + dv, y + dy)
 }

@@ -27,9 +27,6 @@ fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     let end = t + h;
     let (start_v, start_y) = (0.5 * s.dv(t, v, y), 0.5 * s.dy(t, v, y));
     let both = |v: Block, y: Block| (start_v + 0.5 * s.dv(end, v, y), start_y + 0.5 * s.dy(end, v, y));
-    let (dv, dy) = newton::solved(s, 0.5, both(v, y), |dv, dy| {
-        let (both_v, both_y) = both(v + dv, y + dy);
-        (both_v - dv, both_y - dy)
-    });
+    let (dv, dy) = newton::solved(s, 0.5, both(v, y), |dv, dy| both(v + dv, y + dy));
     (v + dv, y + dy)
 }
