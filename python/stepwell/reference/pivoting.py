@@ -7,9 +7,26 @@ unknowns keeps such zeros.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any, NamedTuple
 
 from . import bits, ordering
+
+#: Notes a part of an elimination: its word and its numbers, by their places.
+Note = Callable[[str, dict[tuple[int, ...], Any]], None]
+_note: ContextVar[Note | None] = ContextVar("note", default=None)
+
+
+@contextmanager
+def noting(note: Note) -> Iterator[None]:
+    """Within this context the parts of each elimination are noted: matrix, exchange, reciprocal, factor and solution."""
+    before = _note.set(note)
+    try:
+        yield
+    finally:
+        _note.reset(before)
 
 
 class Factors(NamedTuple):
@@ -51,6 +68,11 @@ def factored(matrix: list[list[Any]]) -> Factors:
         for i, factor in factors.below[-1]:
             for c in left:
                 rows[i][c] = less(rows[i][c], product(factor, rows[k][c]))
+    if (note := _note.get()) is not None:
+        note("matrix", {(i, j): entry for i, row in enumerate(matrix) for j, entry in enumerate(row)})
+        note("exchange", {(k, i): larger for k, each in zip(order, factors.exchanges, strict=True) for i, larger in each})
+        note("reciprocal", {(k,): over for k, over in zip(order, factors.over, strict=True)})
+        note("factor", {(i, k): factor for k, each in zip(order, factors.below, strict=True) for i, factor in each})
     return factors
 
 
@@ -66,6 +88,8 @@ def solved(factors: Factors, right: list[Any]) -> list[Any]:
         for c in reversed(factors.order[place + 1 :]):
             x[k] = less(x[k], product(factors.rows[k][c], x[c]))
         x[k] = x[k] * factors.over[place]
+    if (note := _note.get()) is not None:
+        note("solution", {(k,): each for k, each in enumerate(x)})
     return x
 
 

@@ -94,12 +94,21 @@ class Writer:
         self.notation = Notation() if notation is None else notation
         self._numbers: Counter[str] = Counter()
         self._used: set[str] = set()
+        self._traced = len(tape)
 
     def symbol(self, name: str, of: Sequence[Any], extra: int) -> Any:
         """The symbol of an operation, by which its name is known; None if an operand has no symbol."""
         if any(each is None for each in of):
             return None
-        return self.notation.called[name](of[0]) if name in self.notation.called else of_tape(self.tape, name, of, extra)
+        if name in self.notation.called:
+            return self.notation.called[name](of[0])
+        symbol = of_tape(self.tape, name, of, extra)
+        if name == "multiply" and symbol.id >= self._traced:
+            # The core moved a sign from the product to a constant in it; the method has it before the product.
+            for a, b in (of, reversed(of)):
+                if (product := (-a) * b).id < self._traced:
+                    return -product
+        return symbol
 
     def source(self, name: str, extra: int) -> Any:
         """The symbol of a value without operands."""
