@@ -230,6 +230,11 @@ def matrix(
     return derivative, values
 
 
+def of_rates(system: System, members: Shape, t: Any, v: Array, y: Array) -> Array:
+    """The derivatives of all rates by all numbers of the state, shape (n, n, *members)."""
+    return matrix(system, "rates", None, members, v, y, t)[0]
+
+
 def stepped(system: System, method: Method, v: Array, y: Array, h: Any) -> Array:
     """The numbers of both blocks after a step from these, at time 0, by the tape of the step, shape (n, *batch)."""
     traced = Traced(system, "step", method)
