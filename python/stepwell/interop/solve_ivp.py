@@ -10,9 +10,10 @@ import numpy as np
 
 from ..base import checks
 from ..base.arrays import Array
-from ..errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning
+from ..errors import ArgumentError, DTypeError, ShapeError, StiffnessWarning, ToleranceWarning
 from ..model.equations.definition import Definition
 from ..reference import adaptive
+from ..runs.findings import is_heard
 from .ivp_events import Event, note_zeros
 from .ivp_function import RightHandSide, arguments, takes
 from .ivp_methods import chosen
@@ -35,8 +36,8 @@ class OdeResult(dict[str, Any]):
         t_events: for each event function the times at which it was zero, or None.
         y_events: the states at these times, or None.
         nfev: number of function evaluations.
-        njev: 0, since no Jacobian is needed.
-        nlu: 0.
+        njev: the number of Jacobians: one for each attempt at a step that solves equations, and else 0.
+        nlu: the number of factored matrices, likewise.
         status: 0 if the end was reached, 1 if an event ended the run, −1 if a step failed.
         message: the status in words.
         success: whether ``status`` is 0 or 1.
@@ -132,6 +133,12 @@ def solve_ivp(
         TraceError: if an operation of ``fun`` cannot be traced.
         UnknownNameError: if there is no such method; for a method of SciPy that stepwell lacks, it says what to write.
 
+    Warns:
+        StiffnessWarning: if stability held down the steps, and not the tolerance: with the limit, how much longer steps the
+            tolerance allows, and the method to take.
+        ToleranceWarning: if ``rtol`` is smaller than numbers of 53 bits allow.
+        UserWarning: if another method stands in for one of SciPy, or an argument is of no use.
+
     Example:
         >>> def lotka_volterra(t, z, a, b, c, d):
         ...     x, y = z
@@ -170,9 +177,11 @@ def solve_ivp(
         wanted = sign * times
         output = wanted if len(wanted) and wanted[-1] == trajectory.end else np.append(wanted, trajectory.end)
         states = trajectory.advance_to_the_end(output)[: len(times)].T
+        _warn_of_stiffness(trajectory, sign)
         return _result(trajectory, None, times[: states.shape[1]], np.ascontiguousarray(states), None, None)
 
     ended = _advanced(trajectory, noted, sign) if end != begin else None
+    _warn_of_stiffness(trajectory, sign)
     ts = sign * np.array(trajectory.times)
     if end == begin:
         ts, trajectory.status = np.array([begin]), adaptive.OK
@@ -290,6 +299,12 @@ def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
 
 def _is_several(events: Any) -> bool:
     return not callable(events) and bool(checks.several("events", events, "functions") or True)
+
+
+def _warn_of_stiffness(trajectory: Trajectory, sign: float) -> None:
+    """Warn if stability held down the steps, and not the tolerance."""
+    if is_heard(StiffnessWarning) and (text := trajectory.stiffness(sign)):
+        warnings.warn(text, StiffnessWarning, stacklevel=3)
 
 
 def _warn_of_useless(**arguments: Any) -> None:

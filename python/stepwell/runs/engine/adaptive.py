@@ -171,7 +171,7 @@ class Adapted(NamedTuple):
     waypoints: Array | None = None
 
 
-def _room_for_waypoints(pacing: Pacing, state: int, pace: int, members: int) -> Array | None:
+def room_for_waypoints(pacing: Pacing, state: int, pace: int, members: int) -> Array | None:
     """Room for the waypoints of all members, two states and a pace each; None if they are not asked for, or are too many."""
     numbers = 2 * state + pace
     if not pacing.waypoints or WAYPOINTS * numbers * members > MOST_IN_WAYPOINTS:
@@ -328,7 +328,7 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     if pacing.every:
         blocks = (np.empty((pacing.room, *shape, members)) for shape in (plan.system.v_shape, plan.system.y_shape))
         steps = KeptSteps(np.zeros(members, np.int64), np.empty((pacing.room, members)), *blocks)
-    waypoints = _room_for_waypoints(pacing, len(last), numbers, members)
+    waypoints = room_for_waypoints(pacing, len(last), numbers, members)
     ends = status.reshape(-1)
     arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, ends, None, steps, waypoints)
     core_pacing, core_plan = pacing_of_core(plan, pacing), plan._replace(t0=0.0)
@@ -355,7 +355,7 @@ def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array
     pace = begun(plan, paces, v, y) if pacing.begins else pace_of(plan, paces)
     attempt, jumps = attempt_by_numpy(plan, pacing.budget), jumps_of(plan, pacing)
     series, numbers = plan.method.has_series, prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    waypoints = _room_for_waypoints(pacing, numbers, pace_numbers(plan), plan.members)
+    waypoints = room_for_waypoints(pacing, numbers, pace_numbers(plan), plan.members)
     at, budget, every = pacing.at, pacing.budget, pacing.every
     out = adaptive.run(attempt, v, y, pace, at=at, budget=budget, jumps=jumps, series=series, every=every, waypoints=waypoints)
     each = _evaluations_of_attempt(plan)
