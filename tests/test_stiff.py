@@ -15,6 +15,7 @@ import stepwell as sw
 from stepwell.model.systems import LinearSystem
 from stepwell.reference import pivoting
 from stepwell.reference.rosenbrock import Rosenbrock
+from stepwell.scenes import stiff_equations
 from support import stiff_problems as stiff
 
 IMPLICIT = [m.name for m in sw.methods() if m.is_implicit]
@@ -331,7 +332,7 @@ def test_reference_values(name: str, method: str) -> None:
 
 def test_second_order_systems_solve_for_velocities_alone() -> None:
     """Van der Pol's equation in two blocks has the values of its form of first order; its step has fewer operations."""
-    second = sw.integrate(stiff.van_der_pol_2, "rodas5p", v=0.0, y=2.0, tolerance=(1e-10, 1e-13), at=[2000.0])
+    second = sw.integrate(stiff_equations.van_der_pol, "rodas5p", v=0.0, y=2.0, tolerance=(1e-10, 1e-13), at=[2000.0])
     assert second.y[-1] == pytest.approx(1.706167732170469, rel=1e-7)
     assert second.v[-1] == pytest.approx(-8.928097010248125e-4, rel=1e-6)
     first = sw.integrate(stiff.van_der_pol_1, "rodas5p", y=[2.0, 0.0], tolerance=(1e-10, 1e-13), at=[2000.0])

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import stepwell as sw
+from stepwell.scenes.stiff_equations import hires, oregonator, rober
 
 
 class Problem(NamedTuple):
@@ -31,34 +32,6 @@ class Problem(NamedTuple):
 
 
 @sw.system(order=1)
-def rober(t, y):  # type: ignore[no-untyped-def]
-    slow, fast = 0.04 * y[0] - 1e4 * y[1] * y[2], 3e7 * y[1] * y[1]
-    return [-slow, slow - fast, fast]
-
-
-@sw.system(order=1)
-def oregonator(t, y):  # type: ignore[no-untyped-def]
-    a, b, c = y
-    return [77.27 * (b + a * (1.0 - 8.375e-6 * a - b)), (c - (1.0 + a) * b) / 77.27, 0.161 * (a - c)]
-
-
-@sw.system(order=1)
-def hires(t, y):  # type: ignore[no-untyped-def]
-    a, b, c, d, e, f, g, h = y
-    seventh = 280.0 * f * h - 1.81 * g
-    return [
-        -1.71 * a + 0.43 * b + 8.32 * c + 0.0007,
-        1.71 * a - 8.75 * b,
-        -10.03 * c + 0.43 * d + 0.035 * e,
-        8.32 * b + 1.71 * c - 1.12 * d,
-        -1.745 * e + 0.43 * (f + g),
-        -280.0 * f * h + 0.69 * d + 1.71 * e - 0.43 * f + 0.69 * g,
-        seventh,
-        -seventh,
-    ]
-
-
-@sw.system(order=1)
 def van_der_pol(t, y):  # type: ignore[no-untyped-def]
     return [y[1], ((1.0 - y[0] * y[0]) * y[1] - y[0]) / 1e-6]
 
@@ -66,11 +39,6 @@ def van_der_pol(t, y):  # type: ignore[no-untyped-def]
 @sw.system(order=1)
 def van_der_pol_1(t, y, mu=1000.0):  # type: ignore[no-untyped-def]
     return [y[1], mu * (1.0 - y[0] * y[0]) * y[1] - y[0]]
-
-
-@sw.system
-def van_der_pol_2(t, v, y, mu=1000.0):  # type: ignore[no-untyped-def]
-    return mu * (1.0 - y * y) * v - y
 
 
 @sw.system(order=1)
