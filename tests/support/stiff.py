@@ -10,6 +10,9 @@ import stepwell as sw
 from stepwell.scenes.stiff_equations import hires, oregonator, van_der_pol
 from stepwell.scenes.stiff_equations import rober as robertson
 
+#: The scenes on which explicit methods diverge with the usual step.
+SCENES = ("hires", "oregonator", "rober", "van_der_pol")
+
 #: Methods that choose their steps, and are stable with short ones only.
 EXPLICIT = [m.name for m in sw.methods() if m.error_order is not None and not m.is_always_stable]
 
