@@ -16,6 +16,7 @@ from stepwell.studies.advice.costs import Times, cost_noise
 from stepwell.studies.advice.result import about
 from stepwell.studies.advice.search import Search
 from stepwell.studies.advice.trials import Trial
+from support import stiff
 from support.advised import (  # noqa: F401
     RATIO,
     WORTH,
@@ -48,6 +49,7 @@ SLOW = {
     "energy_control": (),
     "figure_eight": (1e-2, 1e-4),
     "gimbal_trap": (1e-1, 1e-3),
+    **dict.fromkeys(stiff.SCENES, ()),  # explicit methods take millions of steps: test_stiff_scenes.py
     "heavy_top": (1e-3,),
     "jelly_cube": (),
     "kepler": (1e-1, 1e-3, 1e-6),

@@ -11,9 +11,11 @@ from stepwell.errors import ArgumentError, UnknownNameError
 from stepwell.runs import engine
 from stepwell.studies.measuring import data, known, measure, peers, timing
 from stepwell.views.charts import style
+from support import stiff
 from support.charted import LADDER, METHODS, SCENES, read, the_charts, the_small, the_whole  # noqa: F401
 
-UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None]
+#: Those without a formula; the stiff ones are compared with published values in test_stiff_scenes.py.
+UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None and scene.name not in stiff.SCENES]
 
 #: Below this, rounding is part of an error: it is some 1e-13 on these scenes, so a hundredth.
 ROUNDING = 1e-11

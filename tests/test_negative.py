@@ -10,6 +10,7 @@ import pytest
 import stepwell as sw
 from stepwell.scenes.stiff_equations import rober
 from support.advised import unmeasured  # noqa: F401
+from support.stiff import lorenz
 
 ABLE = [method.name for method in sw.methods() if method.error_order is not None and not method.has_series]
 IMPLICIT = [name for name in ABLE if sw.method(name).is_implicit]
@@ -79,8 +80,8 @@ def test_the_warning_says_which_number_and_which_members() -> None:
 
 
 def test_numbers_that_may_become_negative_are_not_warned_of() -> None:
-    """A swing; amounts that began negative; a number that fell below what is tolerated only."""
-    for start, system in (([1.0, 0.5], swing()), ([1.0, -0.5, 0.1], may_leonard(a=0.8, b=1.3))):
+    """A swing; Lorenz's equations, whose rates are negative at large numbers only; amounts that began negative; rounding."""
+    for start, system in (([1.0, 0.5], swing()), ([1.0, 1.0, 1.0], lorenz()), ([1.0, -0.5, 0.1], may_leonard(a=0.8, b=1.3))):
         _, texts = run_of(system, "rodas4", start, 2.0, 1e-3)
         assert not texts
     run, texts = run_of(predators(), "rodas4", [20.0, 20.0], 15.0, 1e-4)

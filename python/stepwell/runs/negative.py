@@ -23,8 +23,8 @@ from .positive import name_of
 from .request import Request
 from .result import Run
 
-#: Rates are looked at in so many states, whose amounts are these parts of the largest ones.
-LOOKED_AT, LEAST_PART, MOST_PART = 16, 1e-3, 1.0
+#: Rates are looked at in so many states, whose numbers are from the first to the second of these parts of the largest one.
+LOOKED_AT, LEAST_PART, MOST_PART = 64, 1e-4, 1e4
 
 
 def of_negative_amounts(run: Run, request: Request) -> Finding | None:
@@ -66,7 +66,7 @@ def _tolerated(plan: engine.Plan, pace: Array) -> Array:
 
 
 def _stays_positive(plan: engine.Plan, member: int, t: float, y: Array) -> bool:
-    """Whether no rate of a number that is 0 is negative in states of positive numbers, up to the size of these."""
+    """Whether no rate of a number that is 0 is negative in states of positive numbers, far smaller and far larger than these."""
     n = len(y)
     parts = LEAST_PART * (MOST_PART / LEAST_PART) ** np.random.default_rng(n).random((n, LOOKED_AT))
     states = np.repeat(np.abs(y).max() * parts, n, axis=1)

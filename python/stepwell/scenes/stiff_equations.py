@@ -10,8 +10,8 @@ from ..model.equations import system
 @system(order=1)
 def rober(t: Any, y: Any, *, slow: Any = 0.04, fast: Any = 3e7, back: Any = 1e4) -> Any:
     """Robertson's reaction: A → B slowly, 2B → B + C fast, and B + C → A + C."""
-    left, made = slow * y[0] - back * y[1] * y[2], fast * y[1] * y[1]
-    return [-left, left - made, made]
+    gained, made = back * y[1] * y[2] - slow * y[0], fast * y[1] ** 2
+    return [gained, -gained - made, made]
 
 
 @system(order=1)
