@@ -314,7 +314,7 @@ def cloth() -> Figure:
 EXPLICIT = {
     "false_euler": (3e-4, 2.5e-5, 0),
     "rk4": (1.83e-3, 2e-9, 90),
-    "merson": (2.27e-3, 2e-9, 90),
+    "merson": (2.95e-3, 2e-9, 90),
     "dop853": (3.9e-3, 1e-9, 90),
 }
 IMPLICIT = {
