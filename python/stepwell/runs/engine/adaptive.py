@@ -212,9 +212,12 @@ def paces(
             t0 = jumps.begun(t0)
         if step is None:
             span = pacing.at[-1] - plan.t0
-            step = -BLIND * np.where((span > 0.0) & (span < SHORT), span, 1.0)
+            if isinstance(span, float):
+                step = -BLIND * (float(span) if 0.0 < span < SHORT else 1.0)
+            else:
+                step = -BLIND * np.where((span > 0.0) & (span < SHORT), span, 1.0)
     each = [-BLIND if step is None else step, relative, absolute, np.inf if most_step is None else most_step, t0]
-    h, *both, longest, begin = (np.asarray(number).item() if np.size(number) == 1 else number for number in each)
+    h, *both, longest, begin = (_one_number(number) for number in each)
     tolerance = both[0], both[1], float(tolerances.absolute is None)
     numbers = [*adaptive.waiting(begin, h, tolerance, plan.system.samples, longest, groups).numbers, *own]
     if not any(getattr(number, "ndim", 0) for number in numbers):  # as ``np.ndim``, in a fifth of the time
@@ -223,6 +226,13 @@ def paces(
     for row, number in zip(out, numbers, strict=True):
         row[...] = number
     return out
+
+
+def _one_number(number: Any) -> Any:
+    """An array of one number as that number."""
+    if isinstance(number, float):
+        return float(number)
+    return np.asarray(number).item() if np.size(number) == 1 else number
 
 
 def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
