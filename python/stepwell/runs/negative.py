@@ -33,6 +33,8 @@ def of_negative_amounts(run: Run, request: Request) -> Finding | None:
     assert end is not None
     if prod(plan.system.v_shape) or not plan.system.groups or plan.backward or not (end.y < 0.0).any():
         return None
+    if plan.system.mass_matrix is not None:  # what algebraic equations give is no rate
+        return None
     n, size = prod(plan.system.y_shape), run.status.size
     first = np.broadcast_to(request.y, (*plan.system.y_shape, *run.status.shape)).reshape(n, size)
     last = end.y.reshape(n, size)
