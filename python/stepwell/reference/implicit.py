@@ -89,9 +89,10 @@ class Implicit:
         n = self.of_v if self.follows else everything
         matrix: list[list[Any]] = [n * [None] for _ in range(n)]
         for i in range(n):
+            by_way_of = [k for k in range(n, everything) if self.by_state[k][i] is not None]
             for j in range(n):
                 entry = less(self._mass(i, j), self._entry(gamma, i, j))
-                for k in range(n, everything):
+                for k in by_way_of:
                     entry = less(entry, product(self._entry(gamma, i, k), self._entry(gamma, k, j)))
                 matrix[i][j] = entry
         return pivoting.factored(matrix)
