@@ -150,7 +150,7 @@ def test_a_run_is_drawn_in_one_line(scene, tmp_path):
     run = scene.run("rosenbrock23" if scene.name in stiff.SCENES else "rk4", steps=3, every=1)
     figure = run.plot(tmp_path / "run.png")
     assert (tmp_path / "run.png").stat().st_size > 10_000
-    title = f"{type(scene.system).__name__} by Runge-Kutta 4: "
+    title = f"{scene.system.kind_name} by {run.method.title}: "
     assert (
         len([text for text in figure.texts if text.get_text().startswith(title) and len(text.get_text()) > len(title) + 5]) == 1
     )

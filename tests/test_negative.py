@@ -98,3 +98,16 @@ def test_what_is_advised_stays_positive() -> None:
         assert advice.ranked
         for row in advice.ranked:
             assert (advice.run(row).y > -1e-2).all()
+
+
+def test_equations_that_depend_on_the_time_are_left_alone() -> None:
+    """The rate at zero is positive at the end, and was negative before."""
+
+    @sw.system(order=1)
+    def driven(t, y):  # type: ignore[no-untyped-def]
+        return np.cos(t) - 0.3 * y
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = sw.integrate(driven(), "merson", y=0.5, tolerance=1e-8, at=[1.5 * np.pi + 0.2])
+    assert run.y[-1] < -0.1

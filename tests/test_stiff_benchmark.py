@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.util
 import json
 import sys
 from pathlib import Path
@@ -36,7 +37,15 @@ def test_true_ends_are_the_published_ones(name: str) -> None:
     assert ends[:, 0] == pytest.approx(published, rel=2e-10)
 
 
-@pytest.mark.parametrize("contestant", [OURS, *PEERS], ids=lambda each: each.name)
+#: One of them is no wheel: pip builds it, which takes a Fortran compiler.
+BUILT = ("numbalsoda",)
+
+
+@pytest.mark.parametrize(
+    "contestant",
+    [each for each in (OURS, *PEERS) if each.name not in BUILT or importlib.util.find_spec(each.name)],
+    ids=lambda each: each.name,
+)
 def test_all_contestants_solve_the_same_problem(contestant: Contestant) -> None:
     if (missing := measuring.warmed_up(contestant)) is not None:
         pytest.skip(missing)

@@ -1,5 +1,4 @@
-"""
-A cloth a hundred times too stiff for leapfrog falls at one step a frame
+"""A cloth a hundred times too stiff for leapfrog falls at one step a frame
 ========================================================================
 
 A square cloth hangs from two corners, at 60 frames a second with one step each. Leapfrog bears springs a hundredth as stiff; with

@@ -119,7 +119,9 @@ def assert_cheap(brute: Brute, advice: sw.advice.Advice) -> None:
         return
     if cheaper is not None and cheaper.tolerance is None:
         beside = [brute.error(cheaper.method, brute.end / n, n) for n in (cheaper.steps - 1, cheaper.steps + 1)]
-        assert min(beside) > 100 * advice.tolerance
+        # An implicit step stays bounded; it may be so long that it ends, turns too late, where the truth is by chance.
+        luck = 10 if sw.method(cheaper.method).is_implicit else 100
+        assert min(beside) > luck * advice.tolerance
     else:
         assert cheaper is None
 

@@ -301,8 +301,9 @@ class Case:
 
 #: The most numbers of a state in a system of these tests whose series is not too long.
 MOST_IN_SERIES = 60
-#: The most velocities of bodies of which each pulls each other, for a method that solves equations.
-MOST_TO_SOLVE = 60
+#: The most velocities of bodies of which each pulls each other, for a method that solves equations; and the most numbers of a
+#: state for one, but in the long run: its reference derives rates number by number. rust/core/tests/large.rs has larger ones.
+MOST_TO_SOLVE, MOST_TO_DERIVE = 60, 24
 
 
 def fits(system: sw.System, method: sw.Method) -> bool:
@@ -311,6 +312,8 @@ def fits(system: sw.System, method: sw.Method) -> bool:
         return False
     if method.is_implicit and isinstance(system, sw.NBody) and int(np.prod(system.v_shape)) > MOST_TO_SOLVE:
         return False  # a full matrix of so many rows; test_stiff.py has what is then said
+    if method.is_implicit and not families.LONG and int(np.prod(system.v_shape) + np.prod(system.y_shape)) > MOST_TO_DERIVE:
+        return False
     if method.has_series and (getattr(system, "push", None) or not getattr(system.control, "between", True)):
         return False  # a series of what a control pushes would not be that of the motion
     return not method.needs_acceleration or (system.second_order and system.velocity_term is None)

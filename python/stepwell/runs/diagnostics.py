@@ -19,7 +19,6 @@ from ..model.parameters import aligned
 from ..model.systems import NBody, System
 from . import encounters, engine, known_energy
 from .findings import Finding
-from .negative import of_negative_amounts
 from .request import Request
 from .result import Run
 from .stops import of_derivatives, of_stops, of_the_start
@@ -82,6 +81,8 @@ def findings_of(
             noticed.append(stiff)
         if (lost := _of_a_lost_motion(run, request)) is not None:
             noticed.append(lost)
+        from .negative import of_negative_amounts  # only such runs need it
+
         if (negative := of_negative_amounts(run, request)) is not None:
             noticed.append(negative)
     # The energy says nothing where events changed the state, nor where the run began from what a method carries.

@@ -23,6 +23,8 @@ from .positive import name_of
 from .request import Request
 from .result import Run
 
+#: Errors of many steps add up to so many times the tolerated one of a step, but to no more than this part of a size.
+BEYOND, PART = 100.0, 0.01
 #: Rates are looked at in so many states, whose numbers are from the first to the second of these parts of the largest one.
 LOOKED_AT, LEAST_PART, MOST_PART = 64, 1e-4, 1e4
 
@@ -35,12 +37,15 @@ def of_negative_amounts(run: Run, request: Request) -> Finding | None:
         return None
     if plan.system.mass_matrix is not None:  # what algebraic equations give is no rate
         return None
+    if plan.system.reads_time or plan.system.all_inputs():  # rates at one time say nothing of those at another
+        return None
     n, size = prod(plan.system.y_shape), run.status.size
     first = np.broadcast_to(request.y, (*plan.system.y_shape, *run.status.shape)).reshape(n, size)
     last = end.y.reshape(n, size)
-    beyond = last < -_tolerated(plan, end.pace)
+    beyond = last < -_allowed(plan, end.pace)
     members = np.flatnonzero(beyond.any(axis=0) & (first >= 0.0).all(axis=0))
-    members = members[[_stays_positive(plan, int(member), float(run.t[-1]), last[:, member]) for member in members]]
+    ends = np.broadcast_to(run.t[-1], run.status.shape).reshape(-1)
+    members = members[[_stays_positive(plan, int(member), float(ends[member]), last[:, member]) for member in members]]
     if not members.size:
         return None
     one = int(members[0])
@@ -58,13 +63,14 @@ def of_negative_amounts(run: Run, request: Request) -> Finding | None:
     return Finding(AccuracyWarning, text, whole)
 
 
-def _tolerated(plan: engine.Plan, pace: Array) -> Array:
-    """The tolerated error of a step for each number and member, by the largest sizes so far."""
+def _allowed(plan: engine.Plan, pace: Array) -> Array:
+    """How far below zero errors may have led each number of each member, by the largest sizes so far."""
     numbers = engine.pace_of(plan, pace)
     n = prod(plan.system.y_shape)
     count = sum(plan.acceptance.counts(0, n))
     _, tolerated = adaptive.tolerated(numbers, numbers.h, (0, count), numbers.longest, numbers.longest, adaptive.ROUNDING)
-    return np.asarray(tolerated).reshape(count, plan.members)[list(plan.acceptance.groups)]
+    allowed = np.maximum(tolerated, np.minimum(BEYOND * tolerated, PART * numbers.longest))
+    return np.asarray(allowed).reshape(count, plan.members)[list(plan.acceptance.groups)]
 
 
 def _stays_positive(plan: engine.Plan, member: int, t: float, y: Array) -> bool:

@@ -152,6 +152,7 @@ def _marks(scene: Scene) -> Array:
     assert scene.exact is not None
     t = even = np.linspace(0.0, scene.horizon, EVEN_SAMPLES + 1)
     path = np.linspace(0.0, 1.0, EVEN_SAMPLES + 1)
+    _ = scene.scales  # which checks what a function of the user returns
     blocks = scene.exact(t)
     for i in range(PATH_ITERATIONS):
         changes = scene.relative_lengths(*(np.diff(block, axis=0) for block in blocks))

@@ -41,7 +41,7 @@ SAMPLES, MAX_SIZE_STEPS, SHARE_LEFT_OUT = 1000, 20_000, 0.005
 #: The longest step that goes into a page, in characters; and in operations, which are counted before a step is written.
 MAX_SOURCE, MAX_OPERATIONS = 400_000, 80_000
 #: The same of a step that solves equations: seven methods have such steps, and those of many unknowns would be most of a page.
-MAX_SOLVING = 14_000
+MAX_SOLVING, MAX_UNKNOWNS = 14_000, 8
 
 
 def of_method(method: Method) -> dict[str, Any]:
@@ -134,6 +134,9 @@ def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[s
 def _source(scene: Scene, method: Method, control: AnyControl | None) -> str:
     """A step as JavaScript."""
     options: dict[str, Any] = {"dt": scene.dt, "v": scene.v, "y": scene.y, "control": control}
+    numbers = scene.v.size + scene.y.size
+    if method.is_implicit and numbers > MAX_UNKNOWNS:
+        raise UnsupportedError(f"equations of {numbers} numbers are too long for a page; at most {MAX_UNKNOWNS} fit")
     count = about(Request.one_step(scene.system, method, Options(**options)).plan)
     if count > MAX_OPERATIONS:
         raise UnsupportedError(f"a step of about {count} operations is too long for a page; at most {MAX_OPERATIONS} fit")
