@@ -62,8 +62,10 @@ hooks: .venv/test ## check format, lints, types and tables before each commit; .
 	$(PIP) pre-commit
 	$(BIN)/pre-commit install
 
-bench: .venv/bench ## time every language on the same work, in one run, into benches/RESULTS.md
+bench: .venv/bench ## time every language on the same work, into benches/RESULTS.md, and stiff systems, into their page
 	$(BIN)/python -m benches.compare
+	@$(PIP) numbalsoda 2> /dev/null || echo "numbalsoda is left out: pip builds it, which takes cmake and a Fortran compiler"
+	$(BIN)/python -m benches.stiff
 
 # In `make test` two of these run at a time, so that neither core waits for a download or a program that uses only one.
 lint: lint-rust lint-python

@@ -98,12 +98,12 @@ class Brute:
         self.given = replace(scene, horizon=horizon) if horizon < scene.horizon else scene
         self.frame, self.ratio = frame, ratio
         exact, last = known.exact, min(self.end, known.until)
-        scales = replace(known, horizon=horizon).scales
+        scales = replace(known, horizon=horizon).scales_of_numbers
         table = tabled(exact, last, scales, CLOSE)
         self.scene = replace(known, exact=lambda t: table(np.minimum(t, last)), until=math.inf, horizon=horizon)
         times = np.random.default_rng(5).uniform(0.0, last, 500)
         for a, b, scale in zip(table(times), exact(times), scales, strict=True):
-            assert np.abs(a - b).max(initial=0.0) <= 10 * CLOSE * scale
+            assert (np.abs(a - b) <= 10 * CLOSE * scale).all()
         self._errors: dict[tuple[Any, ...], float] = {}
         self._adaptive: dict[str, list[Try]] = {}
         self._others: dict[tuple[str, float], float] = {}

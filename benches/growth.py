@@ -276,6 +276,7 @@ def show(name: str, rows: list[dict[str, Any]], console: Console) -> None:
 def draw(told: dict[str, Any]) -> None:
     """A picture of each sweep, and one of the kernels."""
     from matplotlib import rc_context
+    from stepwell.base.pictures import png
     from stepwell.views.charts import style
     from stepwell.views.charts.labels import at_ends, title
 
@@ -316,7 +317,7 @@ def draw(told: dict[str, Any]) -> None:
             call = powers(rows[0]["one thread"] * STEPS / rows[-1]["one thread"]) if name == "members" else ""
             title(figure, 0.012, 0.93, said.format(call=call), 17)
             figure.text(0.012, 0.885, told["machine"], size=11, color=style.GREY)
-            (IMAGES / f"growth-{name}.png").write_bytes(style.png(figure))
+            (IMAGES / f"growth-{name}.png").write_bytes(png(figure))
 
 
 #: The names of forms stand above the curves, in this share of the height.

@@ -171,7 +171,8 @@ def published() -> dict[str, dict[str, str]]:
 def draw(path: Path) -> None:
     """The cycles of the table, alone and within a force, a row for each sequence; exact ones first."""
     from matplotlib import rc_context
-    from stepwell.views.charts.style import FAMILIES, FONT, GREY, new_figure, png
+    from stepwell.base.pictures import new_figure, png
+    from stepwell.views.charts.style import FAMILIES, FONT, GREY
 
     rows = sorted(published().items(), key=lambda row: float(row[1]["error"]))
     looks = {"512 bits": ("plain", FAMILIES["Runge-Kutta"], "o"), "fused, 512 bits": ("fused", FAMILIES["Heun"], "D")}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import stepwell as sw
 from PIL import Image
+from stepwell.base.pictures import png
 from stepwell.views.charts import labels, style
 
 IMAGES = Path(__file__).resolve().parent / "images"
@@ -114,7 +115,7 @@ def five_methods() -> None:
         title = finding(chart)
         figure.text(0.012, 0.935, f"Of five methods, {title}", size=16, weight="bold")
         figure.text(0.012, 0.88, "Three bodies on a clover leaf (Appendix C), 30 units of time.", size=12.5, color=style.GREY)
-        (IMAGES / "five-methods.png").write_bytes(style.png(figure))
+        (IMAGES / "five-methods.png").write_bytes(png(figure))
     print("five-methods.png", (IMAGES / "five-methods.png").stat().st_size)
 
 

@@ -6,6 +6,7 @@ A table stands between ``<!-- generated: NAME -->`` and ``<!-- end generated -->
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Iterable
@@ -20,6 +21,13 @@ import speed
 
 ROOT = Path(__file__).resolve().parent.parent
 PLACE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end generated -->)", re.DOTALL)
+
+
+def limit(angle: float, digits: int) -> str:
+    """A stability limit in words where it is no number."""
+    if math.isinf(angle):
+        return "stable at every step"
+    return f"{angle:.{digits}g}" if angle else "never stable"
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -46,7 +54,7 @@ def methods() -> str:
                 m.other_names[0] if m.other_names else "—",
                 str(m.order),
                 str(m.evaluations),
-                f"{m.limit:.6g}" if m.limit else "never stable",
+                limit(m.limit, 6),
             )
             for m in sw.methods()
         ),
@@ -86,7 +94,7 @@ def criteria() -> str:
         (
             (
                 c.method.title,
-                f"{c.limit:.10g}" if c.limit else "never stable",
+                limit(c.limit, 10),
                 f"{c.samples_per_period:.4g}" if c.limit else "—",
                 c.r1_squared,
                 c.deviation,

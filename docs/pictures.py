@@ -310,6 +310,80 @@ def cloth() -> Figure:
     return figure
 
 
+#: Methods of the picture of a stiff pair of masses: where their names stand, upright beside a wall, and their colours.
+EXPLICIT = {
+    "false_euler": (3e-4, 2.5e-5, 0),
+    "rk4": (1.83e-3, 2e-9, 90),
+    "merson": (2.95e-3, 2e-9, 90),
+    "dop853": (3.9e-3, 1e-9, 90),
+}
+IMPLICIT = {
+    "backward_euler": (5e-3, 0.2, 0),
+    "trapezoidal": (6e-3, 6e-4, 0),
+    "rodas4": (1.3e-2, 1e-8, 0),
+    "rodas5p": (0.16, 8e-12, 0),
+}
+EXPLICIT_COLOUR, IMPLICIT_COLOUR = "#a33b0a", "#17508f"
+
+
+def where_methods_fail() -> Figure:
+    """Error over step of two masses that a stiff spring joins, by explicit and by implicit methods."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+    from stepwell.views.charts.style import FONT, GREY
+
+    def exact(t: Any) -> Any:
+        return np.outer(-np.sin(t), [1, 1]), np.outer(np.cos(t), [1, 1])
+
+    scene = sw.Scene(sw.Chain(2, stiffness=[1.0, 1e6, 1.0]), v=0.0, y=1.0, horizon=10.0, exact=exact)
+    limits = {name: float(sw.stability_limit(scene.system, name)) for name in EXPLICIT}
+    most = max(limits.values())
+    with rc_context(FONT):
+        figure = Figure(figsize=(12.0, 6.6), dpi=100)
+        axes = figure.add_axes((0.085, 0.12, 0.895, 0.73))
+        axes.set(xscale="log", yscale="log", xlim=(1e-4, 1.0), ylim=(1e-16, 10.0))
+        for names, colour in ((EXPLICIT, EXPLICIT_COLOUR), (IMPLICIT, IMPLICIT_COLOUR)):
+            for name, (x, y, turn) in names.items():
+                steps = 10.0 / np.rint(10.0 / np.geomspace(1e-4, min(limits.get(name, 1.0), 1.0), 40))
+                errors = [error_of(scene, name, dt) for dt in steps if dt < limits.get(name, np.inf)]
+                steps = steps[: len(errors)]
+                if name in limits:
+                    steps, errors = np.append(steps, [limits[name]] * 2), [*errors, errors[-1], 10.0]
+                axes.plot(steps, np.maximum(errors, 1e-16), color=colour, linewidth=2.2)
+                axes.text(
+                    x,
+                    y,
+                    sw.method(name).title,
+                    color=colour,
+                    weight="bold",
+                    size=12.5,
+                    rotation=turn,
+                    ha="right" if turn else "left",
+                )
+        axes.axvspan(most, 1.0, color="#f0f0f0", zorder=0)
+        axes.text(most * 1.1, 2.0, f"no explicit method is stable beyond {most:.2g}", size=12.5, color="#333333")
+        axes.set_xlabel("step")
+        axes.set_ylabel("largest error over 10 units of time, relative")
+        axes.spines[["top", "right"]].set_visible(False)
+        digits = int(-np.log10(error_of(scene, "rodas5p", 0.5)))
+        longer = f"steps {0.5 / most:.0f} times as long have {digits} digits by Rodas5P"
+        title = f"Explicit steps blow up beyond {most:.2g}; {longer}"
+        figure.text(0.012, 0.945, title, size=16.5, weight="bold")
+        figure.text(
+            0.012,
+            0.893,
+            "Two masses between soft springs, joined by one a million times as stiff, which never moves.",
+            size=13,
+            color=GREY,
+        )
+    return figure
+
+
+def error_of(scene: sw.Scene, method: str, dt: float) -> float:
+    """The largest state error of a run."""
+    return float(scene.state_error(scene.run(method, dt, every=max(1, round(0.01 / dt)))).max())
+
+
 ROOT = DOCS.parent
 
 
@@ -366,6 +440,7 @@ if __name__ == "__main__":
     write("contact-rods.png", tumbling())
     write("tape.png", tape())
     write("cloth.png", cloth())
+    write("where-methods-fail.png", where_methods_fail())
     examples()
     turns = sw.scenes.aircraft()
     write("aircraft.png", sw.charts.run_picture(turns, turns.run("false_euler", every=1)).plot())

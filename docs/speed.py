@@ -100,7 +100,7 @@ def rows() -> list[list[str]]:
 def draw() -> None:
     """The picture: a row for each work."""
     import matplotlib.pyplot as plt
-    from stepwell.views.charts.style import png
+    from stepwell.base.pictures import png
 
     found = ratios()
     figure, axes = plt.subplots(figsize=(8.6, 0.31 * len(found) + 1.3), layout="constrained")

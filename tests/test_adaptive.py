@@ -112,7 +112,8 @@ def test_a_hard_member_changes_nobody(method: str) -> None:
         assert whole.paces is not None
         assert alone.paces.accepted == whole.paces.accepted[member]
         assert alone.paces.h == whole.paces.h[member]
-    assert whole.paces.evaluations[3] > 1.5 * whole.paces.evaluations[0]
+    # Of second order every member needs so many steps that the passage of the hard one is a small part of its own.
+    assert whole.paces.evaluations[3] > (1.0 if sw.method(method).order == 2 else 1.5) * whole.paces.evaluations[0]
     # For each of the two asked times the step that passes it is made twice, and an extra one. A series has the coefficients
     # already, so it adds the last step alone, which is not taken. How many evaluations an order is, see test_taylor.py.
     again = 1 if sw.method(method).has_series else 2 * 2
@@ -127,7 +128,8 @@ def test_the_error_follows_the_tolerance(orbit: str, coarsest: float, method: st
     """Over six decades, after one period.
 
     The error of a step is of fifth order in it and is held at the tolerance, so steps shorten as its fifth root. The end error of
-    a result of order p is then of p/5 in the tolerance: 4/5 for Fehlberg, 1 with local extrapolation. Merson's estimate is too
+    a result of order p is then of p/5 in the tolerance: 4/5 for Fehlberg, 1 with local extrapolation. For Rosenbrock 2(3) it is
+    2/3, second order by steps of third. Merson's estimate is too
     large off linear equations, by one power of the step: its end error falls as fast as the tolerance, or a little faster.
     """
     scene = sw.scenes.scene(orbit) if orbit == "arenstorf" else None
@@ -137,7 +139,7 @@ def test_the_error_follows_the_tolerance(orbit: str, coarsest: float, method: st
     runs = [sw.integrate(system, method, tolerance=t, at=[end], **state) for t in tolerances]
     errors = np.array([np.linalg.norm(run.y[-1] - state["y"]) for run in runs])
     line = np.polyfit(np.log10(tolerances), np.log10(errors), 1)
-    assert 0.7 < line[0] < 1.2, errors
+    assert (0.55 if method == "rosenbrock23" else 0.7) < line[0] < 1.2, errors
     assert (np.abs(np.log10(errors) - np.polyval(line, np.log10(tolerances))) < 1.0).all(), errors
 
 
@@ -160,7 +162,8 @@ def test_each_state_is_that_of_its_time() -> None:
 def test_a_state_does_not_depend_on_what_else_is_asked_for(method: str, backend: str) -> None:
     """Alone, among many, at the very end of a step, or as the last: the same bits, and the same steps."""
     system, state = kepler(np.array([0.3, 0.7, 0.0]))
-    times = np.sort(np.random.default_rng(3).uniform(0.0, 20.0 if backend == "rust" else 8.0, 40))
+    end = 20.0 if backend == "rust" else 0.5 if sw.method(method).is_implicit else 8.0  # the reference derives at each attempt
+    times = np.sort(np.random.default_rng(3).uniform(0.0, end, 40))
     tolerance = 1e-4 if sw.method(method).has_series else np.array([1e-2, 1e-4, 1e-9])  # a series has one order for all members
     ask: dict[str, Any] = {"tolerance": tolerance, "backend": backend} | state
     many = sw.integrate(system, method, at=times, **ask)
@@ -254,7 +257,8 @@ def test_a_linear_run_scales_with_its_start_to_the_bit(method: str, backend: str
     Of squares of lengths times the square of a tolerance of 1e-6 the least here is 2^−160·1e-24 or so, far above 2^−1022.
     """
     chain = sw.Chain(3, stiffness=[1.0, 30.0, 2.0, 1.0])
-    times = np.linspace(0.0, 30.0 if backend == "rust" else 6.0, 8)[1:]
+    end = 30.0 if backend == "rust" else 0.5 if sw.method(method).is_implicit else 6.0
+    times = np.linspace(0.0, end, 8)[1:]
     for v, y in (([0.0, 1.0, -0.3], [0.2, 0.0, 0.1]), ([0.0] * 3, [0.0, 1.0, 0.0]), ([0.1, 0.0, 0.0], [0.0] * 3)):
         ask: dict[str, Any] = {"tolerance": 1e-6, "at": times, "backend": backend}
         one = sw.integrate(chain, method, v=np.array(v), y=np.array(y), **ask)

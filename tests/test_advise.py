@@ -16,6 +16,7 @@ from stepwell.studies.advice.costs import Times, cost_noise
 from stepwell.studies.advice.result import about
 from stepwell.studies.advice.search import Search
 from stepwell.studies.advice.trials import Trial
+from support import stiff
 from support.advised import (  # noqa: F401
     RATIO,
     WORTH,
@@ -48,6 +49,7 @@ SLOW = {
     "energy_control": (),
     "figure_eight": (1e-2, 1e-4),
     "gimbal_trap": (1e-1, 1e-3),
+    **dict.fromkeys(stiff.SCENES, ()),  # explicit methods take millions of steps: test_stiff_scenes.py
     "heavy_top": (1e-3,),
     "jelly_cube": (),
     "kepler": (1e-1, 1e-3, 1e-6),
@@ -173,7 +175,8 @@ def test_a_budget_must_hold_in_the_worst_frame(monkeypatch: pytest.MonkeyPatch) 
     assert free.best.seconds_per_frame is not None
     assert budget > 1.5 * free.best.seconds_per_frame
     tight = sw.advise("kepler", frame=0.1, tolerance=1e-2, budget=budget)
-    assert {each.kind for each in tight.rejected if each.by == "tolerance"} == {"budget"}
+    # What costs more than another way at any accuracy is out already.
+    assert {each.kind for each in tight.rejected if each.by == "tolerance"} - {"dominated"} == {"budget"}
     assert "in its worst frame of the" in str(tight)
     for row in tight.ranked:
         assert row.tolerance is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import json
 import re
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from support.cases import number
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+from benches import growth, roots  # noqa: E402
 from benches.compare import machine, peers, report, runner, workloads  # noqa: E402
 from benches.compare.chosen import solar  # noqa: E402
 from benches.compare.own import first_call, tolerance  # noqa: E402
@@ -250,3 +252,10 @@ def test_who_is_not_installed_has_no_row(monkeypatch: pytest.MonkeyPatch) -> Non
         assert solar.measured("heyoka", (1.0,), 60.0) is None
     with pytest.raises(RuntimeError, match="nobody"):
         solar.measured("nobody", (1.0,), 60.0)
+
+
+def test_pictures_are_drawn_of_what_was_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "IMAGES", tmp_path)
+    growth.draw(json.loads(growth.NUMBERS.read_text(encoding="utf-8")))
+    roots.draw(tmp_path / "inverse-cube.png")
+    assert {path.name for path in tmp_path.iterdir()} == {"inverse-cube.png", *(f"growth-{name}.png" for name in growth.AXES)}

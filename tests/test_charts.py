@@ -11,9 +11,11 @@ from stepwell.errors import ArgumentError, UnknownNameError
 from stepwell.runs import engine
 from stepwell.studies.measuring import data, known, measure, peers, timing
 from stepwell.views.charts import style
+from support import stiff
 from support.charted import LADDER, METHODS, SCENES, read, the_charts, the_small, the_whole  # noqa: F401
 
-UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None]
+#: Those without a formula; the stiff ones are compared with published values in test_stiff_scenes.py.
+UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None and scene.name not in stiff.SCENES]
 
 #: Below this, rounding is part of an error: it is some 1e-13 on these scenes, so a hundredth.
 ROUNDING = 1e-11
@@ -50,8 +52,10 @@ def test_the_error_falls_with_the_order_that_is_declared(whole, scene, method):
     curve = next(curve for curve in chart.curves if curve.method is method)
     if (scene.name, method.name) == ("pendulum", "fehlberg"):
         return  # of two signs of error, which cancel in this window; test_orders.py looks closer
-    if method.order > 5 and not scene.system.linear:
-        return  # sixteen digits do not show it; test_orders.py takes fifty
+    if (method.order > 5 and not scene.system.linear) or method.name == "rodas5p":
+        return  # sixteen digits do not show it; test_orders.py takes fifty, and test_stiff.py the coefficients
+    if (scene.name, method.name) == ("clover", "rodas4"):
+        return  # its fifth power rules in this window
     assert slope(curve) == pytest.approx(method.order, abs=0.1 if scene.system.linear else 0.25)
 
 
@@ -129,7 +133,7 @@ def test_a_wrong_exact_solution_is_seen():
 # ---- stability
 
 
-@pytest.mark.parametrize("method", [m for m in METHODS if m.limit], ids=lambda m: m.name)
+@pytest.mark.parametrize("method", [m for m in METHODS if 0.0 < m.limit < math.inf], ids=lambda m: m.name)
 def test_instability_is_marked_beyond_the_limit_and_not_below(charts, method):
     """2 % beyond, the slowest method grows by 8 % a step, 29-fold over the 43 steps; 2 % below, none grows."""
     scene = sw.scenes.oscillator()
@@ -312,8 +316,8 @@ def test_a_scene_without_a_period_has_no_phase_error(small):
 
 
 def test_the_error_falls_with_the_tolerance(charts):
-    """In proportion to it by fifth order, or by its 4/5th power by fourth, as in ``test_adaptive.py``; over the whole range,
-    since errors of one sign and the other cancel here and there.
+    """In proportion to it by fifth order, by its 4/5th power by fourth, by 2/3 by second, as in ``test_adaptive.py``; over the
+    whole range, since errors of one sign and the other cancel here and there.
     """
     for name in ("oscillator", "clover"):
         paced = [curve for curve in charts[name].curves if curve.by == "tolerance"]
@@ -323,7 +327,9 @@ def test_the_error_falls_with_the_tolerance(charts):
             assert [p.tolerance for p in curve.points] == list(peers.TOLERANCES)
             seen = [(p.tolerance, p.state_error) for p in curve.points if 1e-11 < p.tolerance < 2e-3]
             slope_seen = np.polyfit(*np.log10(seen).T, 1)[0]
-            assert 0.7 < slope_seen < 1.15, curve.name
+            # Errors of rodas4 with the loosest tolerances are of both signs.
+            least, most = {"rosenbrock23": (0.6, 1.15), "rodas4": (0.7, 1.25)}.get(curve.method.name, (0.7, 1.15))
+            assert least < slope_seen < most, curve.name
             # Of the loosest tolerance a fifth of the steps is rejected, which costs more than a tighter one.
             assert all(a.cost <= b.cost for a, b in itertools.pairwise(p for p in curve.points if p.tolerance < 5e-3))
 
@@ -457,4 +463,7 @@ def test_every_point_is_in_the_picture(charts):
         if curve.by == "tolerance":
             continue
         own = [mark.get_xdata()[0] for mark in of_row if mark.get_marker() == style.look(curve.method)["marker"]]
+        if curve.method.is_implicit:
+            assert not own  # it is stable at every step
+            continue
         assert curve.method.evaluations / curve.largest_stable_step in own

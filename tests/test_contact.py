@@ -51,7 +51,7 @@ def test_a_ceiling_adds_no_energy() -> None:
         energy = contacts.energies(run, kick)
         met = run.v[1, 0, 0] - (run.v[0, 0, 0] - kick) < -contacts.ROUNDING
         assert met.sum() > 300
-        assert np.where(met, energy[1] - energy[0], -1.0).max() <= contacts.ROUNDING * (0.5 + kick.max())
+        assert np.where(met, energy[1] - energy[0], -1.0).max() <= contacts.rounding(method) * (0.5 + kick.max())
 
 
 # ---- the simpler ways

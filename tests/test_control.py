@@ -214,8 +214,8 @@ def takes_its_turn(size: tuple[int, int, int], form: str, force: str, method: st
 def test_both_backends_agree_to_the_bit(size: tuple[int, int, int], form: str, force: str, method: str) -> None:
     """In batches of one and more, and alone."""
     bodies, dim, members = size
-    if sw.method(method).has_series and bodies > MOST_IN_SERIES:
-        pytest.skip("a series of so many bodies is refused; test_taylor.py tests that")
+    if sw.method(method).has_derivatives and bodies > MOST_IN_SERIES:
+        pytest.skip("a series of so many bodies is refused, and the reference of an implicit step goes number by number")
     rng = np.random.default_rng([bodies, dim, members])
     system = sw.NBody(rng.uniform(0.5, 2.0, bodies) / bodies, force=force, softening=0.1)
     v, y = rng.normal(size=(2, bodies, dim, members))
@@ -279,8 +279,8 @@ def test_nacozys_way_is_one_step_of_newton(method: str) -> None:
 @pytest.mark.parametrize("bodies", [2, 3, 20])
 def test_projections_keep_the_promises(bodies: int, way: str, method: str) -> None:
     """The same by both backends, in a batch and alone, in one piece and in two."""
-    if sw.method(method).has_series and bodies > MOST_IN_SERIES:
-        pytest.skip("a series of so many bodies is refused; test_taylor.py tests that")
+    if sw.method(method).has_derivatives and bodies > MOST_IN_SERIES:
+        pytest.skip("a series of so many bodies is refused, and the reference of an implicit step goes number by number")
     rng = np.random.default_rng(bodies)
     system = sw.NBody(np.ones(bodies) / bodies, force="newton", softening=0.1)
     v, y = rng.normal(size=(2, bodies, 2, 5))

@@ -34,8 +34,11 @@ def bodies(n: int, members: int = 3) -> tuple[sw.NBody, dict[str, Any]]:
 
 
 @pytest.mark.parametrize("control", CONTROLS)
-@pytest.mark.parametrize("n", [2, 3, 6, 9, 20])
-@pytest.mark.parametrize("method", ABLE)
+@pytest.mark.parametrize(
+    ("method", "n"),
+    # The reference of an implicit step goes number by number.
+    [(m, n) for m in ABLE for n in (2, 3, 6, 9, 20) if n < (3 if sw.method(m).is_implicit else 99)],
+)
 def test_adaptive_steps_keep_the_promises(method: str, n: int, control: str) -> None:
     """The same by both backends, alone and in a batch, in one piece and in two, on one tape and row by row; the work is told."""
     system, start = bodies(n)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import stepwell as sw
+from support import stiff
 
 ROOT = Path(__file__).resolve().parent.parent
 AT_THE_ROOT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")
@@ -117,12 +118,13 @@ def test_no_page_names_a_place_of_one_machine(page):
 
 
 def test_every_scene_is_in_a_picture_of_errors_against_cost() -> None:
-    """In one, and in the table unless luck decides there; the cloth is in none, and the page says why."""
+    """In one, and in the table unless luck decides there; the cloth and stiff ones are in none, and the page says why."""
     drawn = runpy.run_path(str(ROOT / "docs" / "pictures.py"))
     names = [name for scenes in drawn["FAMILIES"].values() for name in scenes]
-    assert sorted([*names, "cloth"]) == [scene.name for scene in sw.scenes.scenes()]
+    assert sorted([*names, "cloth", *stiff.SCENES]) == [scene.name for scene in sw.scenes.scenes()]
     page = (ROOT / "docs" / "benchmarks" / "work-precision.md").read_text(encoding="utf-8")
     assert "The scene `cloth` is missing" in page
+    assert all(f"`{name}`" in page for name in stiff.SCENES)
     for picture, scenes in drawn["FAMILIES"].items():
         assert f"](../images/{picture})" in page
         for scene in scenes:

@@ -254,4 +254,6 @@ def test_events_are_located_in_any_unit_of_time(method: str, omega: float) -> No
     """cos ωt passes zero at odd quarters of its period."""
     zero = sw.Event(lambda t, v, y: y, name="zero")
     run = sw.integrate(sw.Oscillator(omega), method, v=0.0, y=1.0, tolerance=1e-10, at=[10.0 / omega], events=zero)
-    np.testing.assert_allclose(run.events["zero"].t * omega / np.pi, [0.5, 1.5, 2.5], rtol=1e-8)
+    # Of a method of order 2 whose estimate is of the third order, h³ follows the tolerance, and the error h².
+    within = 1e-6 if sw.method(method).order == 2 else 1e-8
+    np.testing.assert_allclose(run.events["zero"].t * omega / np.pi, [0.5, 1.5, 2.5], rtol=within)

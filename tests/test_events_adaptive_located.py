@@ -41,7 +41,8 @@ def test_the_error_of_the_time_follows_the_tolerance_and_is_that_of_the_motion(m
     first order: the second is δ²·|v̇|/(2v³), with v near 1 and v̇ near 0 there, less than δ². Both lie in one step, or in two
     whose errors differ: of each step's error a share at most, which the tolerance bounds, counted twice with the roundings.
     """
-    assert 0.7 < slope(method) < 1.3
+    # Of a method of order 2 with an estimate of the third order, h³ follows the tolerance, and the error h².
+    assert (0.6 if sw.method(method).order == 2 else 0.7) < slope(method) < 1.3
     for tolerance in TOLERANCES:
         late, by_state = passage(method, tolerance)
         assert abs(late - by_state) < by_state**2 + 1e-3 * abs(by_state) + 100 * U
@@ -57,10 +58,13 @@ def pericentre(method: str, tolerance: float) -> float:
 
 @pytest.mark.parametrize("method", ABLE)
 def test_a_planet_is_at_its_pericentre_in_time(method: str) -> None:
-    """The error falls by four decades or more over six of the tolerance, and ends within a thousand tolerances."""
+    """The error falls by four decades or more over six of the tolerance, and ends within a thousand tolerances; by a method of
+    order 2, whose error is that of h² while h³ follows the tolerance, by less than four and within ten thousand.
+    """
     coarse, fine = pericentre(method, 1e-4), pericentre(method, 1e-10)
-    assert fine < 1e-4 * coarse
-    assert fine < 1e-7
+    falls, ends = (1e-3, 1e-6) if sw.method(method).order == 2 else (1e-4, 1e-7)
+    assert fine < falls * coarse
+    assert fine < ends
 
 
 @sw.system

@@ -219,7 +219,7 @@ def roots_by(method: str, roots: Any, begin: float, **steps: Any) -> Any:
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
-@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.error_order is not None])
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.error_order is not None and m.order >= 3])
 def test_two_changes_of_sign_in_an_adaptive_step_are_found(method: str, tolerance: float) -> None:
     """A method of third order or more makes no error in a cubic, so that its steps grow as long as they may: of twelve cubics the
     changes of sign come in pairs in one step, at any place of it.

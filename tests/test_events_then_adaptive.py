@@ -104,6 +104,8 @@ def test_a_neuron_fires_when_a_closed_form_says(method: str) -> None:
     np.testing.assert_array_equal(run.events["fires"].count, spikes)
     np.testing.assert_array_equal(run.y[-1][1], spikes)
     bound = 40 * 1e-9 / (current - 1.0) * spikes
+    if sw.method(method).order == 2:  # whose estimate is of the third order: h³ follows the tolerance, and the error h²
+        bound *= 10
     for i in range(3):
         times = run.events["fires"].of(i).t
         np.testing.assert_allclose(times, period[i] * np.arange(1, len(times) + 1), rtol=0, atol=bound[i])

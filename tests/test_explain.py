@@ -18,6 +18,7 @@ import stepwell as sw
 from stepwell import _core
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference import adaptive
+from stepwell.reference.implicit import Implicit
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
 from stepwell.runs.engine import direct, linear
@@ -228,6 +229,10 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool, some: int | 
         assert_counted(explained)
 
 
+#: γ of implicit methods that have no file of coefficients.
+GAMMAS = {"linearly_implicit_euler": 1.0, "backward_euler": 1.0, "implicit_midpoint": 0.5, "trapezoidal": 0.5}
+
+
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_what_a_method_does_to_blocks(method: sw.Method) -> None:
     """The listing of a step that is no single tape."""
@@ -236,6 +241,23 @@ def test_what_a_method_does_to_blocks(method: sw.Method) -> None:
     if method.has_series:  # whose step is always one tape
         with pytest.raises(sw.errors.UnsupportedError, match="take dop853 for a large system"):
             sw.explain(system, method)
+        return
+    if method.is_implicit:
+        n = 20  # the reference finds derivatives number by number; a listing is the same for chains of any length
+        listed, system = sw.explain(system, method), sw.Chain(n)
+        v, y = rng.normal(size=(2, n))
+        s = system.scaled(H, ())
+        equations, gamma = (
+            Implicit(s, T, v, y),
+            method.steps.METHOD.gamma if hasattr(method.steps, "METHOD") else GAMMAS[method.name],
+        )
+        solved = {f"solve_{block}": lambda a, b, i=i: equations.solve(gamma, a, b)[i] for i, block in enumerate("vy")}
+        by_time = dict(zip(("dv_by_t", "dy_by_t"), equations.by_time(H), strict=True))
+        values = evaluate(listed, {"v": v, "y": y, "h": H, "t": T, "dv": s.dv, "dy": s.dy} | solved | by_time, {})
+        v1, y1 = method.steps.step(s, T, H, v, y)
+        np.testing.assert_array_equal(values["v'"], v1)
+        np.testing.assert_array_equal(values["y'"], y1)
+        assert "solve_v, solve_y: x of" in str(listed)
         return
     explained = sw.explain(system, method)
     assert explained.parts == "hand"

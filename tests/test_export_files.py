@@ -76,7 +76,7 @@ def test_the_head_says_what_it_is() -> None:
         "number i, j of the block of shape (2, 3) at y[3*i + j]",
     ):
         assert text in head
-    assert "no undamped oscillator" in sw.export(sw.Oscillator(), "standard_euler", "c").source
+    assert "undamped oscillators for no omega*dt" in sw.export(sw.Oscillator(), "standard_euler", "c").source
     assert "(..., fused=True)" in sw.export(sw.Oscillator(), "rk4", "rust", fused=True).source
 
 

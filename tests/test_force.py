@@ -408,7 +408,8 @@ def test_one_graph_of_an_attempt(name: str) -> None:
     for method in map(sw.method, ABLE):
         if not fits(system, method):
             continue
-        for backward in (False,) if method.has_series else (False, True):  # a series has its signs elsewhere
+        # Derivatives have their signs elsewhere: the core takes those of −(a·b) on its tape, the reference those of (−a)·b.
+        for backward in (False,) if method.has_derivatives else (False, True):
             plan = engine.Plan(system, method, system.batch, 1.0, force=force, backward=backward)
             for what in ("attempt", "begin"):
                 tape = _core.Tape()
@@ -432,6 +433,8 @@ SMALL = {"pendulum, damped": True, "linear, masses": True, "free": False, "three
 @pytest.mark.parametrize("method", ABLE)
 def test_adaptive_steps_equal_the_reference(method: str, fused: bool, names: list[str]) -> None:
     """Under a force of each member, forward and backward, in pieces and in one."""
+    if fused and sw.method(method).is_implicit:
+        names = names[:3]  # whose fused multiply-adds NumPy computes one by one
     for name in names:
         system, v, y, force = forced(name, 9)
         if not fits(system, sw.method(method)):
@@ -511,8 +514,10 @@ def test_adaptive_steps_are_as_right_as_without(method: str) -> None:
     force, y = np.linspace(-1.0, 1.0, 7), np.linspace(1.5, 2.0, 7)
     for end in (7.0, -7.0):
         run = sw.integrate(sw.Oscillator(), method, v=0.0, y=y, tolerance=1e-9, at=[end], force=force)
-        assert np.abs(run.y[-1] - force - (y - force) * np.cos(end)).max() < 1e-7
-        assert np.abs(run.v[-1] + (y - force) * np.sin(end)).max() < 1e-7
+        # Of a method of order 2 whose estimate is of the third order, h³ follows the tolerance, and the error h².
+        most = 1e-5 if sw.method(method).order == 2 else 1e-7
+        assert np.abs(run.y[-1] - force - (y - force) * np.cos(end)).max() < most
+        assert np.abs(run.v[-1] + (y - force) * np.sin(end)).max() < most
 
 
 def test_another_force_begins_anew() -> None:

@@ -128,15 +128,17 @@ def test_another_system_acts_from_the_saved_state_on(method: str, members: tuple
     It is the run that begins with the saved state, so its bits are equal, and so is that of an equation of another spelling.
     """
     y = np.linspace(1.0, 2.0, 3) if members else 1.0
-    first = sw.integrate(spring(), method, v=0.0, y=y, tolerance=1e-9, at=[2.5, 5.0], backend=backend)
-    anew = {"v": first.v[-1], "y": first.y[-1], "t0": 5.0, "tolerance": 1e-9, "at": [6.0, 10.0], "backend": backend}
+    # Of a method of order 2 whose estimate is of the third order, h³ follows the tolerance, and the error h².
+    tolerance, most = (1e-6, 1e-3) if sw.method(method).order == 2 else (1e-9, 1e-6)
+    first = sw.integrate(spring(), method, v=0.0, y=y, tolerance=tolerance, at=[2.5, 5.0], backend=backend)
+    anew = {"v": first.v[-1], "y": first.y[-1], "t0": 5.0, "tolerance": tolerance, "at": [6.0, 10.0], "backend": backend}
     for system in (spring(k=4.0), other_spring(), spring(k=np.full(members, 4.0))):
         rest = sw.integrate(system, method, at=[6.0, 10.0], backend=backend, resume=first)
         fresh = sw.integrate(system, method, **anew)
         np.testing.assert_array_equal((rest.v, rest.y), (fresh.v, fresh.y))
         exact = y * (np.cos(5.0) * np.cos(10.0) - np.sin(5.0) / 2.0 * np.sin(10.0))
         # Each of some hundred steps errs by 1e-9 of a length of at most 2·√5, and nothing grows.
-        np.testing.assert_allclose(rest.y[-1], exact, atol=1e-6)
+        np.testing.assert_allclose(rest.y[-1], exact, atol=most)
 
 
 @pytest.mark.parametrize("method", CHOOSE)

@@ -228,6 +228,7 @@ def test_a_step_is_traced_and_compiled_in_time(name: str, monkeypatch: pytest.Mo
     rows = list(compiling.rows(repeats=3))
     assert len(rows) >= 9
     for row in rows:
-        assert row.trace + row.compile < 0.020, row
+        # A step that solves equations has ten times as many operations.
+        assert row.trace + row.compile < (0.2 if sw.method(row.method).is_implicit else 0.020), row
         assert row.computed <= row.written, row
         assert (row.bytes > 0) == (sw.isa() != "interpret"), row

@@ -42,6 +42,9 @@ def test_the_free_oscillator_to_the_bit(method: str) -> None:
     nothing = np.zeros(11)
     linear = sw.integrate(sw.LinearSystem([[nothing, -omega], [omega, nothing]]), method, v=0.3, y=1.0, **RUN)
     own = as_block(sw.integrate(sw.Oscillator(omega), method, v=0.3, y=np.ones(11), **RUN))
+    if sw.method(method).is_implicit:  # by way of y only v is solved for, where a matrix might hold derivatives of ẏ by y
+        assert_close(linear, own, method)
+        return
     np.testing.assert_array_equal(linear.v, own.v)
     np.testing.assert_array_equal(linear.y, own.y)
 

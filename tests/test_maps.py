@@ -15,7 +15,8 @@ from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError
 from stepwell.views.charts.maps import ROUNDING
 from support.truths import CLOSED_FORMS
 
-METHODS = sw.methods()
+METHODS = [method for method in sw.methods() if not method.is_implicit]
+IMPLICIT = [method for method in sw.methods() if method.is_implicit]
 DAMPED = [method for method in METHODS if not method.needs_acceleration]
 UNDAMPED = [method for method in METHODS if method.needs_acceleration]
 
@@ -84,6 +85,13 @@ def test_the_grid(false_euler):
     chart = sw.charts.stability_map("rk4", phi=(1, 2), damping=(0.5, 0.7), size=3)
     assert (chart.phi[0], chart.phi[-1], chart.damping[0], chart.damping[-1]) == pytest.approx((4 / 3, 2, 0.5, 0.7))
     assert sw.charts.stability_map("rk4").radius.shape == (512, 512)
+
+
+@pytest.mark.parametrize("method", IMPLICIT, ids=lambda m: m.name)
+def test_a_map_of_an_implicit_method_is_stable_everywhere(method):
+    chart = sw.charts.stability_map(method, size=(40, 9))
+    assert chart.stable.all()
+    assert chart.observe(300).disagreements == 0
 
 
 @pytest.mark.parametrize("method", DAMPED, ids=lambda m: m.name)

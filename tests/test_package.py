@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell import _core
+from stepwell.reference.implicit import Implicit
 
 REFERENCE = Path(sw.__file__).parent / "reference"
 
@@ -45,8 +46,9 @@ def test_every_record_is_complete(method: sw.Method) -> None:
 
 
 @pytest.mark.parametrize("method", sw.methods(), ids=lambda m: m.name)
-def test_the_recorded_evaluations_are_the_ones_made(method: sw.Method) -> None:
-    """Counted on the reference: one evaluation is one of each block."""
+def test_the_recorded_evaluations_are_the_ones_made(method: sw.Method, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counted on the reference: one evaluation is one of each block. Those for derivatives do not count."""
+    monkeypatch.setattr(Implicit, "_along", lambda *_: [None, None])
 
     class Counting:
         def __init__(self) -> None:

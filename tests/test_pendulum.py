@@ -83,7 +83,8 @@ def test_chosen_steps_are_the_reference_s(method):
         (sw.RestrictedThreeBody(), ARENSTORF),
     ]
     for system, state in runs:
-        arguments = {"tolerance": 1e-7, "at": [0.5, 1.0, 4.0]}
+        # By a method of order 2 a tolerance of 1e-7 takes steps by the thousand.
+        arguments = {"tolerance": 1e-4 if sw.method(method).order == 2 else 1e-7, "at": [0.5, 1.0, 4.0]}
         rust, other = (sw.integrate(system, method, **state, **arguments, backend=b) for b in ("rust", "numpy"))
         np.testing.assert_array_equal(rust.v, other.v)
         np.testing.assert_array_equal(rust.y, other.y)

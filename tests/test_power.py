@@ -37,7 +37,7 @@ def forced(method: sw.Method) -> list[sw.System]:
         sw.Oscillator(1.0, damping, x=np.array([0.5, -2.0])),
         sw.Oscillator(0.9, damping, x=sw.Sampled([0.5, 0.5], 0.1), form="physical"),
     ]
-    if method.has_series:  # it takes the derivatives of a wave, too
+    if method.takes_derivatives_by_time:  # it takes the derivatives of a wave, too
         return steady
     return [
         *steady,
@@ -108,8 +108,11 @@ def test_a_million_million_steps_at_once() -> None:
     assert limit[0] < 0.02
 
 
-# A series takes the derivatives of the wave, which a transition matrix has not, and refuses (test_taylor.py).
-@pytest.mark.parametrize("method", [m for m in METHODS if not (m.needs_acceleration or m.has_series)], ids=lambda m: m.name)
+# Some methods take the derivatives of the wave, which a transition matrix has not, and refuse (test_taylor.py, test_stiff.py).
+SUITED = [m for m in METHODS if not (m.needs_acceleration or m.takes_derivatives_by_time)]
+
+
+@pytest.mark.parametrize("method", SUITED, ids=lambda m: m.name)
 def test_a_thousand_million_driven_steps(method: sw.Method) -> None:
     """Damped, so that only the last steps count: stepping the last few thousand ends in the same state."""
     system = sw.Oscillator(1.0, 0.5, x=sw.Sinusoid(1.0, 0.7, 0.3), a=0.2)

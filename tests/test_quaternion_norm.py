@@ -20,7 +20,7 @@ from support import tops
 from support.truths import CLOSED_FORMS
 
 #: A series has no stages: what is said of them is not of it, and a test of its own has its growth.
-METHODS = [m.name for m in sw.methods() if not (m.needs_acceleration or m.has_series)]
+METHODS = [m.name for m in sw.methods() if not (m.needs_acceleration or m.has_derivatives)]
 
 #: Of the methods with two blocks, that which they are for one block alone: v stands still here.
 ONE_BLOCK = {

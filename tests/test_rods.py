@@ -175,6 +175,9 @@ def test_every_method_has_the_limit_of_its_damped_oscillator(method: str) -> Non
 
     1 % above, an error grows by at least 1 % a step, to e⁷⁵ times itself; it is about 1e-12 and more at the start.
     """
+    if math.isinf(limit(method)):
+        assert stays(method, 20.0, 1.0, 1e-3)
+        return
     assert stays(method, 0.95 * limit(method), 1.0, 1e-3)
     assert not stays(method, 1.01 * limit(method), 1.0, 1e-3)
 

@@ -505,19 +505,31 @@ def test_methods_by_name() -> None:
     np.testing.assert_array_equal(sw.solve_ivp(decay, (0, 10), [1.0], scipy.DOP853).y, default.y)
 
 
-@pytest.mark.parametrize("name", ["RK45", "rk45", "RK23", "Radau", "BDF", "LSODA"])
-def test_methods_that_are_not_here_are_never_replaced(name: str) -> None:
-    stiff = name in ("Radau", "BDF", "LSODA")
-    match = (
-        f"method: {name.upper() if name == 'rk45' else name} is .* here.*{'stay with SciPy' if stiff else 'write one of these: '}"
-    )
+@pytest.mark.parametrize("name", ["RK45", "rk45", "RK23"])
+def test_methods_that_are_not_here_are_not_replaced(name: str) -> None:
+    match = f"method: {name.upper()} is .* here.*write one of these: "
     with pytest.raises(UnknownNameError, match=match) as caught:
         sw.solve_ivp(decay, (0, 10), [1.0], name)
     able = [m.name for m in sw.methods() if m.error_order is not None]
     assert all(repr(each) in str(caught.value) for each in able)
     scipy = pytest.importorskip("scipy.integrate")
     with pytest.raises(UnknownNameError, match=match):
-        sw.solve_ivp(decay, (0, 10), [1.0], getattr(scipy, name.upper() if name == "rk45" else name))
+        sw.solve_ivp(decay, (0, 10), [1.0], getattr(scipy, name.upper()))
+
+
+@pytest.mark.parametrize(
+    ("name", "taken"), [("Radau", "rodas5p"), ("bdf", "rodas4"), ("LSODA", "rodas4"), ("Rosenbrock", "rodas4")]
+)
+def test_methods_for_stiff_equations_are_replaced_by_the_nearest_with_a_warning(name: str, taken: str) -> None:
+    with pytest.warns(UserWarning, match=rf"method: {name} is not here; {taken} is taken".replace("bdf", "BDF")):
+        result = sw.solve_ivp(decay, (0, 10), [1.0], name)
+    np.testing.assert_array_equal(result.y, sw.solve_ivp(decay, (0, 10), [1.0], taken).y)
+    assert result.njev == result.nlu == result.nfev // sw.method(taken).attempt_evaluations
+    assert sw.solve_ivp(decay, (0, 10), [1.0]).njev == 0
+    if name in ("Radau", "LSODA"):
+        scipy = pytest.importorskip("scipy.integrate")
+        with pytest.warns(UserWarning, match=f"{taken} is taken"):
+            sw.solve_ivp(decay, (0, 10), [1.0], getattr(scipy, name))
 
 
 def test_methods_that_cannot_choose_their_steps() -> None:

@@ -54,7 +54,7 @@ def test_at_an_equilibrium_it_is_the_limit_there(method: str) -> None:
         assert abs(along.mode.rate - there.mode.rate) <= 1e-8 * abs(there.mode.rate)
 
 
-@pytest.mark.parametrize("method", [m.name for m in sw.methods()])
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if not m.is_implicit or m.name == "rosenbrock23"])
 def test_scaled_limits_are_those_that_are_tried(method: str) -> None:
     """Of forces with an energy: one search for each direction of λ, or steps of many lengths for each state."""
     members = 1 if sw.method(method).has_series else 5  # the steps of a series go number by number

@@ -267,12 +267,12 @@ def test_broken_criteria_silence_what_is_stiff(monkeypatch: pytest.MonkeyPatch, 
 
 def test_the_method_to_take_is_one_that_is_stable(monkeypatch: pytest.MonkeyPatch) -> None:
     """There may be none; of several it goes by the tolerance."""
-    explicit = tuple(m for m in sw.methods() if m.family not in all_methods.STABLE_FAMILIES)
+    explicit = tuple(m for m in sw.methods() if not m.is_always_stable)
     monkeypatch.setattr(all_methods, "methods", lambda: explicit)
     assert all_methods.for_stiff(1e-6) is None
     (text,) = told(method="merson", tolerance=1e-4, **PROBLEMS["driven"])[1]
     assert text.endswith("(stiff equations); SciPy's Radau and LSODA are for them")
-    common = {"error_order": 3, "family": "Rosenbrock", "needs_acceleration": False, "has_series": False}
+    common = {"error_order": 3, "is_always_stable": True, "needs_acceleration": False, "has_series": False}
     loose, tight = (SimpleNamespace(name=f"implicit_{order}", order=order, **common) for order in (2, 5))
     fixed = SimpleNamespace(**{**vars(tight), "error_order": None, "order": 6})
     monkeypatch.setattr(all_methods, "methods", lambda: (*explicit, loose, tight, fixed))

@@ -415,13 +415,16 @@ def test_a_function_alone_makes_the_run_once(monkeypatch: pytest.MonkeyPatch) ->
     from stepwell.studies.sweeps import task
 
     lengths: list[int] = []
-    original = task.quietly
 
-    def counted(*args: Any, **options: Any) -> sw.Run:
-        lengths.append(options["steps"])
-        return original(*args, **options)
+    def counting(original: Any) -> Any:
+        def counted(*args: Any, **options: Any) -> Any:
+            lengths.append(options["steps"])
+            return original(*args, **options)
 
-    monkeypatch.setattr(task, "quietly", counted)
+        return counted
+
+    monkeypatch.setattr(task, "quietly", counting(task.quietly))
+    monkeypatch.setattr(task.Pieces, "make", counting(task.Pieces.make))
 
     def end(run: sw.Run) -> Any:
         return run.y[-1]

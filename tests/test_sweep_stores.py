@@ -273,7 +273,14 @@ def test_after_a_signal_in_the_middle(sent: signal.Signals, ending: str, tmp_pat
     written: dict[Path, int] = {}
     chunks = 27  # three of two, two and one member for each of nine values
     for least in (3, 10):
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        # Processes begun from a shell's background ignore Ctrl-C, and so would this one.
+        process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )
         until = time.monotonic() + 60
         while finished_chunks(store) < least and process.poll() is None and time.monotonic() < until:
             time.sleep(0.01)

@@ -187,7 +187,7 @@ def test_at_two_both_roots_of_false_euler_are_minus_one(chart):
 def test_the_ladder_is_round_and_goes_past_the_largest_limit(chart):
     assert {0.5, 1.0, 1.5, 2.0, 2.5, 3.0} <= set(chart.phi.tolist())
     assert chart.phi[0] > 0
-    assert chart.phi[-1] >= 1.1 * max(method.limit for method in METHODS)
+    assert chart.phi[-1] >= 1.1 * max(method.limit for method in METHODS if method.limit < math.inf)
     assert len(chart.phi) == 200 * chart.phi[-1]
     assert (largest([0.0]), largest([2.83, math.inf]), largest([3.4641])) == (2.5, 3.5, 4.0)
     assert ladder(0.001).tolist() == [0.001]
@@ -273,7 +273,11 @@ def test_a_picture_is_whole(kind, methods, tmp_path):
     names = [[c.method.title for c in same] if len(same) > 1 else [style.named(same[0].method)] for same in shared]
     assert [" ".join(title[:-1]) for title in titles] == [", ".join(each) for each in names]
     first = [same[0] for same in shared]
-    assert [title[-1] for title in titles] == [f"stable for Φ < {c.limit:.5g}" if c.limit else "never stable" for c in first]
+    limits = [(c.limit, c.method) for c in first]
+    stable = ["every Φ" if method.is_implicit else f"Φ < {limit:.5g}" for limit, method in limits]
+    assert [title[-1] for title in titles] == [
+        f"stable for {each}" if limit else "never stable" for each, (limit, _) in zip(stable, limits, strict=True)
+    ]
 
 
 def test_what_is_the_same_shares_a_panel():
@@ -341,7 +345,7 @@ def test_the_curves_are_exact_and_series_with_the_limit(chart):
             assert has_line(axes, locus.phi, np.where(pair, np.nan, exact))
             assert has_line(axes, locus.phi, series)
             upright = [line[0, 0] for line in lines(axes) if len(line) == 2 and line[0, 0] == line[1, 0]]
-            assert upright == ([float(locus.limit)] if locus.limit else [])
+            assert upright == ([float(locus.limit)] if 0.0 < locus.limit < math.inf else [])
         assert radius.get_yscale() == "symlog"
         assert any(patch.get_hatch() for patch in radius.patches)
     assert figure.axes[0].get_ylabel() == "r₁² − 1"

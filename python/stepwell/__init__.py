@@ -15,8 +15,11 @@ from . import _core
 from .base import registry
 
 registry.register(
+    algebraic_rates="stepwell.analysis.consistency:rates",
+    algebraic_start="stepwell.analysis.consistency:check_start",
     animate_run="stepwell.views.charts.runs_animation:animate",
     draw_advice="stepwell.views.charts.advice_picture:draw",
+    derivatives_of_rates="stepwell.analysis.derivatives.traced:of_rates",
     draw_control="stepwell.views.charts.control_picture:draw",
     draw_curves="stepwell.views.charts.zplane_picture:curves",
     draw_eigenvalues="stepwell.views.charts.roots_picture:draw",

@@ -4,6 +4,7 @@ from . import scenes as scenes
 from .analysis import derivatives as derivatives
 from .analysis import dynamics as dynamics
 from .analysis import stability as stability
+from .analysis.consistency import consistent_start as consistent_start
 from .analysis.dynamics import equilibria as equilibria
 from .analysis.dynamics import jacobian as jacobian
 from .analysis.dynamics import lyapunov as lyapunov

@@ -213,11 +213,12 @@ class Tape:
         quantities: list[tuple[str, Symbol]] = ...,
         kept: tuple[Symbol, list[Symbol], list[Symbol], Symbol] | None = None,
         functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]], tuple[float, float] | None]] = ...,
+        mass: list[list[tuple[int, float]]] | None = None,
     ) -> Equations:
         """These values as the rates of a system; without ``dy``, ẏ is v.
 
         ``functions`` are values with, for each that they depend on, the derivative by it; and, of one branch of several, its
-        bounds.
+        bounds. ``mass`` is the mass matrix: of each row the columns and entries that are not zero.
 
         ``kept`` is an invariant that a projection keeps: its value, its derivatives by v and by y, the square of their length.
         """

@@ -17,6 +17,7 @@ from stepwell.errors import ArgumentError, TraceError, UnsupportedError
 from stepwell.reference.series import expanded
 from stepwell.reference.traced import Tracer
 
+from support import families
 from support import own_systems as own
 from support.families import family
 
@@ -300,11 +301,18 @@ class Case:
 
 #: The most numbers of a state in a system of these tests whose series is not too long.
 MOST_IN_SERIES = 60
+#: The most velocities of bodies of which each pulls each other, for a method that solves equations; and the most numbers of a
+#: state for one, but in the long run: its reference derives rates number by number. rust/core/tests/large.rs has larger ones.
+MOST_TO_SOLVE, MOST_TO_DERIVE = 60, 24
 
 
 def fits(system: sw.System, method: sw.Method) -> bool:
     """Whether the method can step the system."""
     if method.has_series and int(np.prod(system.y_shape)) > MOST_IN_SERIES:
+        return False
+    if method.is_implicit and isinstance(system, sw.NBody) and int(np.prod(system.v_shape)) > MOST_TO_SOLVE:
+        return False  # a full matrix of so many rows; test_stiff.py has what is then said
+    if method.is_implicit and not families.LONG and int(np.prod(system.v_shape) + np.prod(system.y_shape)) > MOST_TO_DERIVE:
         return False
     if method.has_series and (getattr(system, "push", None) or not getattr(system.control, "between", True)):
         return False  # a series of what a control pushes would not be that of the motion
@@ -325,7 +333,7 @@ def cases(methods: Iterator[str] | None = None) -> Iterator[Case]:
         if not fits(instance, record) or (record.has_series and system in DIVERGE_IN_SERIES):
             continue
         waves = any(isinstance(x, sw.Sinusoid) for x in instance.given_inputs().values())
-        forms = ["direct"] + ["matrix"] * (instance.linear and not (record.has_series and waves))
+        forms = ["direct"] + ["matrix"] * (instance.linear and not (record.takes_derivatives_by_time and waves))
         if "matrix" in forms and all(isinstance(x, sw.Sinusoid) or x.constant for x in instance.given_inputs().values()):
             forms.append("power")
         for form in forms:
@@ -377,6 +385,12 @@ SOME = pytest.mark.parametrize("some", family([2, None], lambda some: some is no
 def drawn(methods: Sequence[sw.Method], some: int | None, *salt: Any) -> list[sw.Method]:
     """So many of these methods, always the same of the same words."""
     return sorted(methods, key=lambda method: number(method.name, *salt))[:some]
+
+
+def few_implicit(methods: Sequence[sw.Method], some: int, *salt: Any) -> list[sw.Method]:
+    """All explicit ones, and so many of the implicit ones, which are made of the same parts; in the long run all."""
+    implicit = [method for method in methods if method.is_implicit]
+    return [m for m in methods if not m.is_implicit] + drawn(implicit, None if families.LONG else some, *salt)
 
 
 def assert_same(a: sw.Run, b: sw.Run) -> None:

@@ -46,7 +46,8 @@ def functions(precision: Precision) -> dict[str, Any]:
     def on_bits(f: Any) -> Any:
         return lambda *of: np.asarray(f(*map(as_bits, of))).view(number)
 
-    return {"sqrt": np.sqrt, "floor": np.floor, "fma": fma} | {name: on_bits(f) for name, f in ON_BITS.items()}
+    others = {"sqrt": np.sqrt, "floor": np.floor, "fma": fma, "magnitude": np.abs}
+    return others | {name: on_bits(f) for name, f in ON_BITS.items()}
 
 
 #: By dtype the type of constants, and what formulas call.
@@ -118,6 +119,7 @@ def evaluate(explained: sw.Explanation, known: dict[str, Any], tables: dict[str,
                 text = NAME.sub(plain, line.formula)
                 for sign, python in SIGNS:
                     text = text.replace(sign, python)
+                text = re.sub(r"\|([^|]+)\|", r"magnitude(\1)", text)
                 assert line.name not in places, f"{line.name} twice"
                 places[line.name] = f"name_{len(places)}"
                 out[line.name] = numbered[places[line.name]] = _value(

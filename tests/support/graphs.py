@@ -10,7 +10,7 @@ import pytest
 import stepwell as sw
 from stepwell.runs import engine
 
-from support.cases import fits
+from support.cases import few_implicit, fits
 from support.tracing import METHODS
 
 #: Bodies whose graphs are compared with one method of each kind alone: they have tens of thousands of operations.
@@ -33,6 +33,6 @@ def model(system: sw.System, method: sw.Method, *, single: bool = False) -> Any:
 
 def methods(system: sw.System) -> Iterator[sw.Method]:
     large = int(np.prod(system.v_shape)) > MANY
-    for method in METHODS[:4] if large else METHODS:
+    for method in METHODS[:4] if large else few_implicit(METHODS, 3, "graph", str(system)):
         if fits(system, method):
             yield method

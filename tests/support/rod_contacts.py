@@ -22,7 +22,7 @@ RESETTING = sw.Projection("length")
 METHODS = [m.name for m in sw.methods() if not m.needs_acceleration]
 
 #: Methods whose velocity is not at the same time as y (tests/support/contacts.py).
-LAGGING = ("standard_euler", "damped_euler", "false_euler", "false_heun")
+LAGGING = ("standard_euler", "damped_euler", "false_euler", "false_heun", "backward_euler", "linearly_implicit_euler")
 
 
 def dumb_bell(masses: Any = (1.0, 1.0), gravity: float = G, **options: Any) -> sw.Rods:

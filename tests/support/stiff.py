@@ -7,45 +7,14 @@ from typing import Any
 
 import numpy as np
 import stepwell as sw
+from stepwell.scenes.stiff_equations import hires, oregonator, van_der_pol
+from stepwell.scenes.stiff_equations import rober as robertson
+
+#: The scenes on which explicit methods diverge with the usual step.
+SCENES = ("hires", "oregonator", "rober", "van_der_pol")
 
 #: Methods that choose their steps, and are stable with short ones only.
-EXPLICIT = [m.name for m in sw.methods() if m.error_order is not None and m.family != "Rosenbrock"]
-
-
-@sw.system(order=1)
-def robertson(t: Any, y: Any) -> Any:
-    """Robertson's reaction; the constants are the document's of the Test Set for IVP Solvers, as are those of the next two."""
-    a, c = -0.04 * y[0] + 1e4 * y[1] * y[2], 3e7 * y[1] ** 2
-    return np.array([a, -a - c, c])
-
-
-@sw.system(order=1)
-def oregonator(t: Any, y: Any) -> Any:
-    return np.array(
-        [77.27 * (y[1] + y[0] * (1 - 8.375e-6 * y[0] - y[1])), (y[2] - (1 + y[0]) * y[1]) / 77.27, 0.161 * (y[0] - y[2])]
-    )
-
-
-@sw.system(order=1)
-def hires(t: Any, y: Any) -> Any:
-    last = 280.0 * y[5] * y[7] - 1.81 * y[6]
-    return np.array(
-        [
-            -1.71 * y[0] + 0.43 * y[1] + 8.32 * y[2] + 0.0007,
-            1.71 * y[0] - 8.75 * y[1],
-            -10.03 * y[2] + 0.43 * y[3] + 0.035 * y[4],
-            8.32 * y[1] + 1.71 * y[2] - 1.12 * y[3],
-            -1.745 * y[4] + 0.43 * (y[5] + y[6]),
-            -280.0 * y[5] * y[7] + 0.69 * y[3] + 1.71 * y[4] - 0.43 * y[5] + 0.69 * y[6],
-            last,
-            -last,
-        ]
-    )
-
-
-@sw.system
-def van_der_pol(t: Any, v: Any, y: Any, *, mu: Any = 1000.0) -> Any:
-    return mu * (1.0 - y * y) * v - y
+EXPLICIT = [m.name for m in sw.methods() if m.error_order is not None and not m.is_always_stable]
 
 
 @sw.system(order=1)

@@ -203,6 +203,12 @@ def _of_run(name: str) -> Callable[..., Any]:
     return getattr(sw.integrate(**FREE, dt=0.1, steps=3, every=1), name)
 
 
+@sw.system(order=1, mass=[[1.0, 0.0], [0.0, 0.0]])
+def divider(t: Any, y: Any) -> Any:
+    """A charge, and the current that it drives."""
+    return [-y[1], y[0] - 2.0 * y[1]]
+
+
 FILES = TemporaryDirectory()
 
 
@@ -322,6 +328,9 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "scenes.gimbal_trap": (sw.scenes.gimbal_trap, {"form": "quaternion", "roll": 2.0, "torque": -1.5}),
     "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None, "force": None}),
     "World events": (_world, FREE | {"dt": 0.1, "events": [sw.Event(passage)]}),
+    "scenes.rober": (sw.scenes.rober, {"horizon": 40.0}),
+    "scenes.oregonator": (sw.scenes.oregonator, {"horizon": 360.0}),
+    "scenes.van_der_pol": (sw.scenes.van_der_pol, {"mu": 10.0}),
     "scenes.scene": (sw.scenes.scene, {"name": "clover"}),
     "scenes.chain": (sw.scenes.chain, {"n": 4, "modes": {1: 1.0}}),
     "scenes.bouncing_ball": (sw.scenes.bouncing_ball, {"restitution": 0.8, "height": 1.0, "gravity": 9.81}),
@@ -364,6 +373,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         sw.stability_along,
         {"run": sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=4, every=2), "method": "false_euler"},
     ),
+    "consistent_start": (sw.consistent_start, {"system": divider(), "y": [1.0, 0.0], "t0": 0.0}),
+    "stability function": (sw.stability.function, {"method": "rodas4"}),
     "jacobian": (sw.jacobian, {"system": sw.Pendulum(), "v": 0.0, "y": 1.0, "t": 0.0}),
     "equilibria": (
         sw.equilibria,

@@ -172,7 +172,7 @@ class _Factors:
 
         if sum(maps.size(self._system)) > SMALL_SYSTEM:
             return "use a shorter step; stability_limit says how short"
-        if self._dt < 0.0:
+        if self._dt < 0.0 or self._method.is_implicit:  # whose growth is not that of a linear system
             return "use a shorter step"
         own, t, v, y = self._own(np.array([member]))
         if v is None and not self._system.batch:

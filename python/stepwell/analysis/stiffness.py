@@ -19,10 +19,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Array, Shape, Whole
+from ..base.immutable import by_value
 from ..base.reprs import first_of, share
 from ..errors import StiffnessWarning, UnsupportedError
 from ..model.compatibility import fits_together
-from ..model.methods import STABLE_FAMILIES, Method, for_stiff
+from ..model.methods import Method, for_stiff
 from ..model.methods import method as find_method
 from ..model.systems import LinearSystem
 from ..reference import adaptive
@@ -91,56 +92,118 @@ class Held(NamedTuple):
     rate: Complex
 
 
+class Course(NamedTuple):
+    """A run with adaptive steps after its end.
+
+    Attributes:
+        plan: of the run.
+        tolerance: the relative tolerance, the least of all.
+        jumps: the times that no step crosses, as ``Pacing`` has them, or None.
+        status: how members ended, shape (*batch).
+        paces: their step-size controllers at the end, shape (numbers, *batch).
+        v: their velocities at the end.
+        y: their coordinates there.
+        way: 1, or −1 where the user's time runs back.
+    """
+
+    plan: engine.Plan
+    tolerance: float
+    jumps: Array | None
+    status: Any
+    paces: Array
+    v: Array
+    y: Array
+    way: float
+
+
+@by_value
+class Stiff(NamedTuple):
+    """Members whose steps were held down by stability, and that did not stop.
+
+    Attributes:
+        members: their places in the flattened batch.
+        first: the place of the first of them in the batch.
+        why: the limit there, how much longer steps the tolerance allows, and what to do.
+    """
+
+    members: Whole
+    first: Shape
+    why: str
+
+    @property
+    def number(self) -> int:
+        """How many members are stiff."""
+        return len(self.members)
+
+
+#: What is said of stiff members, before it is said why.
+HELD_DOWN = "stability, and not the tolerance, held down the steps of"
+
+
+def course_of(run: Run, request: Request) -> Course:
+    """The course of a run."""
+    end, control = run.controller_state, request.step_control
+    assert end is not None
+    assert control is not None
+    least = float(np.min(control.paces[engine.RELATIVE]))
+    way = -1.0 if request.plan.backward else 1.0
+    return Course(request.plan, least, control.pacing.jumps, run.status, end.pace, end.v, end.y, way)
+
+
 def finding_of(run: Run, request: Request, waypoints: Array) -> Finding | None:
     """The finding for the members whose steps were held down by stability, and that did not stop; None if there is none."""
-    if run.method.family in STABLE_FAMILIES or not (seen := _suspects(request.plan, waypoints)):
+    stiff = stiff_members(course_of(run, request), waypoints)
+    if stiff is None:
         return None
-    status = run.status.reshape(-1)[seen]
+    members = np.zeros(run.status.shape, dtype=bool)
+    members.reshape(-1)[stiff.members] = True
+    who = f"{share(stiff.number, members.shape, members.size)}{first_of(stiff.number, stiff.first, members.size)}"
+    return Finding(StiffnessWarning, f"{HELD_DOWN} {who}{';' if members.size > 1 else ':'} {stiff.why}", members)
+
+
+def stiff_members(course: Course, waypoints: Array) -> Stiff | None:
+    """The members whose steps were held down by stability, and that did not stop; None if there is none."""
+    if course.plan.method.is_always_stable or not (seen := _suspects(course.plan, waypoints)):
+        return None
+    status = course.status.reshape(-1)[seen]
     suspects = np.array(seen)[(status == Status.OK) | (status == Status.EVENT)]
     if not suspects.size:
         return None
-    verdicts = _verdicts(request, _stands(run, request, waypoints, suspects))
+    verdicts = _verdicts(course, _stands(course, waypoints, suspects))
     stiff = np.array([verdict.ratio > 0.0 for verdict in verdicts])
     held = stiff.sum(axis=0) >= 2
     if not held.any():
         return None
     k = int(held.argmax())
     verdict = verdicts[int(stiff[:, k].argmax())]
-    members = np.zeros(run.status.size, dtype=bool)
-    members[suspects[held]] = True
-    members = members.reshape(run.status.shape)
-    first, number = tuple(np.argwhere(members)[0].tolist()), int(held.sum())
-    who = f"{share(number, members.shape, members.size)}{first_of(number, first, members.size)}"
-    text = (
-        f"stability, and not the tolerance, held down the steps of {who}{';' if members.size > 1 else ':'} "
-        f"{_in_words(request, verdict, k, f'at t = {verdict.t[k]:g}')}, where the tolerance allows {_times(verdict.ratio[k])} as "
-        f"long (stiff equations); {_advice(run, request)}"
-    )
-    return Finding(StiffnessWarning, text, members)
+    limit = _in_words(course.plan, verdict, k, f"at t = {verdict.t[k]:g}")
+    why = f"{limit}, where the tolerance allows {_times(verdict.ratio[k])} as long (stiff equations); {_advice(course)}"
+    first = np.unravel_index(int(suspects[k]), course.status.shape) if course.status.shape else ()
+    return Stiff(suspects[held], tuple(map(int, first)), why)
 
 
 def held_by_stability(run: Run, request: Request, waypoints: Sequence[Array], index: Shape) -> str:
     """The end of the message for a member that ran out of attempts: whether stability held down its steps."""
-    if run.method.family in STABLE_FAMILIES:
+    course = course_of(run, request)
+    if course.plan.method.is_always_stable:
         return ""
-    place = np.array([np.ravel_multi_index(index, run.status.shape) if index else 0])
+    place = np.array([np.ravel_multi_index(index, course.status.shape) if index else 0])
     rows = waypoints[0] if waypoints else None
-    verdicts = _verdicts(request, _stands(run, request, rows, place))
+    verdicts = _verdicts(course, _stands(course, rows, place))
     stiff = [bool(verdict.ratio[0] > 0.0) for verdict in verdicts]
     if not (stiff[0] or sum(stiff) >= 2):
         return ", not held down by stability"
     verdict = verdicts[stiff.index(True)]
     there = "there" if stiff[0] else f"at t = {verdict.t[0]:g}"
-    return (
-        f", held down by stability and not by accuracy: {_in_words(request, verdict, 0, there)} (stiff equations: the tolerance "
-        f"allows {_times(verdict.ratio[0])} as long; {_advice(run, request)})"
-    )
+    limit, ratio = _in_words(course.plan, verdict, 0, there), _times(verdict.ratio[0])
+    equations = f"(stiff equations: the tolerance allows {ratio} as long; {_advice(course)})"
+    return f", held down by stability and not by accuracy: {limit} {equations}"
 
 
-def _in_words(request: Request, verdict: Held, k: int, where: str) -> str:
+def _in_words(plan: engine.Plan, verdict: Held, k: int, where: str) -> str:
     """The fastest rate and the longest stable step, in words."""
     rate = complex(verdict.rate[k])
-    limit = limit_of(request.plan.method, request.plan.order, rate)
+    limit = limit_of(plan.method, plan.order, rate)
     return f"the fastest rate {where}, 1/{1.0 / abs(rate):.3g}, lets no steps beyond {limit:.3g} be stable"
 
 
@@ -149,13 +212,12 @@ def _times(ratio: float) -> str:
     return "more than 1000 times" if ratio >= MOST_RATIO else f"about {float(f'{ratio:.1g}'):g} times"
 
 
-def _advice(run: Run, request: Request) -> str:
+def _advice(course: Course) -> str:
     """What to take for stiff equations."""
-    assert request.step_control is not None
-    instead = for_stiff(float(np.min(request.step_control.paces[engine.RELATIVE])))
+    instead = for_stiff(course.tolerance)
     if instead is not None:
         try:
-            fits_together(run.system, instead)
+            fits_together(course.plan.system, instead)
         except UnsupportedError:
             instead = None
     return "SciPy's Radau and LSODA are for them" if instead is None else f'"{instead.name}" is stable there'
@@ -230,13 +292,12 @@ def _rounding(plan: engine.Plan) -> float:
     return adaptive.SINGLE_ROUNDING if plan.single else adaptive.ROUNDING
 
 
-def _stands(run: Run, request: Request, waypoints: Array | None, members: Whole) -> list[Stand]:
+def _stands(course: Course, waypoints: Array | None, members: Whole) -> list[Stand]:
     """Where members stand at the end, and where they stood at their last waypoints, the later one first."""
-    end = run.controller_state
-    assert end is not None
-    shapes, size = (run.system.v_shape, run.system.y_shape), run.status.size
-    blocks = [block.reshape(*shape, size)[..., members] for block, shape in zip((end.v, end.y), shapes, strict=True)]
-    stands = [Stand(members, end.pace.reshape(-1, size)[:, members], *blocks)]
+    system, size = course.plan.system, course.status.size
+    shapes = system.v_shape, system.y_shape
+    blocks = [block.reshape(*shape, size)[..., members] for block, shape in zip((course.v, course.y), shapes, strict=True)]
+    stands = [Stand(members, course.paces.reshape(-1, size)[:, members], *blocks)]
     if waypoints is None:
         return stands
     n_v, n = prod(shapes[0]), prod(shapes[0]) + prod(shapes[1])
@@ -251,18 +312,17 @@ def _stands(run: Run, request: Request, waypoints: Array | None, members: Whole)
     return stands
 
 
-def _verdicts(request: Request, stands: Sequence[Stand]) -> list[Held]:
+def _verdicts(course: Course, stands: Sequence[Stand]) -> list[Held]:
     """What holds down the steps from each of some places where members stand, found for all together."""
-    held = _held(request, Stand(*(np.concatenate(each, axis=-1) for each in zip(*stands, strict=True))))
+    held = _held(course, Stand(*(np.concatenate(each, axis=-1) for each in zip(*stands, strict=True))))
     return [Held(*each) for each in zip(*(np.split(numbers, len(stands)) for numbers in held), strict=True)]
 
 
-def _held(request: Request, stand: Stand) -> Held:
+def _held(course: Course, stand: Stand) -> Held:
     """What holds down the steps from where members stand."""
-    assert request.step_control is not None
-    plan, jumps = Members(request.plan._replace(progress=None)).plan(stand.members), request.step_control.pacing.jumps
+    plan, jumps = Members(course.plan._replace(progress=None)).plan(stand.members), course.jumps
     if jumps is not None and jumps.ndim > 1:
-        jumps = np.broadcast_to(jumps, (len(jumps), *request.plan.batch)).reshape(len(jumps), -1)[:, stand.members]
+        jumps = np.broadcast_to(jumps, (len(jumps), *course.plan.batch)).reshape(len(jumps), -1)[:, stand.members]
     paces = np.array(stand.paces)
     paces[[engine.EXTRA, engine.HELD, *range(engine.COUNTS.start, engine.COUNTS.stop)]] = 0.0
     t, most = paces[engine.TIME], paces[engine.MOST_STEP].copy()
@@ -281,13 +341,12 @@ def _held(request: Request, stand: Stand) -> Held:
         ratio = np.where((ratio >= STIFF) & (natural.lengths(plan).max(axis=0) < 0.99 * bound), ratio, 0.0)
     rate = np.zeros(len(t), dtype=np.complex128)
     suspects = np.flatnonzero(ratio)
-    n = prod(request.system.v_shape) + prod(request.system.y_shape)
+    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
     for some in np.array_split(suspects, -(-len(suspects) * n * n // MOST_NUMBERS)) if suspects.size else ():
         rate[some] = _fastest(plan, some, t[some], stand.v[..., some], stand.y[..., some])
     reach = step * np.abs(rate) / limit_of(plan.method, plan.order, -1.0)
     ratio = np.where((reach >= NEAR) & (reach <= BEYOND), ratio, 0.0)
-    sign = -1.0 if plan.backward else 1.0
-    return Held(ratio, sign * t, rate)
+    return Held(ratio, course.way * t, rate)
 
 
 def _smooth_for(plan: engine.Plan, v: Array, y: Array, paces: Array) -> Array:

@@ -7,13 +7,16 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..analysis.stiffness import HELD_DOWN, Course, stiff_members
 from ..base import checks
 from ..base.arrays import Array
 from ..errors import ArgumentError, ShapeError
 from ..model.methods import Method
 from ..reference import adaptive
 from ..reference.acceptance import Acceptance
+from ..reference.adaptive import waypoints
 from ..runs import engine
+from ..runs.diagnostics import may_be_stiff
 
 #: The most attempts at steps in one run: up to here the counts of the step-size controller are exact.
 MAX_ATTEMPTS = 2**53 - 1
@@ -44,11 +47,13 @@ class Trajectory:
         acceptance = Acceptance(tuple(range(len(y))), own=of_groups)
         self._plan = engine.Plan(system, method, (), 1.0, span[0], threads=1, acceptance=acceptance)
         self._model = engine.model(self._plan)
-        self._method, self.begin, self.end = method, *span
+        self.method, self.begin, self.end = method, *span
         self._v = np.empty(0)
         self.times, self.states = [span[0]], [y]
         tolerances = engine.Tolerances(relative, absolute, of_groups)
-        pacing = engine.Pacing(np.array([span[1]]), MAX_ATTEMPTS)
+        pacing = engine.Pacing(np.array([span[1]]), MAX_ATTEMPTS, waypoints=not method.is_always_stable)
+        self._tolerance, self._last = float(relative.min()), y
+        self._waypoints = engine.room_for_waypoints(pacing, len(y), engine.pace_numbers(self._plan), 1)
         self.pace: Any = engine.begun(self._plan, engine.paces(self._plan, None, tolerances, None, pacing), self._v, y)
         self.status = adaptive.BUDGET
         self.extra_steps = 0
@@ -62,7 +67,7 @@ class Trajectory:
     def evaluations(self) -> int:
         """Function evaluations so far."""
         attempts = self.pace.accepted + self.pace.rejected + self.pace.extra_steps
-        return self._method.attempt_evaluations * (int(attempts) + self.extra_steps)
+        return self.method.attempt_evaluations * (int(attempts) + self.extra_steps)
 
     def advance(self) -> bool:
         """Make one accepted step, by as many attempts as it takes. Return whether there was one."""
@@ -70,6 +75,9 @@ class Trajectory:
             accepted = float(self.pace.accepted)
             attempts = int(accepted + self.pace.rejected) + 1
             saved, last = self._continued(self.pace, self.states[-1], np.array([self.end]), attempts)
+            self._last = last
+            if self._waypoints is not None and waypoints.is_near(int(self.pace.accepted)):
+                waypoints.keep(self._waypoints, accepted, self.pace, self._v, last)
             if self.status == adaptive.OK:
                 self.times.append(self.end)
                 self.states.append(saved[0])
@@ -82,7 +90,7 @@ class Trajectory:
 
     def advance_to_the_end(self, times: Array) -> Array:
         """Continue to the end; return the states at these ascending times, up to the last one reached."""
-        saved, _ = self._continued(self.pace, self.states[-1], times, MAX_ATTEMPTS)
+        saved, self._last = self._continued(self.pace, self.states[-1], times, MAX_ATTEMPTS, self._waypoints)
         return saved[: len(times) if self.status == adaptive.OK else int((times <= float(self.pace.t)).sum())]
 
     def state(self, t: float) -> Array:
@@ -119,14 +127,28 @@ class Trajectory:
         self.extra_steps += len(times)
         return saved
 
-    def _continued(self, pace: Any, y: Array, times: Array, attempts: int) -> tuple[Array, Array]:
-        """Continue from a state of the controller and a state; return the states at these times, and the last state."""
+    def stiffness(self, way: float) -> str:
+        """That stability held down the steps, and what to do, in words; "" if it did not. ``way`` is −1 where time runs back."""
+        if self._waypoints is None or not may_be_stiff(int(self.pace.accepted), len(self.states[0])):
+            return ""
+        status = np.asarray(adaptive.OK if self.status == adaptive.BUDGET else self.status)  # an event may have ended it
+        course = Course(self._plan, self._tolerance, None, status, engine.numbers_of(self.pace), self._v, self._last, way)
+        stiff = stiff_members(course, self._waypoints)
+        return "" if stiff is None else f"{HELD_DOWN} the run: {stiff.why}"
+
+    def _continued(self, pace: Any, y: Array, times: Array, attempts: int, passed: Array | None = None) -> tuple[Array, Array]:
+        """Continue from a state of the controller and a state; return the states at these times, and the last state.
+
+        ``passed`` gets where the trajectory stands on the way.
+        """
         n = len(y)
         saved_v, saved_y = np.empty((len(times), 0)), np.empty((len(times), n))
         last, status = np.empty((n, 1)), np.empty(1, dtype=np.int64)
         paces = engine.numbers_of(pace).reshape(-1, 1)
         last_paces = np.empty_like(paces)
-        arrays = engine.AdaptiveArrays(np.empty((0, 1)), y.reshape(n, 1), paces, saved_v, saved_y, last, last_paces, status)
+        arrays = engine.AdaptiveArrays(
+            np.empty((0, 1)), y.reshape(n, 1), paces, saved_v, saved_y, last, last_paces, status, None, None, passed
+        )
         _core.adapt(self._model, self._plan, engine.pacing_of_core(self._plan, engine.Pacing(times, attempts)), arrays)
         self.pace, self.status = engine.pace_of(self._plan, last_paces.reshape(-1)), int(status[0])
         return saved_y, last.reshape(n)

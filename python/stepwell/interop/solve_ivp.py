@@ -10,9 +10,10 @@ import numpy as np
 
 from ..base import checks
 from ..base.arrays import Array
-from ..errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning
+from ..errors import ArgumentError, DTypeError, ShapeError, StiffnessWarning, ToleranceWarning
 from ..model.equations.definition import Definition
 from ..reference import adaptive
+from ..runs.findings import is_heard
 from .ivp_events import Event, note_zeros
 from .ivp_function import RightHandSide, arguments, takes
 from .ivp_methods import chosen
@@ -35,8 +36,8 @@ class OdeResult(dict[str, Any]):
         t_events: for each event function the times at which it was zero, or None.
         y_events: the states at these times, or None.
         nfev: number of function evaluations.
-        njev: 0, since no Jacobian is needed.
-        nlu: 0.
+        njev: the number of Jacobians: one for each attempt at a step that solves equations, and else 0.
+        nlu: the number of factored matrices, likewise.
         status: 0 if the end was reached, 1 if an event ended the run, −1 if a step failed.
         message: the status in words.
         success: whether ``status`` is 0 or 1.
@@ -99,8 +100,9 @@ def solve_ivp(
         fun: ``fun(t, y, *args)``, which returns ẏ: a function, a method or another callable that is written in Python.
         t_span: the times (t0, tf) of start and end; tf may be earlier than t0.
         y0: the state at t0, shape (n,).
-        method: the name of a method with an ``error_order``: "dop853", "fehlberg", "fehlberg_5", "merson", by any of their names;
-            None for "dop853".
+        method: the name of a method with an ``error_order``: "dop853", "fehlberg", "fehlberg_5", "merson", and for stiff
+            equations "rosenbrock23", "rodas4", "rodas5p", by any of their names; None for "dop853". For "Radau" it is "rodas5p",
+            and for "BDF" and "LSODA" "rodas4", with a warning.
         t_eval: the times at which to return the state, in the direction of the run; None for the ends of the steps. Steps do not
             depend on them.
         dense_output: whether to return ``sol``, which gives the state at any time.
@@ -116,7 +118,7 @@ def solve_ivp(
         rtol: tolerated error of a component in a step, relative to its size before and after the step; a number, or one for each
             component, shape (n,).
         atol: the absolute error of a component that is tolerated in addition, likewise.
-        jac: for methods for stiff equations, which stepwell does not have; ignored with a warning, as in SciPy.
+        jac: ignored with a warning: methods for stiff equations take derivatives from the operations of ``fun``.
         jac_sparsity: likewise.
         lband: likewise.
         uband: likewise.
@@ -130,6 +132,12 @@ def solve_ivp(
         ArgumentError: if an argument is wrong.
         TraceError: if an operation of ``fun`` cannot be traced.
         UnknownNameError: if there is no such method; for a method of SciPy that stepwell lacks, it says what to write.
+
+    Warns:
+        StiffnessWarning: if stability held down the steps, and not the tolerance: with the limit, how much longer steps the
+            tolerance allows, and the method to take.
+        ToleranceWarning: if ``rtol`` is smaller than numbers of 53 bits allow.
+        UserWarning: if another method stands in for one of SciPy, or an argument is of no use.
 
     Example:
         >>> def lotka_volterra(t, z, a, b, c, d):
@@ -169,9 +177,11 @@ def solve_ivp(
         wanted = sign * times
         output = wanted if len(wanted) and wanted[-1] == trajectory.end else np.append(wanted, trajectory.end)
         states = trajectory.advance_to_the_end(output)[: len(times)].T
+        _warn_of_stiffness(trajectory, sign)
         return _result(trajectory, None, times[: states.shape[1]], np.ascontiguousarray(states), None, None)
 
     ended = _advanced(trajectory, noted, sign) if end != begin else None
+    _warn_of_stiffness(trajectory, sign)
     ts = sign * np.array(trajectory.times)
     if end == begin:
         ts, trajectory.status = np.array([begin]), adaptive.OK
@@ -209,6 +219,8 @@ def _result(
     """The result, with SciPy's names."""
     status = 1 if ended is not None else 0 if trajectory.status == adaptive.OK else -1
     n = len(trajectory.states[0])
+    solver = trajectory.method
+    jacobians = trajectory.evaluations // solver.attempt_evaluations if solver.is_implicit else 0  # one for each attempt
     return OdeResult(
         t=t,
         y=y,
@@ -218,8 +230,8 @@ def _result(
         if events is None
         else [np.array(each.states).reshape(-1, n) if each.states else np.empty((0, n)) for each in events],
         nfev=trajectory.evaluations,
-        njev=0,
-        nlu=0,
+        njev=jacobians,
+        nlu=jacobians,
         status=status,
         message=ENDS[status] if status >= 0 else FAILURES[trajectory.status],
         success=status >= 0,
@@ -289,11 +301,17 @@ def _is_several(events: Any) -> bool:
     return not callable(events) and bool(checks.several("events", events, "functions") or True)
 
 
+def _warn_of_stiffness(trajectory: Trajectory, sign: float) -> None:
+    """Warn if stability held down the steps, and not the tolerance."""
+    if is_heard(StiffnessWarning) and (text := trajectory.stiffness(sign)):
+        warnings.warn(text, StiffnessWarning, stacklevel=3)
+
+
 def _warn_of_useless(**arguments: Any) -> None:
     """Warn of arguments that only methods for stiff equations read."""
     if useless := [name for name, value in arguments.items() if value is not None]:
         warnings.warn(
-            f"{', '.join(useless)}: of no use, for it goes with implicit methods only, of which there are none here",
+            f"{', '.join(useless)}: of no use, for derivatives come from the operations of fun, and steps have no least length",
             UserWarning,
             stacklevel=3,
         )

@@ -15,6 +15,11 @@ from .systems import Sampled, System
 
 def fits_together(system: System, method: Method) -> None:
     """Raise if the method cannot step the system."""
+    if system.mass_matrix is not None and not method.is_implicit:
+        raise UnsupportedError(
+            f"method: {method.name} needs the rate of every number of the state, and the algebraic equations of {system!r} give "
+            f"none; take an implicit method, such as rodas5p"
+        )
     if not method.needs_acceleration:
         return
     if not system.second_order:

@@ -50,11 +50,12 @@ OPTIONAL_WORDS = ("the", "method", "rule", "scheme", "integrator")
 
 #: Kinds of methods that stepwell does not have, by patterns of their names in the form of ``spelling``; and the explanation.
 NOT_HERE = {
-    r"implicit_.*|.*_implicit|backward_euler|crank_nicolson|i?bdf\d?|.*radau.*|lsod[aei]?r?|l?vode|cvode|(esd|sd|d)irk.*|"
-    r"tr_?bdf2|rosenbrock.*|ros\d.*|rodas.*|kvaerno\d?|kencarp\d+|lobatto.*|gauss_legendre.*|newmark.*|hht.*|generali[sz]ed_alpha|"
-    r"ode(15s|15i|23s|23t|23tb)|backward_differentiation.*|exponential_euler|xpbd|imex.*": (
-        "implicit, and no implicit method is here; for stiff springs shorten the step (stability_limit, safe_step) or use Rods, "
-        "for stiff equations SciPy's Radau, BDF or LSODA."
+    r"implicit_(?!euler|midpoint|trapezoidal).*|.*_implicit|i?bdf[2-6]?|.*radau.*|lsod[aei]?r?|l?vode|cvode|(esd|sd|d)irk.*|"
+    r"tr_?bdf2|rosenbrock(?!_?2_?3$|_?euler$).*|ros[2-9].*|rodas(?!_?4(_3)?$|_?5_?p$).+|kvaerno\d?|kencarp\d+|lobatto.*|"
+    r"gauss_legendre(_\d.*)?|newmark.*|hht.*|generali[sz]ed_alpha|ode(15s|15i|23t|23tb)|backward_differentiation.*|"
+    r"exponential_euler|xpbd|imex.*": (
+        "implicit, and not here; for stiff equations rosenbrock23, rodas4 and rodas5p choose their steps, with tolerance= and "
+        "at=, and linearly_implicit_euler is for stiff springs in games."
     ),
     r"euler_maruyama|.*milstein.*|sri?w?\d?|sra\d?|sosri\d?|sosra\d?|langevin|baoab|.*stochastic.*": (
         "for equations with noise, and there is none here; noise that is held over a step is an input, sw.Sampled."

@@ -236,7 +236,7 @@ def at_start(x: Any) -> Any:
     if not among((x,)):
         return x
     numbers = [_start(each) for each in x.flat]
-    return _filled(numbers, x.shape)
+    return in_array(numbers, x.shape)
 
 
 def among(values: Sequence[Any]) -> bool:
@@ -392,7 +392,7 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
     """
     book, (h, unit) = Book(), lengths
     v, y = np.asarray(v), np.asarray(y)
-    blocks = [_filled([Series(book, each, None) for each in block.flat], block.shape) for block in (v, y)]
+    blocks = [in_array([Series(book, each, None) for each in block.flat], block.shape) for block in (v, y)]
     # Where members have steps of their own, each needs a time of its own, though all are equal at the start.
     each_its_own = np.broadcast_arrays(t, h)[0] if np.ndim(h) else t
     times = np.frompyfunc(lambda t: Series(book, t, None), 1, 1)(each_its_own)
@@ -400,7 +400,7 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
     rates = s.dv(times, *blocks), s.dy(times, *blocks)
     seeds = [each for block in blocks for each in block.flat]
     slopes = [
-        each for rate, block in zip(rates, blocks, strict=True) for each in np.broadcast_to(_objects(rate), block.shape).flat
+        each for rate, block in zip(rates, blocks, strict=True) for each in np.broadcast_to(as_objects(rate), block.shape).flat
     ]
     zero = t.number(0.0) if hasattr(t, "number") else 0.0
     result = []
@@ -418,11 +418,11 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
         for time, length in clocks:
             time.terms.append(length if k == 0 else None)
         numbers = [zero if term is None else term for term in terms]
-        result.append((_filled(numbers[: v.size], v.shape), _filled(numbers[v.size :], y.shape)))
+        result.append((in_array(numbers[: v.size], v.shape), in_array(numbers[v.size :], y.shape)))
     return result, book.branches
 
 
-def _objects(x: Any) -> Any:
+def as_objects(x: Any) -> Any:
     """An array of objects."""
     if isinstance(x, np.ndarray):
         return x
@@ -431,7 +431,7 @@ def _objects(x: Any) -> Any:
     return array
 
 
-def _filled(numbers: list[Any], shape: tuple[int, ...]) -> Any:
+def in_array(numbers: list[Any], shape: tuple[int, ...]) -> Any:
     """An array of that shape: of objects, unless all are numbers."""
     if all(isinstance(each, (float, complex, np.number)) for each in numbers):
         return np.array(numbers, dtype=np.result_type(np.float64, *{type(each) for each in numbers})).reshape(shape)

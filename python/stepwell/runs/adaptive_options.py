@@ -80,6 +80,8 @@ def check_estimates(system: System, method: Method, control: Any, options: Optio
 
 def is_backward(times: Array, t0: Array) -> bool:
     """Whether the last times are before the start, the same for all members."""
+    if times.ndim == 1 and not t0.ndim and times[-1] > t0:
+        return False  # the most frequent case
     ahead = times[-1] - t0
     if (ahead > 0.0).any() and (ahead < 0.0).any():
         raise ArgumentError("at: expected all members to go forward in time, or all backward, got some of each")
@@ -97,6 +99,8 @@ def times_of_run(t0: Array, times: Array, batch: Shape) -> tuple[Array, Array]:
 
 def check_ascending(times: Array, since: Array, sign: float, goes_on: bool) -> None:
     """Raise unless times go on from the times of the members, in the direction of the run."""
+    if times.shape == (1,) and since.ndim == 0 and times[0] >= since:
+        return  # the most frequent case
     ascends = (times[0] >= since) & (np.diff(times, axis=0) > 0.0).all(axis=0)
     if ascends.all():
         return
@@ -111,11 +115,14 @@ def check_ascending(times: Array, since: Array, sign: float, goes_on: bool) -> N
 def jump_times(system: System, jumps: Any, t0: Array, times: Array) -> Array | None:
     """The times that no step crosses, ascending along the first axis: of the user, of inputs and of the equations."""
     parts = []
+    has_inputs, reads_time = bool(system.all_inputs()), system.reads_time
+    if not has_inputs and not reads_time and jumps is None:
+        return None
     ahead = bool((times[-1] - t0).max() >= 0.0)
-    if system.all_inputs():
+    if has_inputs:
         # Those after the last time count, too: the step that contains it goes on from there when the run is continued.
         parts.append(system.jumps(*((float(t0.min()), np.inf) if ahead else (-np.inf, float(t0.max())))))
-    if system.reads_time:
+    if reads_time:
         begin, end = min(float(times.min()), float(t0.min())), max(float(times.max()), float(t0.max()))
         parts.append(system.switching_times(begin, end))
     if jumps is not None:

@@ -21,7 +21,7 @@ from . import encounters, engine, known_energy
 from .findings import Finding
 from .request import Request
 from .result import Run
-from .stops import of_stops, of_the_start
+from .stops import of_derivatives, of_stops, of_the_start
 from .tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance
 
 #: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
@@ -76,11 +76,15 @@ def findings_of(
         if np.count_nonzero(run.status) and (diverged := _of_divergence(run, request)) is not None:
             noticed.append(diverged)
     else:
-        noticed += of_stops(run, partial(_why_steps_are_short, run, request, waypoints))
+        noticed += of_stops(run, partial(why_steps_are_short, run, request, waypoints))
         if (stiff := _of_stiffness(run, request, waypoints, heard)) is not None:
             noticed.append(stiff)
         if (lost := _of_a_lost_motion(run, request)) is not None:
             noticed.append(lost)
+        from .negative import of_negative_amounts  # only such runs need it
+
+        if (negative := of_negative_amounts(run, request)) is not None:
+            noticed.append(negative)
     # The energy says nothing where events changed the state, nor where the run began from what a method carries.
     began = not request.carried and request.before is None
     if request.events is not None and any(event.then for event in request.events):
@@ -162,7 +166,8 @@ def _of_divergence(run: Run, request: Request) -> Finding | None:
             why = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
     if not request.carried and step == run.start_step + 1 and not why:
         start = request.v, request.y
-        if wrong := of_the_start(run.system, run.status.shape, run.t0 + run.start_step * run.dt, start, first):
+        place = run.status.shape, run.t0 + run.start_step * run.dt, start, first
+        if wrong := of_the_start(run.system, *place) or of_derivatives(run.system, run.method, *place):
             why = f"; {wrong} at the start, t = {time_of(run, run.start_step, first):g}"
     number = int(np.count_nonzero(bad))
     return Finding(
@@ -173,12 +178,17 @@ def _of_divergence(run: Run, request: Request) -> Finding | None:
     )
 
 
-def _why_steps_are_short(run: Run, request: Request, waypoints: Sequence[Array], index: Shape) -> str:
+def why_steps_are_short(run: Run, request: Request, waypoints: Sequence[Array], index: Shape) -> str:
     """Whether stability held down the steps of a member that is out of attempts, in words."""
     assert run.paces is not None
     if run.paces.accepted[index] + run.paces.rejected[index] < STOPPED:
         return ""
     return str(registry.task("held_by_stability")(run, request, waypoints, index))
+
+
+def may_be_stiff(steps: int, numbers: int) -> bool:
+    """Whether a run of so many accepted steps, whose members have so many numbers in all, is looked at for stiffness."""
+    return steps >= MANY_OF_FEW or (steps >= MANY and numbers >= FEW_NUMBERS)
 
 
 def _of_stiffness(
@@ -188,9 +198,7 @@ def _of_stiffness(
     assert run.paces is not None
     accepted = run.paces.accepted
     steps = int(accepted) if not accepted.shape else int(accepted.max(initial=0))
-    if not waypoints or steps < MANY or (steps < MANY_OF_FEW and run.y[-1].size + run.v[-1].size < FEW_NUMBERS):
-        return None
-    if not heard(StiffnessWarning):
+    if not waypoints or not may_be_stiff(steps, run.y[-1].size + run.v[-1].size) or not heard(StiffnessWarning):
         return None
     found: Finding | None = registry.task("stiffness_of")(run, request, waypoints[0])
     return found

@@ -79,8 +79,8 @@ def integrate(
             component that decays to nothing, or a stiff one, give a tuple (relative, absolute): it allows relative·size +
             absolute with the present size, as SciPy's rtol and atol, the absolute part in the units of the state. Each is a
             number, an array over the batch, or one with a number for each component, shape (*block, …) of y, which v has too; a
-            list is refused. For methods with an ``error_order``:
-            merson, fehlberg, fehlberg_5, dop853, taylor.
+            list is refused. For methods with an ``error_order``: merson, fehlberg, fehlberg_5, dop853, taylor, and for stiff
+            equations rosenbrock23, rodas4, rodas5p.
         at: with a tolerance, the times at which to save the state, from t0 on, ascending, or descending for a run backward in
             time; shape (times,), or (times, *batch) for times of each member. A state within a step is computed by an extra step
             from its start. Steps do not depend on these times, unless the extra step errs by more than is tolerated: the
@@ -162,15 +162,15 @@ def integrate(
     return run
 
 
-def step(request: Request) -> Run:
-    """The requested run, without findings and warnings."""
-    return fixed_run(request) if request.step_control is None else adaptive_run(request)
+def step(request: Request, waypoints: list[Array] | None = None) -> Run:
+    """The requested run, without findings and warnings; ``waypoints`` gets where members with adaptive steps stood on the way."""
+    return fixed_run(request) if request.step_control is None else adaptive_run(request, waypoints)
 
 
 def noticing(request: Request, heard: Callable[[type[Warning]], bool] = lambda _: True) -> Run:
     """The requested run with its findings; what takes a while to find is searched only if its warning is ``heard``."""
     waypoints: list[Array] = []
-    run = fixed_run(request) if request.step_control is None else adaptive_run(request, waypoints)
+    run = step(request, waypoints)
     if findings := findings_of(run, request, heard, waypoints):
         run.findings = findings
     return run

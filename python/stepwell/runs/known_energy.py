@@ -79,10 +79,12 @@ def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[t
     system, paces = run.system, run.paces
     if paces is None and (run.method.limit == 0.0 or not (isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS)):
         return None  # other systems have no barrier
-    evaluations = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
-    if evaluations < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS or not run.status.size:
+    if system.keeper is not None or not (names := _names(system)) or not run.status.size:
         return None
-    if system.keeper is not None or not (names := _names(system)) or not keeps_energy(run) or not heard(AccuracyWarning):
+    evaluations = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
+    if evaluations < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS:
+        return None
+    if not keeps_energy(run) or not heard(AccuracyWarning):
         return None
     start = np.broadcast_to(start[0], run.v.shape[1:]), np.broadcast_to(start[1], run.y.shape[1:])
     with np.errstate(all="ignore"):
@@ -97,6 +99,8 @@ def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[t
 def _is_constant(run: Run, name: str) -> bool:
     """Whether an invariant is one: along the rates at the end its changes by v and by y cancel."""
     system, v, y = run.system, run.v[-1], run.y[-1]
+    if system.mass_matrix is not None:
+        return False  # algebraic equations give no rates to go along
     alone = system.reference_at_step(1.0, run.status.shape)
     t = np.broadcast_to(run.t[-1], run.status.shape)
     rates = np.broadcast_to(alone.dv(t, v, y), v.shape), np.broadcast_to(alone.dy(t, v, y), y.shape)

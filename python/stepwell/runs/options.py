@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..base import checks
+from ..base import checks, registry
 from ..base.arrays import Array, Shape
 from ..base.reprs import of_member
 from ..errors import ArgumentError, UnsupportedError
@@ -14,7 +14,7 @@ from ..model.compatibility import fits_together, velocities
 from ..model.controls import ConstraintControl, EnergyControl
 from ..model.methods import Method
 from ..model.methods import method as find_method
-from ..model.systems import Sinusoid, System
+from ..model.systems import Sampled, Sinusoid, System
 from ..model.systems.base import a_system
 from . import continuation
 
@@ -57,6 +57,10 @@ class Options(NamedTuple):
     resume: Any = None
 
 
+#: The share of a component by which it may be off at the start of a run whose steps have no tolerance.
+UNTOLD = 1e-6
+
+
 def under_control(system: System, control: Any, v: Array | None, y: Array | None, batch: Shape, dt: float | None) -> System:
     """The system under control. Without a state the control needs all of its numbers, but not if there is no ``dt`` either."""
     if v is not None and y is not None and dt is not None:
@@ -93,6 +97,15 @@ def checked_system(system: Any, method: str | Method, v: Any, y: Any) -> tuple[M
     return method, system, v
 
 
+def check_algebraic(system: System, y: Array, t: Any, tolerances: Any = None) -> None:
+    """Raise if algebraic equations of a system do not hold at the start, within the tolerance or 1e-6 of each number."""
+    if system.mass_matrix is None:
+        return
+    relative = UNTOLD if tolerances is None else float(tolerances.relative.max())
+    absolute = 0.0 if tolerances is None or tolerances.absolute is None else float(tolerances.absolute.max())
+    registry.task("algebraic_start")(system, y, t, relative, absolute)
+
+
 def arithmetic(fused: Any, dtype: Any) -> tuple[bool, bool]:
     """Whether steps have fused multiply-adds, and whether they are in float32."""
     return fused is not None and checks.flag("fused", fused), dtype is not None and checks.is_single(dtype)
@@ -126,11 +139,16 @@ def check_matrix_form(system: System, method: Method, form: str, force: Any) -> 
         )
     if not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
-    if method.has_series and any(isinstance(each, Sinusoid) for each in system.given_inputs().values()):
+    if method.takes_derivatives_by_time and any(map(_is_smooth, system.given_inputs().values())):
         raise UnsupportedError(
             f"form: {method.name} takes the derivatives of inputs too, and the transition matrix their values only; "
             f"use form='direct'"
         )
+
+
+def _is_smooth(given: Any) -> bool:
+    """Whether an input changes within a step, so that it has a derivative there."""
+    return isinstance(given, Sinusoid) or (isinstance(given, Sampled) and given.interpolation != "hold" and not given.constant)
 
 
 def quantities(system: System, record: Any) -> list[str]:

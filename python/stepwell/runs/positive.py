@@ -27,6 +27,8 @@ def places_of(system: System, components: Any) -> list[int]:
 def checked_places(system: System, components: Any, v: Array, y: Array) -> tuple[int, ...]:
     """``places_of``; raise if one of the components is negative at the start."""
     places = places_of(system, components)
+    if not places:
+        return ()
     rows = [row for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))) for row in _rows_of(block, axes)]
     for place in places:
         if (rows[place] < 0.0).any():

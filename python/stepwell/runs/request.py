@@ -35,6 +35,7 @@ from .options import (
     FORMS,
     Options,
     arithmetic,
+    check_algebraic,
     check_matrix_form,
     checked_system,
     controlled,
@@ -210,6 +211,8 @@ class Request(NamedTuple):
         v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)
         if control is not None:
             system = controlled(system, method, control, v, y, dt)
+        if before is None:
+            check_algebraic(system, y, t0)
         system = system.stepped_by(method)
         stepped = system.over_steps(method, checks.once_of(t0) if isinstance(t0, np.ndarray) else t0, dt)
         carried = False
@@ -304,10 +307,11 @@ class Request(NamedTuple):
         batch = checks.batch_shape(batches)
         if pace is not None and pace.shape[1:] != batch:
             raise ShapeError(f"resume: expected a run of batch {batch}, got one of batch {pace.shape[1:]}")
-        for end in (t0, times):
-            system.check_time(float(np.abs(end).max()))
-            if single:
-                float32.check_inputs(system, float(np.abs(end).max()))
+        if system.all_inputs():
+            for end in (t0, times):
+                system.check_time(float(np.abs(end).max()))
+                if single:
+                    float32.check_inputs(system, float(np.abs(end).max()))
         every = None if options.every is None else checks.count("every", options.every, 1)
         if every is not None and len(times) > 1:
             raise ShapeError(
@@ -341,6 +345,8 @@ class Request(NamedTuple):
                 lengths = sizes(v, y, (len(system.v_shape), len(system.y_shape)), acceptance.groups)
                 float32.check_tolerance(tolerances.relative, tolerances.absolute, lengths)
         progress = checks.flag("progress", options.progress)
+        if tolerances is not None:
+            check_algebraic(system, y, t0, tolerances)
         if control is not None:
             system = system.controlled(control, v, y, TINY)
         relative = (
@@ -427,6 +433,8 @@ class Request(NamedTuple):
         if single:
             float32.check_inputs(stepped, abs(t0) + first * abs(dt))
         stepped.check_time(abs(t0) + first * abs(dt))
+        if before is None and first == 0:
+            check_algebraic(stepped, y, t0)
         seen = stepped.over_steps(method, t0, dt)
         plan = engine.Plan(seen, method, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
         watched = None if events is None else event_list(events, "direct")

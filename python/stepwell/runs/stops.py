@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import prod
 from typing import Any
 
 import numpy as np
 
-from ..base import checks
+from ..base import checks, registry
 from ..base.arrays import Array, Shape
 from ..base.reprs import counted, first_of, share
-from ..errors import ToleranceWarning
+from ..errors import ToleranceWarning, UnsupportedError
+from ..model.methods import Method
 from ..model.systems import System
 from ..reference.around import wrapped
 from . import engine
@@ -34,6 +36,8 @@ BLOWS_UP = (
 BEYOND = 8.0
 #: The time has too few digits if a member stops at its start, or if this share of its mean step is within roundings.
 USUAL = 2.0**-10
+#: The most derivatives of rates that are looked at.
+MOST_DERIVATIVES = 1_000_000
 
 State = tuple[Array, Array]
 
@@ -49,12 +53,12 @@ def of_stops(run: Run, why_short: Callable[[Shape], str]) -> list[Finding]:
     number = int(np.count_nonzero(stopped))
     text = (
         f"{share(number, stopped.shape, stopped.size)} stopped before t = {end:g}"
-        f"{first_of(number, first, stopped.size) or ','} at t = {time:g}; {_why(run, first, why_short)}"
+        f"{first_of(number, first, stopped.size) or ','} at t = {time:g}; {why_stopped(run, first, why_short)}"
     )
     return [Finding(ToleranceWarning, text, stopped)]
 
 
-def _why(run: Run, index: Shape, why_short: Callable[[Shape], str]) -> str:
+def why_stopped(run: Run, index: Shape, why_short: Callable[[Shape], str]) -> str:
     """Why a member stopped, with numbers."""
     assert run.paces is not None
     status = Status(int(run.status[index]))
@@ -69,6 +73,9 @@ def _why(run: Run, index: Shape, why_short: Callable[[Shape], str]) -> str:
         return f"{WHY_STOPPED[status]}: {wrong}"
     if status == Status.NOT_FINITE:
         assert run.controller_state is not None
+        state = run.controller_state.v, run.controller_state.y
+        if wrong := of_derivatives(run.system, run.method, run.status.shape, run.paces.t, state, index):
+            return f"{WHY_STOPPED[status]}: {wrong} {_where(run, index)}"
         longest = max(
             float(np.abs(checks.member(block, index)).max(initial=0.0))
             for block in (run.controller_state.v, run.controller_state.y)
@@ -116,7 +123,13 @@ def _of_rates_there(run: Run, index: Shape) -> str:
     """Which rate is not finite where a member stopped; empty if all are finite."""
     assert run.paces is not None
     wrong = _not_finite(_rates_there(run), index)
-    return wrong and f"{wrong} {'at the start' if float(run.paces.t[index]) == start_of(run, index) else 'there'}"
+    return wrong and f"{wrong} {_where(run, index)}"
+
+
+def _where(run: Run, index: Shape) -> str:
+    """Whether a member stopped at its start, in words."""
+    assert run.paces is not None
+    return "at the start" if float(run.paces.t[index]) == start_of(run, index) else "there"
 
 
 def _largest_rate(run: Run, index: Shape) -> str:
@@ -157,6 +170,26 @@ def _roundings_of_the_time(run: Run, index: Shape) -> float:
 def of_the_start(system: System, batch: Shape, t: Any, state: State, index: Shape) -> str:
     """Which rate of a member is not finite at the start, as "the rate of y[1] is NaN"; empty if all are finite."""
     return _not_finite(rates_of(system, batch, t, state), index)
+
+
+def of_derivatives(system: System, method: Method, batch: Shape, t: Any, state: State, index: Shape) -> str:
+    """Which derivative of a rate of a member is not finite, if the method needs derivatives; "" if all are finite."""
+    shapes = system.v_shape, system.y_shape
+    n = sum(map(prod, shapes))
+    if not method.has_derivatives or n * n * prod(batch) > MOST_DERIVATIVES:
+        return ""
+    try:
+        with np.errstate(all="ignore"):
+            derivatives = registry.task("derivatives_of_rates")(system, batch, t, *state)
+    except UnsupportedError:  # there are no rates without a step, or no derivatives
+        return ""
+    of_member = checks.member(derivatives, index)
+    if np.isfinite(of_member).all():
+        return ""
+    rate, number = np.argwhere(~np.isfinite(of_member))[0].tolist()
+    value = "NaN" if np.isnan(of_member[rate, number]) else "infinite"
+    names = [_component(block, place) for block, shape in zip("vy", shapes, strict=True) for place in np.ndindex(shape)]
+    return f"{method.name} needs the derivative of the rate of {names[rate]} by {names[number]}, which is {value}"
 
 
 def _not_finite(rates: State, index: Shape) -> str:

@@ -65,13 +65,15 @@ def _of_groups(part: Array, of_components: bool, system: System, acceptance: Acc
     groups = acceptance.groups or (0,) * n_v + (int(n_v > 0),) * n_y
     count = sum(acceptance.counts(n_v, n_y))
     if not of_components:
-        return np.broadcast_to(part, (count, *part.shape))
+        return np.broadcast_to(part, (count, *part.shape)) if part.ndim else checks.over(part, (count,))
     if n_v not in (0, n_y):
         raise ShapeError(
             f"tolerance: v and y have different shapes, {system.v_shape} and {system.y_shape}; give one number for all"
         )
     rows = part.reshape(n_y, *part.shape[len(system.y_shape) :])
     of_each = np.concatenate([rows, rows]) if n_v else rows
+    if groups == tuple(range(len(of_each))):
+        return of_each  # each component is a group
     least = np.full((count, *rows.shape[1:]), np.inf)
     for group, row in zip(groups, of_each, strict=True):
         least[group] = np.minimum(least[group], row)

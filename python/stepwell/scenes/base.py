@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base import checks, registry
-from ..base.arrays import Array, Shape
+from ..base.arrays import Array, Shape, Whole
 from ..base.immutable import ValueEquality, frozen
 from ..base.progress import in_notebook
 from ..base.reprs import facts
@@ -24,10 +24,13 @@ from ..model.systems.base import a_system
 from ..runs.integration import integrate, quietly
 from ..runs.result import Run
 
-#: The scale of the exact solution is that of SCALE_SAMPLES times over the horizon. Where a block changes by more than STEEP of
+#: The scale of the exact solution is that of SCALE_SAMPLES times over the horizon. Where a group changes by more than STEEP of
 #: its largest length from one time to the next, there may be a peak between them: MORE_SAMPLES are added there, and again between
 #: those, down to an interval of SHORTEST of the horizon and up to MAX_SAMPLES in all.
 SCALE_SAMPLES, STEEP, MORE_SAMPLES, SHORTEST, MAX_SAMPLES = 1001, 0.25, 15, 1e-12, 40_000
+
+#: A component that is always smaller than this part of its block's largest length, and may be rounding, is measured by that part.
+LEAST_SCALE = 1e-12
 
 #: n steps of horizon/n end at the horizon up to two roundings, each of 2⁻⁵³ of the time.
 TIME_ROUNDING = 2.0**-51
@@ -214,7 +217,9 @@ class Scene(ValueEquality):
         """The relative error of each saved state, shape (saved,); infinite if it is not finite, NaN if the true state is unknown.
 
         It is the larger of the errors of the two blocks; that of a block is the length of its difference from the exact one,
-        divided by the block's largest length in the exact solution. At 1 the error is as large as the solution.
+        divided by the block's largest length in the exact solution. Of own equations and linear systems, whose numbers may have
+        units of their own, each component has an error, or each part that ``scale=`` says; the largest counts. At 1 the error is
+        as large as the solution.
 
         Raises:
             ArgumentError: if the scene has no exact solution, or the run is of another system.
@@ -226,11 +231,7 @@ class Scene(ValueEquality):
         """The ``state_error`` of states at these times, from any source."""
         exact, known = self._solution(t)
         with np.errstate(all="ignore"):
-            errors = [
-                _relative(_length(block - true, shape), scale)
-                for block, true, shape, scale in zip((v, y), exact, self._shapes, self.scales, strict=True)
-            ]
-        error = np.maximum(*errors)
+            error = self.relative_lengths(v - exact[0], y - exact[1]).max(axis=0)
         return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
 
     def energy_error(self, run: Run) -> Array:
@@ -253,14 +254,18 @@ class Scene(ValueEquality):
         return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
 
     def amplitude(self, run: Run) -> Array:
-        """The larger relative length of both blocks in each saved state, shape (saved,), in units of ``scales``."""
+        """The larger relative length of both blocks in each saved state, shape (saved,), as ``state_error`` measures lengths."""
         self._check(run)
         with np.errstate(all="ignore"):
-            lengths = [
-                _relative(_length(block, shape), scale)
-                for block, shape, scale in zip((run.v, run.y), self._shapes, self.scales, strict=True)
-            ]
-        return np.maximum(*lengths)
+            return np.asarray(self.relative_lengths(run.v, run.y).max(axis=0))
+
+    def relative_lengths(self, v: Array, y: Array) -> Array:
+        """The length of each group of numbers relative to its largest in the exact solution, shape (groups, times).
+
+        Groups are the two blocks, or those of ``System.groups``.
+        """
+        lengths = self.lengths((v, y))
+        return np.stack([_relative(*both) for both in zip(lengths, self.group_scales, strict=True)])
 
     def owns(self, run: Run) -> bool:
         """Whether a run is of this scene's system, controlled or not, and of one member; its start does not matter."""
@@ -282,6 +287,42 @@ class Scene(ValueEquality):
         return v, y
 
     @cached_property
+    def scales_of_numbers(self) -> tuple[Array, Array]:
+        """For each number of v and of y the scale of its group, of the shapes of the blocks."""
+        if not self.system.groups:
+            v, y = (np.full(shape, scale) for shape, scale in zip(self._shapes, self.scales, strict=True))
+        else:
+            scales, parts = np.asarray(self.group_scales), zip(self._groups, self._shapes, strict=True)
+            v, y = (scales[part].reshape(shape) for part, shape in parts)
+        return v, y
+
+    @cached_property
+    def group_scales(self) -> list[float]:
+        """The largest length of each group in the exact solution, and at least a small part of the block's."""
+        if not self.system.groups:
+            return list(self.scales)
+        largest = [float(length.max()) for length in self.lengths(self._sampled)]
+        least = [LEAST_SCALE * scale for scale, part in zip(self.scales, self._groups, strict=True) for _ in np.unique(part)]
+        return [max(both) for both in zip(largest, least, strict=True)]
+
+    @cached_property
+    def _groups(self) -> tuple[Whole, Whole]:
+        """The group of each number of v and of y."""
+        groups = np.asarray(self.system.groups, dtype=np.int64)
+        return groups[: self.v.size], groups[self.v.size :]
+
+    def lengths(self, blocks: tuple[Array, Array]) -> list[Array]:
+        """The length of each group of numbers at each time, those of v first."""
+        if not self.system.groups:
+            return [_length(block, shape) for block, shape in zip(blocks, self._shapes, strict=True)]
+        rows = [block.reshape(len(block), -1) for block in blocks]
+        return [
+            np.abs(row[:, part == group][:, 0]) if (part == group).sum() == 1 else np.linalg.norm(row[:, part == group], axis=1)
+            for row, part in zip(rows, self._groups, strict=True)
+            for group in np.unique(part)
+        ]
+
+    @cached_property
     def _sampled(self) -> tuple[Array, Array]:
         """The exact blocks at evenly spaced times, and at more times where they change much in between."""
         t = np.linspace(0.0, self.horizon, SCALE_SAMPLES)
@@ -289,8 +330,9 @@ class Scene(ValueEquality):
         between = np.arange(1, MORE_SAMPLES + 1) / (MORE_SAMPLES + 1)
         while True:
             steep = np.zeros(len(t) - 1, dtype=bool)
-            for block, shape in zip(states, self._shapes, strict=True):
-                steep |= _length(np.diff(block, axis=0), shape) > STEEP * _length(block, shape).max(initial=0.0)
+            changes = self.lengths((np.diff(states[0], axis=0), np.diff(states[1], axis=0)))
+            for change, length in zip(changes, self.lengths(states), strict=True):
+                steep |= change > STEEP * length.max(initial=0.0)
             steep &= np.diff(t) > SHORTEST * self.horizon
             more = (t[:-1][steep, np.newaxis] + np.diff(t)[steep, np.newaxis] * between).ravel()
             if not len(more) or len(t) + len(more) > MAX_SAMPLES:

@@ -23,10 +23,11 @@ CHECK_POINTS = (0.5 * (NODES[1:] + NODES[:-1]))[[0, 4, 8, 12]]
 NODE_PRODUCTS = [float(np.prod(node - np.delete(NODES, j))) for j, node in enumerate(NODES)]
 
 
-def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float) -> Exact:
+def tabled(exact: Exact, until: float, scales: tuple[Array, Array], close: float) -> Exact:
     """A faster function, by a polynomial over each interval, that differs by at most ``close`` times the scales up to a time.
 
-    Intervals are halved until that holds; if it takes too many, the function itself is returned.
+    The scales are those of the numbers of v and of y. Intervals are halved until that holds; if it takes too many, the function
+    itself is returned.
     """
     begins, length, number = np.linspace(0.0, until, FIRST_INTERVALS, endpoint=False), until / FIRST_INTERVALS, 0
     good: list[tuple[Array, Array, Array, Array]] = []
@@ -40,8 +41,8 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
         close_enough = np.ones(len(begins), dtype=bool)
         for block, scale in zip(blocks, scales, strict=True):
             approximated = np.tensordot(_shares(CHECK_POINTS), block[:, : len(NODES)], axes=(0, 1)).swapaxes(0, 1)
-            missed = np.abs(approximated - block[:, len(NODES) :]).reshape(len(begins), -1).max(axis=1, initial=0.0)
-            close_enough &= missed <= close * scale
+            near = np.abs(approximated - block[:, len(NODES) :]) <= close * scale
+            close_enough &= near.reshape(len(begins), -1).all(axis=1)
         v, y = (block[close_enough, : len(NODES)] for block in blocks)
         good.append((begins[close_enough], np.full(len(v), length), v, y))
         left, length = begins[~close_enough], 0.5 * length

@@ -9,14 +9,22 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..errors import ArgumentError
+from ..errors import ArgumentError, UnsupportedError
 from ..runs.integration import quietly
-from ..runs.result import Run
+from ..runs.result import Run, Status
 from .base import Scene
 
-#: The method of the reference solution, its tolerance, and that of the check run. A part that stops early is repeated with these
-#: multiples of its tolerance: from rest, no step is short enough to meet a tight one at the onset of a force.
-METHOD, TIGHT_TOLERANCE, CHECK_TOLERANCE, LOOSER = "dop853", 1e-14, 1e-13, (1e2, 1e4)
+#: The tolerance of the reference solution, and that of the check run. A part that stops early is repeated with these multiples of
+#: its tolerance: from rest, no step is short enough to meet a tight one at the onset of a force.
+TIGHT_TOLERANCE, CHECK_TOLERANCE, LOOSER = 1e-14, 1e-13, (1e2, 1e4)
+
+#: The method of the reference solution, and that where the equations are stiff: where of two runs to a loose tolerance the first
+#: takes MANY attempts, and more than STIFF times those of the second. To a tight tolerance the second, of a lower order, takes
+#: some STIFF times as many; the first takes as many to any tolerance where stability holds down its steps.
+METHOD, METHOD_IF_STIFF, LOOSE_TOLERANCE, MANY, STIFF = "dop853", "rodas5p", 1e-6, 5_000, 20.0
+
+#: The most numbers of a state for which the second is tried: it solves equations in each step.
+MOST_STIFF_NUMBERS = 256
 
 #: The two runs agree where their difference, relative to the blocks' largest lengths, is below this: a thousandth of the least
 #: error that a chart of such a scene shows. Except for rounding, the reference is ten times as accurate as the check run.
@@ -45,10 +53,11 @@ class Tight:
         scene: the scene, whose control is left out.
         tolerance: the tolerance of the run.
         part: its longest step, as a part of that of the reference.
+        method: the method.
     """
 
-    def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCE, part: float = 1.0) -> None:
-        self.scene, self.tolerance, self.part = replace(scene, control=None), tolerance, part
+    def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCE, part: float = 1.0, method: str = METHOD) -> None:
+        self.scene, self.tolerance, self.part, self.method = replace(scene, control=None), tolerance, part, method
         longest = part * 2.0 ** math.floor(math.log2(LONGEST_STEP * scene.horizon))
         self._options = scene.adaptive_options | {"max_step": min(longest, scene.max_step or math.inf)}
         #: Places from which a run can continue: the time, the state, and the arguments of the continuation.
@@ -100,14 +109,14 @@ class Tight:
         return run, False
 
     def _run(self, at: Array, on: dict[str, Any]) -> Run:
-        return quietly(self.scene.system, METHOD, at=at, max_steps=MAX_STEPS, **on)
+        return quietly(self.scene.system, self.method, at=at, max_steps=MAX_STEPS, **on)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Tight, self._arguments
 
     @property
-    def _arguments(self) -> tuple[Scene, float, float]:
-        return self.scene, self.tolerance, self.part
+    def _arguments(self) -> tuple[Scene, float, float, str]:
+        return self.scene, self.tolerance, self.part, self.method
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Tight) and self._arguments == other._arguments
@@ -140,20 +149,48 @@ def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
             f"with adaptive steps, which do not go with {what}; give the solution as a function of times"
         )
     times = np.linspace(0.0, scene.horizon, SAMPLES + 1)
-    tight = Tight(scene)
+    method = method_for(scene)
+    tight = Tight(scene, method=method)
     states = tight.followed(times)
-    known = _agreeing(states, Tight(scene, CHECK_TOLERANCE, PART_OF_CHECK).followed(times), agrees)
+    known = _agreeing(scene, states, Tight(scene, CHECK_TOLERANCE, PART_OF_CHECK, method).followed(times), agrees)
     first = len(times) if known.all() else int(np.argmin(known))
     return replace(scene, exact=tight, until=float(times[max(first - 1, 0)]))
 
 
-def _agreeing(run: tuple[Array, Array], check: tuple[Array, Array], agrees: float) -> Mask:
-    """The times at which two runs differ by at most this share of the blocks' largest lengths so far."""
+def method_for(scene: Scene) -> str:
+    """The method of the reference solution: an implicit one where an explicit one would take far more steps."""
+    if scene.v.size + scene.y.size > MOST_STIFF_NUMBERS or scene.system.contacts or scene.system.stick_friction is not None:
+        return METHOD
+    explicit = _attempts(scene, METHOD, math.inf)
+    if explicit < MANY or _attempts(scene, METHOD_IF_STIFF, explicit / STIFF) * STIFF > explicit:
+        return METHOD
+    return METHOD_IF_STIFF
+
+
+def _attempts(scene: Scene, method: str, most: float) -> float:
+    """How many attempts a run to a loose tolerance takes, extrapolated after ``MANY``; infinite if it takes ``most`` or stops."""
+    limit = int(min(MANY, most))
+    motion: dict[str, Any] = {"v": scene.v, "y": scene.y, "tolerance": LOOSE_TOLERANCE, "at": [scene.horizon]}
+    try:
+        run = quietly(scene.system, method, max_steps=limit, **motion, **scene.adaptive_options)
+    except UnsupportedError:
+        return math.inf
+    assert run.paces is not None
+    attempts = float(run.paces.accepted + run.paces.rejected)
+    if not run.status:
+        return attempts
+    if limit < MANY or run.status != Status.BUDGET or not float(run.paces.t) > 0.0:
+        return math.inf
+    return attempts * scene.horizon / float(run.paces.t)
+
+
+def _agreeing(scene: Scene, run: tuple[Array, Array], check: tuple[Array, Array], agrees: float) -> Mask:
+    """The times at which two runs differ by at most this share of the largest lengths so far, of blocks or of components."""
     known = np.ones(len(run[1]), dtype=bool)
-    for a, b in zip(run, check, strict=True):
-        axes = tuple(range(1, a.ndim))
+    with np.errstate(all="ignore"):
+        differences = scene.lengths((run[0] - check[0], run[1] - check[1]))
+    for apart, length in zip(differences, scene.lengths(run), strict=True):
         with np.errstate(all="ignore"):
-            apart, length = (np.sqrt((x * x).sum(axis=axes)) for x in (a - b, a))
             # The largest length up to the next time: a motion that sets in at a time has only the length of roundings there.
             longest = np.fmax.accumulate(np.append(length, length[-1]))[1:]
             known &= apart <= agrees * longest

@@ -35,7 +35,7 @@ const S: [f64; 8] = [
 #[inline(always)]
 pub fn sin<N: Number>(x: N) -> N {
     if N::is_single() {
-        return single_sin(x);
+        return single_sin(x).marked(Function::Sin, x);
     }
     let y = x * N::of(PER_HALF_TURN) + N::of(MAGIC);
     let n = y - N::of(MAGIC);
@@ -46,7 +46,7 @@ pub fn sin<N: Number>(x: N) -> N {
 #[inline(always)]
 pub fn cos<N: Number>(x: N) -> N {
     if N::is_single() {
-        return single_cos(x);
+        return single_cos(x).marked(Function::Cos, x);
     }
     let y = (x * N::of(PER_HALF_TURN) + N::of(0.5)) + N::of(MAGIC);
     let n = (y - N::of(MAGIC)) - N::of(0.5);
@@ -125,7 +125,7 @@ const TWO_52: u64 = 0x4330_0000_0000_0000;
 #[inline(always)]
 pub fn log<N: Number>(x: N) -> N {
     if N::is_single() {
-        return single_log(x);
+        return single_log(x).marked(Function::Log, x);
     }
     let l = |i: usize| N::of(L[i]);
     let (k, f) = split(x);

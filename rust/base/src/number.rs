@@ -41,6 +41,15 @@ pub struct Branch<N> {
     pub most: f64,
 }
 
+/// The derivatives of rates; none where one is known to be zero.
+#[derive(Clone, Debug)]
+pub struct Derivatives<N> {
+    /// By each number of the state: one for each rate.
+    pub by_state: Vec<Vec<Option<N>>>,
+    /// By the time.
+    pub by_time: Vec<Option<N>>,
+}
+
 /// A number, or a symbol for one.
 ///
 /// A step can use only these operations: no `if` on a number, no operation that two machines might round differently.
@@ -107,6 +116,17 @@ pub trait Number:
     /// makes of the start and of the time. The time is its value, the unit in powers of which the coefficients are, and this over
     /// the one of the rates. Only symbols have a record of how rates were made, so of numbers there is no series.
     fn series(_order: u32, _start: &[Self], _time: [Self; 3], _rates: &mut dyn FnMut() -> Vec<Self>) -> Option<Series<Self>> {
+        None
+    }
+
+    /// The derivatives of rates that a function makes of the state, of the time and of the length of the step, which does not
+    /// change. Of numbers there are none, as of series.
+    fn derivatives(
+        _state: &[Self],
+        _time: Self,
+        _step: Self,
+        _rates: &mut dyn FnMut() -> Vec<Self>,
+    ) -> Option<Derivatives<Self>> {
         None
     }
 

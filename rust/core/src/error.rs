@@ -40,6 +40,15 @@ pub enum Error {
         /// The term that depends on the velocity.
         term: &'static str,
     },
+    /// An explicit method, and a system whose mass matrix is singular.
+    #[error(
+        "method: {method} needs the rate of every number of the state, and algebraic equations give none; take an implicit method, \
+         such as rodas5p"
+    )]
+    MassMatrix {
+        /// The method's name.
+        method: &'static str,
+    },
     /// A step that is too long for one tape, which fused multiply-adds need.
     #[error("fused: a step of about {operations} operations is too long; fused multiply-adds go with steps of up to {most}")]
     TooLongToFuse {
@@ -57,6 +66,21 @@ pub enum Error {
         operations: usize,
         /// What it may have.
         most: usize,
+    },
+    /// A step that is too long to solve equations.
+    #[error(
+        "method: the equations of a step of this system by an implicit method have {unknowns} unknowns and up to {operations} \
+         operations, and may have {most_unknowns} and {most}; take an explicit method for a system that large"
+    )]
+    TooLongToSolve {
+        /// What a step has.
+        operations: usize,
+        /// What it may have.
+        most: usize,
+        /// How many numbers it solves for.
+        unknowns: usize,
+        /// How many there may be.
+        most_unknowns: usize,
     },
     /// A step that is too long for one tape, on which alone members have times of their own.
     #[error(

@@ -181,7 +181,7 @@ fn a_monitor_that_says_no_ends_the_run() {
 #[test]
 fn what_does_not_fit_is_refused() {
     let error = |model: Model, members: usize| last(&plan(model, 0.1, 1, members, 1)).unwrap_err().to_string();
-    assert!(error(oscillators(&[1.0], "rk5"), 1).starts_with("there is no method \"rk5\"; known: damped_euler, "));
+    assert!(error(oscillators(&[1.0], "rk5"), 1).starts_with("there is no method \"rk5\"; known: backward_euler, "));
     assert_eq!(error(oscillators(&[1.0, 2.0], "rk4"), 3), "a parameter: expected 3, got 2");
     assert!(error(model(spec("spring", Of::default()), "rk4"), 1).starts_with("there is no system \"spring\"; known: chain, "));
     let rows = [("omega", vec![Row(&[1.0])]), ("damping", vec![Row(&[0.1])])];

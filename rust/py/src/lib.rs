@@ -417,6 +417,11 @@ fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<u
             Entry::Scale(by, _) => ("scale", by),
             Entry::SeriesV(order, ..) => ("series of v", f64::from(order)),
             Entry::SeriesY(order, ..) => ("series of y", f64::from(order)),
+            Entry::ImplicitV(gamma, ..) => ("implicit v", gamma),
+            Entry::ImplicitY(gamma, ..) => ("implicit y", gamma),
+            Entry::ByTimeV => ("v by time", 0.0),
+            Entry::ByTimeY => ("y by time", 0.0),
+            Entry::Mass(_) => ("mass", 0.0),
         };
         (name, entry.operands().into_iter().map(|block| block.index()).collect(), number)
     };

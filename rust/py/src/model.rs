@@ -58,7 +58,10 @@ pub(crate) fn readable<'py>(array: &Bound<'py, PyArray2<f64>>) -> PyResult<PyRea
 pub(crate) fn core_error(error: Error) -> PyErr {
     let name = match error {
         Error::Memory { .. } => "TooLargeError",
-        Error::TooLongForSeries { .. } | Error::TooLongForTimes { .. } => "UnsupportedError",
+        Error::TooLongForSeries { .. }
+        | Error::TooLongToSolve { .. }
+        | Error::TooLongForTimes { .. }
+        | Error::MassMatrix { .. } => "UnsupportedError",
         _ => "ArgumentError",
     };
     error_of(name, error.to_string())

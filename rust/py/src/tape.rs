@@ -14,6 +14,7 @@ use stepwell_core::{
         self, Id, OPERATIONS, Op,
         equations::{self, Invariant},
         fuse::fuse,
+        mass::Mass,
         print,
         real::Precision,
         reserved::BUDGET,
@@ -350,8 +351,9 @@ impl Tape {
 
     /// The rates of a user's own system: of v, and of y unless they are v itself; quantities of a state by name; and of the
     /// invariant that a projection keeps its value, its derivatives by v and by y, and the square of their length. `functions`
-    /// are values with, for each that they depend on, the derivative by it; and, of one branch of several, its bounds.
-    #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None, functions=Vec::new()))]
+    /// are values with, for each that they depend on, the derivative by it; and, of one branch of several, its bounds. `mass` is
+    /// the mass matrix: of each row the columns and entries that are not zero.
+    #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None, functions=Vec::new(), mass=None))]
     fn equations(
         &self,
         dv: Vec<PyRef<'_, Symbol>>,
@@ -359,6 +361,7 @@ impl Tape {
         quantities: Vec<(String, PyRef<'_, Symbol>)>,
         kept: Option<Kept<'_>>,
         functions: Vec<Function<'_>>,
+        mass: Option<Vec<Vec<(u32, f64)>>>,
     ) -> PyResult<Equations> {
         let tape = lock(&self.0);
         let known = |symbol: &PyRef<'_, Symbol>| -> PyResult<Id> {
@@ -379,6 +382,7 @@ impl Tape {
             Ok((known(&value)?, by, bounds.map(|bounds| bounds.map(f64::to_bits))))
         });
         let made = made.with_functions(functions.collect::<PyResult<Vec<_>>>()?);
+        let made = made.with_mass(mass.map(|rows| Mass::new(&rows)));
         Ok(Equations(Arc::new(made.without_the_rest())))
     }
 

@@ -108,6 +108,11 @@ class Traced:
 def _roots(tracer: Tracer, what: str, method: Method | None) -> list[Symbol]:
     """The symbols of the rates at h = 1, of the slots after a step, or of the state that finishes a slot."""
     if method is None:
+        if what == "rates" and tracer.system.mass_matrix is not None:
+            raise UnsupportedError(
+                f"rates: the algebraic equations of {tracer.system!r} give no rate for what they determine, so there is no "
+                f"matrix of rates; steps by implicit methods and consistent_start go without"
+            )
         if tracer.system.stick_friction is not None:
             raise UnsupportedError(
                 f"rates: {tracer.system!r} has friction that sticks; what it does depends on the step, so there are no rates "
@@ -197,7 +202,8 @@ def matrix(
 
     Args:
         system: the system.
-        what: "rates", the "step" of a method from slot to slot, or its "finish" from slots to states.
+        what: "rates", or "equations", which some may be algebraic; the "step" of a method from slot to slot, or its "finish" from
+            slots to states.
         method: the method; None for rates.
         members: the shape to which states, parameters, times and steps broadcast.
         v: the velocities, or what the method carries in place of them, shape (*block, *batch).
@@ -222,6 +228,21 @@ def matrix(
     for k, value in enumerate(entry.evaluation([*rows, nothing, *changes], t, h)):
         (values if k < n else derivative)[k % n] = value
     return derivative, values
+
+
+def of_rates(system: System, members: Shape, t: Any, v: Array, y: Array) -> Array:
+    """The derivatives of all rates by all numbers of the state, shape (n, n, *members)."""
+    return matrix(system, "rates", None, members, v, y, t)[0]
+
+
+def stepped(system: System, method: Method, v: Array, y: Array, h: Any) -> Array:
+    """The numbers of both blocks after a step from these, at time 0, by the tape of the step, shape (n, *batch)."""
+    traced = Traced(system, "step", method)
+    rows = _rows(system, v, y)
+    values = np.empty((traced.length, *np.broadcast_shapes(rows[0].shape, np.shape(h))))
+    for k, value in enumerate(traced.evaluation(traced.roots)([*rows, np.zeros(())], 0.0, h)):
+        values[k] = value
+    return values
 
 
 def together(system: System, v: Array, y: Array, **more: Any) -> Shape:

@@ -437,7 +437,7 @@ def _motions(tapes: _Tapes, plan: engine.Plan, v: Array, y: Array, shares: int) 
 
 def _world(plan: engine.Plan, step: _core.Equations, numbers: Array) -> _core.World:
     """The world that makes this step with these numbers, in place."""
-    parameters = plan.system.parameters(plan.batch, series=plan.method.has_series)
+    parameters = plan.system.parameters(plan.batch, series=plan.method.has_derivatives)
     model = _core.ModelSpec(plan.system.kernel, plan.method.name, [*parameters, ("step()", step)])
     return _core.World(model, plan, np.empty(0), numbers.reshape(-1))
 

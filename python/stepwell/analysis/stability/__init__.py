@@ -10,6 +10,7 @@ from .analysis import KINDS, Analysis, analyse
 from .counted import Operations, operations
 from .criterion import Criteria, Criterion, criteria
 from .expansion import Series, series
+from .function import StabilityFunction, function
 from .limit import Mode, StabilityLimit, StabilityLimits, stability_limit
 
 __all__ = [
@@ -21,10 +22,12 @@ __all__ = [
     "Operations",
     "Series",
     "StabilityAlong",
+    "StabilityFunction",
     "StabilityLimit",
     "StabilityLimits",
     "analyse",
     "criteria",
+    "function",
     "operations",
     "series",
     "stability_along",

@@ -121,7 +121,9 @@ def eigen(matrix: Array, units: Array | None = None) -> Eigen:
     # LAPACK returns the positive angle of a pair first, and later sorting keeps that order.
     values = np.where(finite, np.moveaxis(values, -1, 0), np.nan).astype(np.complex128)
     vectors = np.moveaxis(vectors.astype(np.complex128), (-2, -1), (0, 1))
-    return Eigen(values, vectors, units, np.sqrt((scaled * scaled).sum(axis=(0, 1))))
+    with np.errstate(over="ignore"):  # the matrix of a step far beyond all that is stable has a norm of infinity
+        norm = np.sqrt((scaled * scaled).sum(axis=(0, 1)))
+    return Eigen(values, vectors, units, norm)
 
 
 def vector(matrix: Array, value: complex) -> Complex:

@@ -70,7 +70,7 @@ def eigenvalues(matrix: Any, near: Complex) -> Complex:
 
 
 def unrounded(rates: Array, velocities: int, method: Method) -> tuple[Any, int]:
-    """P of ṡ = A·s as exact polynomials in dt/2ᵏ, shape (n, n), in units that balance A, and k.
+    """P of ṡ = A·s as exact polynomials in dt/2ᵏ, or quotients of them, shape (n, n), in units that balance A, and k.
 
     In that unit of time all elements of A are whole numbers, which ``polynomials`` takes as they are; other floats it replaces by
     simple fractions that round to them.
@@ -92,10 +92,15 @@ class Step:
 
     def __init__(self, rates: Array, velocities: int, method: Method) -> None:
         P, self.clock = unrounded(rates, velocities, method)
-        most = max(len(p.coefficients) for p in P.flat)
         self.digits = digits(rates) + GUARD_DIGITS
+        self.above, self.below = (self._powers(P, side) for side in (0, 1))
+
+    def _powers(self, P: Any, side: int) -> list[Number]:
+        """The coefficients of each power of dt in the polynomials above or below the line."""
+        polynomials = np.frompyfunc(lambda p: p.fraction[side], 1, 1)(P)
         with localcontext(context(self.digits)):
-            self.powers = [decimals(np.frompyfunc(lambda p, k=k: p[k], 1, 1)(P)) for k in range(most)]
+            most = max(len(p.coefficients) for p in polynomials.flat)
+            return [decimals(np.frompyfunc(lambda p, k=k: p[k], 1, 1)(polynomials)) for k in range(most)]
 
     def eigenvalues(self, dt: float) -> Complex:
         """The eigenvalues of P, right to double precision, shape (n,)."""
@@ -111,11 +116,20 @@ class Step:
     def _matrix(self, dt: float) -> tuple[Number, Complex]:
         """P, and its eigenvalues as computed in double precision."""
         with localcontext(context(self.digits)):
-            h, P = Decimal(dt) / (1 << self.clock), self.powers[-1]
-            for power in self.powers[-2::-1]:
-                P = P * h + power
+            h = Decimal(dt) / (1 << self.clock)
+            P, below = self._at(h, self.above), self._at(h, self.below)
+            if len(self.below) > 1:
+                P = P / below
             rough = P.astype(float)
         return P, eigen.eigenvalues(rough)
+
+    @staticmethod
+    def _at(h: Decimal, powers: list[Number]) -> Number:
+        """Polynomials at a step, by Horner's rule."""
+        value = powers[-1]
+        for power in powers[-2::-1]:
+            value = value * h + power
+        return value
 
 
 def _characteristic(m: Number) -> list[Decimal]:

@@ -1,4 +1,4 @@
-"""A method on the undamped oscillator as exact polynomials in Φ, and the series of its errors (Appendix A).
+"""A method on the undamped oscillator as exact polynomials in Φ or quotients of them, and the series of its errors (Appendix A).
 
 The reference step is run with h = Φ, an unknown, and ω₀ = 1. P then has polynomials for elements, from which p, q = r₁² and the
 series of Ψ/Φ follow by the rules of power series; no number is rounded.
@@ -14,9 +14,9 @@ import numpy as np
 
 from ...model.methods import Method
 from ...model.methods import method as find_method
-from ...model.systems import Oscillator, System
+from ...model.systems import LinearSystem, Oscillator, System
 from . import maps
-from .numbers import Polynomial
+from .numbers import Polynomial, Rational
 
 #: The number of terms of series in Φ²; the last is lost where a series is divided by Φ².
 TERMS = 8
@@ -29,13 +29,13 @@ class Series(NamedTuple):
     """A method on the undamped oscillator, as functions of Φ.
 
     Attributes:
-        p: half the trace of P, a polynomial.
-        q: the determinant of P, a polynomial: r₁² of a conjugate pair.
+        p: half the trace of P, a polynomial, or a quotient of two if a step solves equations.
+        q: the determinant of P, likewise: r₁² of a conjugate pair.
         ratio: the first terms of the series of Ψ/Φ.
     """
 
-    p: Polynomial
-    q: Polynomial
+    p: Polynomial | Rational
+    q: Polynomial | Rational
     ratio: Polynomial
 
     def __repr__(self) -> str:
@@ -64,8 +64,10 @@ def series(method: str | Method) -> Series:
 
 
 def polynomials(system: System, method: Method) -> Any:
-    """P of a linear system as exact polynomials in the step, shape (n, n, *members) of ``Polynomial``."""
+    """P of a linear system as exact polynomials in the step, or quotients of them, shape (n, n, *members)."""
     system = system.without_inputs()
+    if method.is_implicit and sum(maps.size(system)) > 1:
+        return _of_rates(system, method)
     dt: Any = Polynomial(0, 1)
     v, y = maps.unit(system, system.batch)
     exactly: Any = np.frompyfunc(Polynomial, 1, 1)
@@ -75,6 +77,29 @@ def polynomials(system: System, method: Method) -> Any:
     return maps.rows(system, *(np.asarray(block, dtype=object) for block in blocks))
 
 
+def _of_rates(system: System, method: Method) -> Any:
+    """P of a method that treats both blocks alike: R(h·A) with its stability function R, which needs no choice of pivots."""
+    alone = polynomials(LinearSystem([[1.0]], velocities=0), method)[0, 0]
+    A = maps.rates(system)
+    scaled: Any = np.frompyfunc(lambda x: Polynomial(0, x), 1, 1)(A)
+    identity: Any = np.frompyfunc(Polynomial, 1, 1)(np.eye(len(A)).reshape(A.shape[:2] + (1,) * (A.ndim - 2)))
+    above, below = np.zeros(A.shape, dtype=object), np.zeros(A.shape, dtype=object)
+    power = np.broadcast_to(identity, A.shape)
+    for k in range(max(len(p.coefficients) for p in alone.fraction)):
+        above, below = (total + power * p[k] for total, p in zip((above, below), alone.fraction, strict=True))
+        power = np.einsum("ij...,jk...->ik...", power, scaled)
+    # Elimination: at h = 0 the matrix below is the identity, so no pivot is zero.
+    n = len(A)
+    for k in range(n):
+        over = 1 / below[k, k]
+        below[k], above[k] = below[k] * over, above[k] * over
+        for i in range(n):
+            if i != k:
+                factor = below[i, k]
+                below[i], above[i] = below[i] - factor * below[k], above[i] - factor * above[k]
+    return above
+
+
 @cache
 def _series(method: Method) -> Series:
     (a, b), (c, d) = polynomials(Oscillator(), method)
@@ -82,7 +107,7 @@ def _series(method: Method) -> Series:
     return Series(p, q, _ratio(p, q))
 
 
-def _ratio(p: Polynomial, q: Polynomial) -> Polynomial:
+def _ratio(p: Polynomial | Rational, q: Polynomial | Rational) -> Polynomial:
     """The series of Ψ/Φ = arctan(√(q − p²)/p)/Φ.
 
     With P(−Φ) = S·P(Φ)·S, S = diag(1, −1), both p and q are even in Φ; in u = Φ² the root is Φ·√w(u), w(0) = 1, and with
@@ -103,9 +128,9 @@ def _ratio(p: Polynomial, q: Polynomial) -> Polynomial:
     return Polynomial(*ratio)
 
 
-def _even(p: Polynomial) -> list[Fraction]:
-    """A polynomial in Φ² by its powers of u."""
-    return [p[2 * k] for k in range(TERMS)]
+def _even(p: Polynomial | Rational) -> list[Fraction]:
+    """The power series of a function of Φ² by its powers of u."""
+    return p.terms(2 * TERMS)[::2]
 
 
 def _minus(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
@@ -131,8 +156,8 @@ def _root(a: list[Fraction]) -> list[Fraction]:
     return coefficients
 
 
-def _terms(p: Polynomial, most: int) -> list[tuple[int, Fraction]]:
-    terms = [(k, c) for k, c in enumerate(p.coefficients) if abs(c) > NEGLIGIBLE]
+def _terms(p: Polynomial | Rational, most: int) -> list[tuple[int, Fraction]]:
+    terms = [(k, c) for k, c in enumerate(p.terms(2 * TERMS)) if abs(c) > NEGLIGIBLE]
     return terms[:most]
 
 

@@ -13,6 +13,7 @@ from ...model.methods import Method
 from ...model.systems import System
 from . import eigen, exact, maps
 from .eigen import EPS, Complex, Truths
+from .function import a_stable
 from .limit_digits import LADDER, RUNG_RATIO, in_many_digits, passes_zero
 from .limit_result import Mode
 from .parts import rates
@@ -202,6 +203,9 @@ class Search:
 
     def limits(self) -> tuple[Array, Array]:
         """The limit of each member, and the smallest step known to grow: a larger one where rounding hides what is between."""
+        if self.v is None and a_stable(self.method):  # proven of all steps at once
+            grows = np.where(self.grows_by_itself, 0.0, np.inf)
+            return grows, grows.copy()
         fastest = np.where(self.fastest > 0.0, self.fastest, 1.0)
         none = len(LADDER)
         first = np.full(self.members, none)
@@ -360,7 +364,8 @@ class Search:
         doubtful = seek & (np.abs(slope) < MIN_SLOPE)
         if len(self.rates) == 2:
             z, _ = self.eigenvalues(limits)
-            doubtful |= at_an_angle & (np.abs(z[0] - z[1]) < NEARLY_DOUBLE)
+            with np.errstate(invalid="ignore"):  # infinite where P is not finite
+                doubtful |= at_an_angle & (np.abs(z[0] - z[1]) < NEARLY_DOUBLE)
         with np.errstate(invalid="ignore"):
             blurred = ~(np.take_along_axis(tolerance, largest, axis=0)[0] <= MAX_CROSSING_ERROR * np.abs(slope))
         return self.exactly(limits, doubtful), blurred
@@ -380,7 +385,8 @@ class Search:
             twice_p, q, near = a + d, a * d - b * c, np.ldexp(limits[at], -clock)
             # From a little below, so that the first of two roots that nearly meet is found (both eigenvalues, one after the
             # other).
-            margins = [f for f in (q - 1, 1 + q - twice_p, 1 + q + twice_p) if f.coefficients]
+            margins = [f.fraction[0] for f in (q - 1, 1 + q - twice_p, 1 + q + twice_p)]
+            margins = [f for f in margins if f.coefficients]
             roots = [(f, f.root_near(float(near * (1.0 - SEARCH_BELOW)))) for f in margins]
             # A margin that only nearly reaches zero (for a pair that nearly meets on the real line) has no root there.
             passed = [x for f, x in roots if abs(x / near - 1.0) < 10.0 * SEARCH_BELOW and passes_zero(f, x)]

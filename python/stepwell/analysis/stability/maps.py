@@ -38,6 +38,8 @@ def transition(system: System, method: Method, dt: Array) -> Array:
     if dt.ndim == 0:
         return linear.transition(engine.Plan(free, method, free.batch, float(dt)))
     members = np.broadcast_shapes(dt.shape, free.batch)
+    if method.is_implicit:  # the tape of its step serves all steps at once; its reference derives rates number by number
+        return traced.stepped(free, method, *unit(free, members), dt)
     return rows(free, *_step(free, method, dt, (sum(size(free)), *members), *unit(free, members)))
 
 
@@ -50,6 +52,9 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
         if dt.ndim == 0:
             one = linear.one_step(engine.Plan(constant, method, constant.batch, float(dt)))
             q[:, j] = one.reshape(n, *(1,) * (len(members) - one.ndim + 1), *one.shape[1:])
+        elif method.is_implicit:
+            v, y = (np.zeros((*shape, *members)) for shape in (system.v_shape, system.y_shape))
+            q[:, j] = traced.stepped(constant, method, v, y, dt)
         else:
             v, y = (np.zeros((*shape, 1, *members)) for shape in (system.v_shape, system.y_shape))
             q[:, j] = rows(system, *_step(constant, method, dt, (1, *members), v, y))[:, 0]
@@ -59,12 +64,12 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
 def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: Array) -> Array:
     """P of any system at the state (v, y) and time t: the exact derivative of the reference step with respect to the slots.
 
-    It is computed by the complex step where the system's reference accepts complex numbers and the method is no series, else from
-    the tape of the step. A projection of the system onto its energy is part of the step.
+    It is computed by the complex step where the system's reference accepts complex numbers and the method needs no derivatives,
+    else from the tape of the step. A projection of the system onto its energy is part of the step.
     """
     members = together(system, dt, v, y)
     slot = _started(system, method, dt, members, t, v, y) if method.carry else v
-    if method.has_series or not system.complex_step:
+    if method.has_derivatives or not system.complex_step:
         return traced.matrix(system, "step", method, members, slot, y, t, dt)[0]
     s: Any = _scaled(system, dt, (1, *members))
     h: Any = float(dt) if dt.ndim == 0 else dt

@@ -207,7 +207,12 @@ def _with(multiples: list[list[float | None]], i: int, j: int, value: complex) -
 
 @cache
 def function_of_rates(method: Method) -> bool:
-    """Whether a step of ṡ = A·s is a polynomial in h·A: the method treats both blocks alike. Tested exactly on one matrix."""
+    """Whether a step of ṡ = A·s is a function of h·A: the method treats both blocks alike. Tested exactly on one matrix.
+
+    An implicit step is, since it has the Jacobian of both blocks.
+    """
+    if method.is_implicit:
+        return True
     a = np.array([[2.0, 3.0], [-5.0, 7.0]])
     both = LinearSystem(a, velocities=1)
     try:

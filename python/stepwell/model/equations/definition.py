@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable
+from math import prod
 from types import FunctionType
 from typing import Any, Literal, get_args, overload
 
@@ -13,9 +14,10 @@ import numpy as np
 from ...base import checks, registry
 from ...base.arrays import Shape
 from ...base.immutable import frozen
-from ...errors import ArgumentError, DTypeError, UnknownNameError
+from ...errors import ArgumentError, DTypeError, ShapeError, UnknownNameError
 from ..inputs import Sampled, Sinusoid
 from .invariants import Invariant, invariant
+from .mass import MassMatrix, mass_matrix
 
 #: The numbers whose size the error of an adaptive step is relative to.
 Scale = Literal["component", "row", "block"]
@@ -32,6 +34,7 @@ class Definition:
         shape: the declared shapes of the blocks v and y; None for one that is taken from the state.
         quick_sines: whether sine and cosine are those of the built-in systems.
         scale: what the error of an adaptive step is relative to: each "component", "row" or "block".
+        mass: the mass matrix, or None for that of units.
         parameters: names and defaults.
         own_axes: how many axes of its own each parameter has: as many as its default.
         invariants: the declared invariants, by name.
@@ -45,9 +48,10 @@ class Definition:
         shape: tuple[Any, Any],
         quick_sines: bool = False,
         scale: str = "component",
+        mass: MassMatrix | None = None,
     ) -> None:
         self.function, self.order, self.blocks, self.shape = function, order, blocks, shape
-        self.quick_sines, self.scale = quick_sines, scale
+        self.quick_sines, self.scale, self.mass = quick_sines, scale, mass
         self.__name__ = self.name = function.__name__
         self.__doc__, self.__module__, self.__qualname__ = function.__doc__, function.__module__, function.__qualname__
         self.__wrapped__ = function
@@ -199,7 +203,13 @@ def _from_signature(function: Callable[..., Any], state: int) -> dict[str, Any]:
 def system(function: Callable[..., Any], /) -> Definition: ...
 @overload
 def system(
-    *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False, scale: Scale = "component"
+    *,
+    order: int = 2,
+    blocks: int = 1,
+    shape: Any = None,
+    quick_sines: bool = False,
+    scale: Scale = "component",
+    mass: Any = None,
 ) -> Callable[[Callable[..., Any]], Definition]: ...
 def system(
     function: Any = None,
@@ -210,6 +220,7 @@ def system(
     shape: Any = None,
     quick_sines: bool = False,
     scale: Scale = "component",
+    mass: Any = None,
 ) -> Any:
     """Make a kind of system from a function: your own equations, in NumPy style, as fast as built-in ones.
 
@@ -230,6 +241,9 @@ def system(
         scale: the size to which the error of an adaptive step is relative: the largest value that each ``"component"`` has had,
             so that components may have different units; the length of each ``"row"`` along the last axis, for a state of shape
             (bodies, 3) whose directions are equivalent; or the length of each whole ``"block"``, v and y.
+        mass: the mass matrix M of M·ẏ = f, with ``order=1``: constant numbers, shape (n, n) for a state of n numbers. It may be
+            singular: a row of zeros is an algebraic equation, 0 = f. Such a system is stepped by implicit methods, from a state
+            for which the algebraic equations hold; ``consistent_start`` finds one.
 
     Returns:
         A ``Definition``: called with parameters by name, it returns a ``System``.
@@ -254,13 +268,17 @@ def system(
     shapes = _shapes(shape, order, blocks)
     quick_sines = checks.flag("quick_sines", quick_sines)
     scale = checks.known("scale", scale, SCALES)
+    matrix = None if mass is None else mass_matrix("mass", mass)
+    if matrix is not None and order == 2:
+        raise ArgumentError("mass: expected order=1, M·ẏ = f; write a second-order equation as two of first order")
+    shapes = _with_mass(shapes, matrix)
 
     def define(function: Any) -> Definition:
         if isinstance(function, Definition):
             raise DTypeError(f"function: {function.name} is a system already")
         if not isinstance(function, FunctionType):
             raise DTypeError(f"function: expected a Python function such as f(t, v, y), got {type(function).__name__}")
-        return Definition(function, order, blocks, shapes, quick_sines, scale)
+        return Definition(function, order, blocks, shapes, quick_sines, scale, matrix)
 
     return define if function is None else define(function)
 
@@ -275,6 +293,18 @@ def _shapes(shape: Any, order: int, blocks: int) -> tuple[Any, Any]:
         return _shape(shape[0]), _shape(shape[1])
     one = None if shape is None else _shape(shape)
     return (one if order == 2 else (0,)), one
+
+
+def _with_mass(shapes: tuple[Any, Any], mass: MassMatrix | None) -> tuple[Any, Any]:
+    """The declared shapes, of y that of the rows of a mass matrix if none was declared."""
+    if mass is None:
+        return shapes
+    rows = len(mass.matrix)
+    if shapes[1] is None:
+        return shapes[0], (rows,)
+    if None not in shapes[1] and prod(shapes[1]) != rows:
+        raise ShapeError(f"mass: expected {prod(shapes[1])} rows and columns, one for each number of the state, got {rows}")
+    return shapes
 
 
 def _shape(shape: Any) -> tuple[int | None, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 from ...base.arrays import Array as Numbers
 from ...base.arrays import Shape
 from ...errors import REFUSED, TraceError
+from ...reference.mass import Mass, combined
 from ...reference.series import among
 from .arrays import QUICK_SINES
 from .namespace import rebound
@@ -81,6 +82,12 @@ class Equations:
             if name not in self._invariants or self._invariants[name].invariant is not each:
                 self._invariants[name] = Traced(each, self)
         return self._invariants
+
+    @property
+    def mass_matrix(self) -> Mass | None:
+        """The mass matrix if equations are algebraic. Of any other, the rates are multiplied by its inverse."""
+        matrix = self.definition.mass
+        return None if matrix is None or not matrix.algebraic else Mass(matrix.rows, self.y_shape)
 
     def keeping(self, name: str, *, limited: bool, pushed: bool) -> Equations:
         """These equations with an invariant that a control or a projection keeps."""
@@ -186,7 +193,14 @@ class Equations:
             return self._block("v̇", result[0], self.v_shape), self._block("ẏ", result[1], self.y_shape)
         if self.definition.order == 2:
             return self._block("v̇", result, self.v_shape), None
-        return None, self._block("ẏ", result, self.y_shape)
+        return None, self._combined(self._block("ẏ", result, self.y_shape))
+
+    def _combined(self, rates: Any) -> Any:
+        """The rows of equations that are combinations of the function's, so that each but algebraic ones is for one number."""
+        if self.definition.mass is None:
+            return rates
+        combinations = [combined(row, rates.ravel()) for row in self.definition.mass.combinations]
+        return objects(combinations).reshape(rates.shape)
 
     def _block(self, what: str, value: Any, shape: Shape) -> Any:
         try:

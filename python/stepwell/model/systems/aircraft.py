@@ -207,7 +207,7 @@ class Aircraft(OwnSystem):
 
     def _with_constraint_control(self, control: Any) -> Aircraft:
         controlled = super()._with_constraint_control(control)
-        controlled._core = controlled._single = None  # its rates have another term
+        controlled._core, controlled._single = None, {}  # its rates have another term
         return controlled
 
     # ---- attitudes

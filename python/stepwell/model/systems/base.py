@@ -20,6 +20,7 @@ from ..inputs import Sampled
 from ..parameters import CoreParameters, flat, of_shape
 
 if TYPE_CHECKING:
+    from ...reference.mass import Mass
     from ...reference.quantities import Quantity
     from ..controls import AnyControl, ConstraintControl, EnergyControl, Projection
     from ..inputs import Input
@@ -45,6 +46,7 @@ class System(Immutable, ValueEquality, ABC):
         complex_step: whether the reference is correct for numbers with an infinitesimal imaginary part, which is the fastest way
             to its derivatives; those of other systems come from their tape.
         input_names: the names of the inputs that it accepts, each a number.
+        mass_matrix: the mass matrix M, if some equations of M·ẏ = f are algebraic; the rates are then f.
         batch: shape to which the parameters broadcast.
         around: the parts around its equations, from the inside out; see ``model/around.py``.
         constraint: the name of the constraint on its coordinates that a control or projection can keep; None without one.
@@ -66,6 +68,7 @@ class System(Immutable, ValueEquality, ABC):
     y_shape: Shape = ()
     velocity_term: str | None = None
     input_names: tuple[str, ...] = ()
+    mass_matrix: Mass | None = None
     batch: Shape = ()
     around: tuple[Part, ...] = ()
     constraint: ClassVar[str | None] = None

@@ -26,4 +26,7 @@ def digest(system: System) -> str:
         values += tracer.flat(s.record(name, v, y))
     if isinstance(known.keeper, Projection):
         values += tracer.flat(*s.gradient(v, y))
-    return hashlib.sha256(repr(tape.operations(values)).encode()).hexdigest()
+    operations = repr(tape.operations(values))
+    if known.mass_matrix is not None:
+        operations += repr(known.mass_matrix.rows)
+    return hashlib.sha256(operations.encode()).hexdigest()

@@ -16,6 +16,7 @@ from ...base.arrays import Array, Shape
 from ...base.immutable import changed, complete
 from ...errors import ShapeError, TraceError, UnsupportedError
 from ...reference.marks import Marks, recording
+from ...reference.mass import Mass
 from ...reference.systems.equations import Equations as Reference
 from ...reference.traced import Tracer
 from ..controls import WAYS, AnyControl, ConstraintControl, Control, EnergyControl, Projection
@@ -63,7 +64,7 @@ class OwnSystem(System):
         self.equations: Equations | None = None
         #: The operations of the function, and those in float32.
         self._core: Any = None
-        self._single: Any = None
+        self._single: dict[bool, Any] = {}
         #: The rates ``_core``, and these rates with the derivatives of their functions, for series.
         self._with_functions: tuple[Any, Any] | None = None
         #: This system for blocks of these shapes, and for states of these shapes, which may have batch axes.
@@ -74,6 +75,12 @@ class OwnSystem(System):
     def keeper(self) -> AnyControl | None:
         """The control, which is a part of the rates, or the projection, which is around them."""
         return self.push if self.push is not None else self.control
+
+    @property
+    def mass_matrix(self) -> Mass | None:  # type: ignore[override]  # of other systems it is always None
+        """The mass matrix, if equations are algebraic."""
+        equations = self._known().equations
+        return None if equations is None else equations.mass_matrix
 
     @property
     def kind_name(self) -> str:
@@ -92,7 +99,7 @@ class OwnSystem(System):
         return {name: value for name, value in super()._contents().items() if name not in DERIVED}
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}
+        return vars(self) | {"_core": None, "_single": {}, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
         own = {name: copy.deepcopy(vars(self)[name], memo) for name in ("parameters_given", "around") if name in vars(self)}
@@ -189,7 +196,7 @@ class OwnSystem(System):
             for name, value in self.parameters_given.items()
         }
         equations = Equations(definition, v_shape, y_shape, shapes)
-        bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _single=None, _bounds={}, _met={})
+        bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _single={}, _bounds={}, _met={})
         bound._trace_once()
         self._bounds[v_shape, y_shape] = bound
         return bound
@@ -213,7 +220,8 @@ class OwnSystem(System):
             parameters = tuple((name, self._kind_of(name, value)) for name, value in self.parameters_given.items())
             invariants = tuple((each.name, each.parameters, identity(each.function)) for each in definition.invariants.values())
             function = identity(definition.function)
-            key = definition.order, definition.blocks, definition.quick_sines, self.v_shape, self.y_shape
+            mass = None if definition.mass is None else definition.mass.matrix.tobytes()
+            key = definition.order, definition.blocks, definition.quick_sines, self.v_shape, self.y_shape, mass
             return *key, function, parameters, invariants, definition.name
         except Unknown:
             return None
@@ -267,7 +275,8 @@ class OwnSystem(System):
             projected = (*tracer.flat(value), tracer.flat(along_v), tracer.flat(along_y), *tracer.flat(square))
         own_dv, own_dy = dv if equations.v_shape != (0,) else [], None if equations.second_order else dy
         functions = [] if marks is None else derivatives_of_functions(tape, marks)
-        return tape.equations(own_dv, own_dy, quantities, projected, functions)
+        rows = None if equations.mass_matrix is None else equations.mass_matrix.rows
+        return tape.equations(own_dv, own_dy, quantities, projected, functions, rows)
 
     def _known(self) -> OwnSystem:
         """This system with known shapes of its blocks."""
@@ -303,15 +312,15 @@ class OwnSystem(System):
     def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
         """The operations of the function and the parameters by name, as the core takes them; for ``series`` with derivatives."""
         bound = self._retraced()
-        rates = bound._in_single() if single else bound._series_rates() if series else bound._core
+        rates = bound._in_single(series) if single else bound._series_rates() if series else bound._core
         own = {name: value for name, value in bound.all_parameters(batch).items() if name != RATES and not callable(value)}
         return [(RATES, rates), *flat(own, batch)]
 
-    def _in_single(self) -> Any:
-        """The operations of the function in float32."""
-        if self._single is None:
-            self._single = self._rates(single=True)
-        return self._single
+    def _in_single(self, series: bool) -> Any:
+        """The operations of the function in float32; for ``series`` with derivatives."""
+        if series not in self._single:
+            self._single[series] = self._rates({} if series else None, single=True)
+        return self._single[series]
 
     @property
     def chooses(self) -> bool:
@@ -412,13 +421,18 @@ class OwnSystem(System):
         return checks.known("control", name, self.definition.invariants)
 
     def _keeping(self, name: str, control: Any) -> OwnSystem:
+        if self.mass_matrix is not None:
+            raise UnsupportedError(
+                f"control: {control!r} moves the state along the gradient of an invariant, and the algebraic equations of "
+                f"{self!r} do not hold there"
+            )
         known = self._known().uncontrolled  # a control replaces another
         assert isinstance(known, OwnSystem)
         assert known.equations is not None
         pushed = isinstance(control, Control)
         controlled = changed(
             known,
-            _single=None,
+            _single={},
             _bounds={},
             _met={},
             _free=known,

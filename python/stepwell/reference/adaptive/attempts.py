@@ -25,6 +25,7 @@ class Stretched:
     def __init__(self, s: Scaled, h: Array) -> None:
         self.s, self.h = s, h
         self.fixed = getattr(s, "fixed", ())
+        self.mass_matrix = getattr(s, "mass_matrix", None)
 
     def dv(self, t: Array, v: Array, y: Array) -> Array:
         """h·v̇."""
@@ -90,6 +91,7 @@ class Backward:
             self.stretched = lambda h: Backward(s.stretched(-h))
         if hasattr(s, "project"):
             self.project = s.project
+        self.mass_matrix = getattr(s, "mass_matrix", None)
         self.fixed = getattr(s, "fixed", ())
 
     def dv(self, t: Any, v: Array, y: Array) -> Any:
@@ -119,9 +121,11 @@ class Tried(NamedTuple):
     work: Any
 
 
-def tried(pair: Pair, system: Attempted, t: Any, step: Any, v: Array, y: Array) -> Tried:
-    """The stages of an attempt, and what follows from them by their weights."""
+def tried(pair: Pair, system: Attempted, t: Any, step: Any, v: Array, y: Array, axes: tuple[int, int] | None = None) -> Tried:
+    """The stages of an attempt, and what follows from them by their weights; ``axes`` is how many axes a member's blocks have."""
     s = system.rates(step)
+    if axes is not None:
+        s.axes = axes
     increments = pair.stages(s, t, step, v, y)
     v1, y1 = tableau.plus(v, y, pair.WEIGHTS, increments)
     weights = [pair.ERROR, *([coarse] if (coarse := getattr(pair, "COARSE", None)) else [])]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
+from .. import mass
 from ..acceptance import Acceptance
 from ..bits import at_most, less, where
 from .attempts import Attempted, Pair, Tried, tried
@@ -73,7 +74,7 @@ def begin(
     is ``MOVES`` or that of float32.
     """
     with np.errstate(all="ignore"):
-        rates = s.dv(pace.t, v, y), s.dy(pace.t, v, y)
+        rates = s.dv(pace.t, v, y), mass.rates(s, s.dy(pace.t, v, y))
         longest = sizes(v, y, block_axes, groups)
         least = moves * longer(pace.t, -pace.t)
         counts = Acceptance(groups).counts(*numbers_in(v, y, block_axes))
@@ -86,7 +87,8 @@ def begin(
         for part in (0.5, 1.0):
             ahead = part * chosen
             t1, v1, y1 = pace.t + ahead, v + ahead * rates[0], y + ahead * rates[1]
-            time = shortest(longest, sizes(s.dv(t1, v1, y1), s.dy(t1, v1, y1), block_axes, groups), counts)
+            ahead_rates = s.dv(t1, v1, y1), mass.rates(s, s.dy(t1, v1, y1))
+            time = shortest(longest, sizes(*ahead_rates, block_axes, groups), counts)
             h = where(less(FIRST * time, h), FIRST * time, h)
         h = where(less(0.0, pace.h), pace.h, longer(h, least))
         h = pace.shortened(h, pace.t)
@@ -136,7 +138,7 @@ def attempt(
     An extra step that is accepted leaves the pace as it is. ``order`` is the one in which the error is estimated.
     """
     outlook = pace.outlook(budget)
-    trial = tried(pair, system, pace.t, outlook.step, v, y)
+    trial = tried(pair, system, pace.t, outlook.step, v, y, block_axes)
     return judged(pace, outlook, order, block_axes, acceptance, v, y, trial)
 
 

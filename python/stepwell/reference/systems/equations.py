@@ -54,6 +54,11 @@ class Equations:
         """h·ẏ."""
         return self.h * (v if self.equations.second_order else self.rates(t, v, y)[1])
 
+    @property
+    def mass_matrix(self) -> Any:
+        """The mass matrix, if equations are algebraic: dy is then h·f of M·ẏ = f."""
+        return self.equations.mass_matrix
+
     def velocity(self, d: Array) -> Array:
         """The v whose increment of y is d."""
         velocity: Array = d / self.h

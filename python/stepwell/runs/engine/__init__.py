@@ -28,6 +28,7 @@ from .adaptive import (
     TARGET,
     TIME,
     UNTIL,
+    WAYPOINTS,
     WORK,
     Adapted,
     AdaptiveArrays,
@@ -49,6 +50,7 @@ from .adaptive import (
     pace_of,
     paces,
     pacing_of_core,
+    room_for_waypoints,
 )
 from .direct import to_slot
 from .forms import advance
@@ -72,6 +74,7 @@ __all__ = [
     "TARGET",
     "TIME",
     "UNTIL",
+    "WAYPOINTS",
     "WORK",
     "Adapted",
     "AdaptiveArrays",
@@ -100,6 +103,7 @@ __all__ = [
     "paces",
     "pacing_of_core",
     "pushes",
+    "room_for_waypoints",
     "to_slot",
 ]
 

@@ -171,7 +171,7 @@ class Adapted(NamedTuple):
     waypoints: Array | None = None
 
 
-def _room_for_waypoints(pacing: Pacing, state: int, pace: int, members: int) -> Array | None:
+def room_for_waypoints(pacing: Pacing, state: int, pace: int, members: int) -> Array | None:
     """Room for the waypoints of all members, two states and a pace each; None if they are not asked for, or are too many."""
     numbers = 2 * state + pace
     if not pacing.waypoints or WAYPOINTS * numbers * members > MOST_IN_WAYPOINTS:
@@ -212,9 +212,12 @@ def paces(
             t0 = jumps.begun(t0)
         if step is None:
             span = pacing.at[-1] - plan.t0
-            step = -BLIND * np.where((span > 0.0) & (span < SHORT), span, 1.0)
+            if isinstance(span, float):
+                step = -BLIND * (float(span) if 0.0 < span < SHORT else 1.0)
+            else:
+                step = -BLIND * np.where((span > 0.0) & (span < SHORT), span, 1.0)
     each = [-BLIND if step is None else step, relative, absolute, np.inf if most_step is None else most_step, t0]
-    h, *both, longest, begin = (np.asarray(number).item() if np.size(number) == 1 else number for number in each)
+    h, *both, longest, begin = (_one_number(number) for number in each)
     tolerance = both[0], both[1], float(tolerances.absolute is None)
     numbers = [*adaptive.waiting(begin, h, tolerance, plan.system.samples, longest, groups).numbers, *own]
     if not any(getattr(number, "ndim", 0) for number in numbers):  # as ``np.ndim``, in a fifth of the time
@@ -223,6 +226,13 @@ def paces(
     for row, number in zip(out, numbers, strict=True):
         row[...] = number
     return out
+
+
+def _one_number(number: Any) -> Any:
+    """An array of one number as that number."""
+    if isinstance(number, float):
+        return float(number)
+    return np.asarray(number).item() if np.size(number) == 1 else number
 
 
 def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
@@ -328,7 +338,7 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     if pacing.every:
         blocks = (np.empty((pacing.room, *shape, members)) for shape in (plan.system.v_shape, plan.system.y_shape))
         steps = KeptSteps(np.zeros(members, np.int64), np.empty((pacing.room, members)), *blocks)
-    waypoints = _room_for_waypoints(pacing, len(last), numbers, members)
+    waypoints = room_for_waypoints(pacing, len(last), numbers, members)
     ends = status.reshape(-1)
     arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, ends, None, steps, waypoints)
     core_pacing, core_plan = pacing_of_core(plan, pacing), plan._replace(t0=0.0)
@@ -355,7 +365,7 @@ def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array
     pace = begun(plan, paces, v, y) if pacing.begins else pace_of(plan, paces)
     attempt, jumps = attempt_by_numpy(plan, pacing.budget), jumps_of(plan, pacing)
     series, numbers = plan.method.has_series, prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    waypoints = _room_for_waypoints(pacing, numbers, pace_numbers(plan), plan.members)
+    waypoints = room_for_waypoints(pacing, numbers, pace_numbers(plan), plan.members)
     at, budget, every = pacing.at, pacing.budget, pacing.every
     out = adaptive.run(attempt, v, y, pace, at=at, budget=budget, jumps=jumps, series=series, every=every, waypoints=waypoints)
     each = _evaluations_of_attempt(plan)

@@ -94,7 +94,7 @@ class Plan(NamedTuple):
     @property
     def by_tape(self) -> bool:
         """Whether the NumPy backend evaluates the tape of the reference: for fused steps, float32 and series."""
-        return self.fused or self.single or self.method.has_series
+        return self.fused or self.single or self.method.has_derivatives
 
     @property
     def members(self) -> int:
@@ -152,7 +152,7 @@ class Outcome(NamedTuple):
 
 def model(plan: Plan) -> _core.ModelSpec:
     """The model of a plan, as the core takes it."""
-    series = plan.method.has_series and not plan.single
+    series = plan.method.has_derivatives
     parameters = plan.system.parameters(plan.batch, series=series, single=plan.single)
     if isinstance(plan.t0, np.ndarray) and plan.system.has_time and not plan.single:
         parameters.append((BEGINS, rows(plan.t0, plan.batch, 0)))

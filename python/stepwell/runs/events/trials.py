@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
+from ...base import registry
 from ...base.arrays import Array
 from ...model.systems.own import OwnSystem
 from ...reference import contact, series_pace, tableau
@@ -99,6 +100,9 @@ class Trials:
 
     def rates(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """By how much v and y of these members would change in a step of this length at their rates here."""
+        if self._plan.system.mass_matrix is not None:
+            plan, sign = self._members.plan(index), -1.0 if self._plan.backward else 1.0
+            return v, sign * h * registry.task("algebraic_rates")(plan.system, y, sign * t, h)  # v has no numbers
         if not self._rates_traced:
             self._rates, self._rates_traced = self._traced_rates(), True
         if self._rates is None:
@@ -221,6 +225,7 @@ def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple
 def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
     """A step of a method from v and y; what it carries in place of v is computed again for this length."""
     steps, carries = plan.method.steps, plan.method.carry is not None
+    s.axes = plan.block_axes  # behind these are those of members, each with a length of its own
     if not carries:
         return tuple(contact.step(steps, s, plan.choice, t, h, v, y))
     with over(of_slot(t, h)):
@@ -238,7 +243,9 @@ def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any)
         terms, share = expanded(system.unit, plan.order or steps.ORDER, t, (unit, unit), v, y)[0], h * (1.0 / unit)
         v, y = (series_pace.value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
     else:
-        v, y = tableau.plus(v, y, steps.WEIGHTS, steps.stages(system.rates(h), t, h, v, y))
+        s = system.rates(h)
+        s.axes = plan.block_axes
+        v, y = tableau.plus(v, y, steps.WEIGHTS, steps.stages(s, t, h, v, y))
     v, y, _ = system.project(v, y)
     return v, y
 

@@ -64,6 +64,8 @@ def formula(name: str, of: Sequence[Formula], extra: int, bits: Sequence[int | N
     if name in ON_BITS:
         if all(each.is_truth or known in (0, all_bits) for each, known in zip(of, bits, strict=True)):
             return _of_truths(name, of, bits, all_bits)
+        if name == "and" and all_bits >> 1 in bits and "|" not in (text := of[bits[0] is not None].text):  # all but the sign
+            return Formula(f"|{text}|")
         of = [each if known is None else bit_pattern(known) for each, known in zip(of, bits, strict=True)]
     match name:
         case "add":

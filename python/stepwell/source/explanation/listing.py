@@ -94,12 +94,21 @@ class Writer:
         self.notation = Notation() if notation is None else notation
         self._numbers: Counter[str] = Counter()
         self._used: set[str] = set()
+        self._traced = len(tape)
 
     def symbol(self, name: str, of: Sequence[Any], extra: int) -> Any:
         """The symbol of an operation, by which its name is known; None if an operand has no symbol."""
         if any(each is None for each in of):
             return None
-        return self.notation.called[name](of[0]) if name in self.notation.called else of_tape(self.tape, name, of, extra)
+        if name in self.notation.called:
+            return self.notation.called[name](of[0])
+        symbol = of_tape(self.tape, name, of, extra)
+        if name == "multiply" and symbol.id >= self._traced:
+            # The core moved a sign from the product to a constant in it; the method has it before the product.
+            for a, b in (of, reversed(of)):
+                if (product := (-a) * b).id < self._traced:
+                    return -product
+        return symbol
 
     def source(self, name: str, extra: int) -> Any:
         """The symbol of a value without operands."""
@@ -299,6 +308,12 @@ def lines_of_program(plan: Plan, attempts: bool) -> tuple[Section, ...]:
             case "dv" | "dy":
                 t = "t" if share == 0.0 else "t + h" if share == 1.0 else f"t + {share!r}·h"
                 text = Formula(f"{name}({t}, {parts[0].text}, {parts[1].text})")
+            case "implicit v" | "implicit y":
+                text = Formula(f"solve_{name[-1]}({parts[0].text}, {parts[1].text})")
+            case "v by time" | "y by time":
+                text = Formula(f"d{name[0]}_by_t")
+            case "mass":
+                text = parts[0]  # a step with a mass matrix is one tape
             case "scale":
                 text = formula("multiply", [number(_bits(share)), *parts], 0, [None, None])
             case _:

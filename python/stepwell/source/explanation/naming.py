@@ -11,8 +11,9 @@ import numpy as np
 
 from ... import _core
 from ...base.arrays import Shape
-from ...reference import adaptive
+from ...reference import adaptive, pivoting
 from ...reference.acceptance import Acceptance
+from ...reference.series import among
 from ...reference.signal import COMPOSED, Held
 from ...reference.tape import increments
 from ...reference.tape.lines import in_order, listed, needed
@@ -36,6 +37,12 @@ class Named(Tracer):
         self.called: list[tuple[Any, str]] = []
         self._taken: set[str] = set()
         self._length: Any = None
+        self._solved = 0
+
+    def step(self, method: Any, choice: int = 0) -> list[Any]:
+        """The slots after a step, of which the parts of its elimination are named, too."""
+        with pivoting.noting(self._note_part):
+            return super().step(method, choice)
 
     def scaled(self, h: Any) -> Any:
         """The system, whose evaluations are recorded."""
@@ -43,6 +50,8 @@ class Named(Tracer):
 
         def noting(which: str, rate: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
             def increment(t: Any, v: Any, y: Any) -> Any:
+                if among((v, y)):
+                    return rate(t, v, y)  # for derivatives
                 counts[which] += 1
                 rates = rate(t, v, y)
                 for name, block in (("v", v), ("y", y)):
@@ -59,7 +68,22 @@ class Named(Tracer):
         """The state and the pace after an attempt; its increments are the rates times the length of its step."""
         _, _, more = self.state()
         self._length = self.pace(acceptance, more).outlook(self.tape.budget()).step
-        return super().attempt(method, order, acceptance, backward=backward)
+        with pivoting.noting(self._note_part):
+            return super().attempt(method, order, acceptance, backward=backward)
+
+    def _note_part(self, word: str, numbers: dict[Shape, Any]) -> None:
+        """Note a part of an elimination: its entries by two places, and solutions, of which there are several, by one."""
+        if word == "solution":
+            self._solved += 1
+            word = f"{word}{self._solved}"
+        for index, value in numbers.items():
+            self._name(indexed(word, index), value)
+
+    def _name(self, name: str, value: Any) -> None:
+        """Note the name of one value, and of its negative."""
+        if isinstance(value, _core.Symbol):
+            self.names.setdefault(value.id, name)
+            self.called.append((value, name))
 
     def _note(self, name: str, block: Any) -> None:
         block = np.asarray(block, dtype=object)

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from ... import _core
 from ...base.immutable import ValueEquality
 from ...base.reprs import counted
 from ...base.tables import write_json
@@ -33,6 +34,10 @@ PARTS = {
     "matrix": "its products of matrices are made by a loop that was compiled beforehand, one member after the other",
     "hand": "the rates are computed by a loop that was compiled beforehand, one member after the other",
 }
+
+
+#: Names whose meaning begins with them, as several have one.
+MEANINGS = ("fma", "v2", "P", "s", "solve_v", "dv_by_t")
 
 
 @dataclass(frozen=True)
@@ -247,6 +252,11 @@ class Explanation(ValueEquality):
         counts = [f"{n} {self._when(Section(when, ()))}" for when, n in self.hoisted.items() if n]
         return f"Operations that are made before: {'; '.join(counts) if counts else 'none'}."
 
+    def _gamma(self) -> str:
+        """The factor of h·J in the equations of an implicit step."""
+        gammas = [share for name, _, share in _core.program(self.method.name)[0] if name == "implicit v"]
+        return "" if gammas in ([], [1.0]) else f"{gammas[0]:.6g}·"
+
     def words(self) -> list[str]:
         """The meanings of names in the listing that are no arguments."""
         text = [f"{line.name} {line.formula}" for section in (*self.sections, *self.beside) for line in section.lines]
@@ -258,12 +268,15 @@ class Explanation(ValueEquality):
             "v2": "v2, y2: the state at which rates are asked for the second time",
             "s": "s: the numbers of v and then those of y",
             "P": "P, Q: the transition matrix of a step, and what the inputs add at each node",
+            "solve_v": f"solve_v, solve_y: x of (I − {self._gamma()}hJ)·x = (a, b), with the derivatives J of the rates at the "
+            f"start of the step; a loop that was compiled beforehand eliminates rows",
+            "dv_by_t": "dv_by_t, dy_by_t: h times the derivatives of h·v̇ and h·ẏ by the time",
             "dv": "h times the rate of v" if self.parts is None else "dv(t, v, y) = h times the rate of v",
         }
         shown = []
         for name, meaning in known.items():
             if any(_names(name, each) for each in text):
-                shown.append(meaning if name in ("fma", "v2", "P", "s") else f"{name}: {meaning}")
+                shown.append(meaning if name in MEANINGS else f"{name}: {meaning}")
         if self.method.carry:
             shown.append(f"{self.method.carry}: what is carried in place of v between steps")
         return [f"Here {'; '.join(shown)}."] if shown else []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ... import _core
 from ...base.arrays import Shape
 from ...base.checks import short
+from ...model.methods import stable_for
 from ...runs import engine
 from .lines import indented
 from .skeleton import Skeleton
@@ -24,7 +25,7 @@ def head(w: Written, language: Skeleton, v: list[float], y: list[float]) -> list
     """The lines of the comment, without its marks."""
     plan = w.traced.plan
     method, system = plan.method, plan.system
-    limit = f"undamped oscillators for omega*dt < {method.limit:.10g}" if method.limit else "no undamped oscillator, whatever dt"
+    limit = f"undamped oscillators for {stable_for(method.limit, 'omega*dt', 10)}"
     count = engine.evaluations(method, system)
     evaluations = f"{count} rate evaluation{'s' * (count > 1)} per step"
     blocks = [("v", system.v_shape), ("y", system.y_shape)]

@@ -29,6 +29,7 @@ from .outcome import Spending, rejection, row, shortfall_of
 from .result import Advice
 from .rows import Rejected, Row, Shortfall
 from .search import LONG_RUN_SHARE, MAX_EVALUATIONS, SIZE_EXPONENT, Search
+from .stiff import Stiff, stiff_of
 from .trials import Trial, Trials
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 Kind = TypeVar("Kind")
 
-__all__ = ["Advice", "Rejected", "Row", "Shortfall", "advise"]
+__all__ = ["Advice", "Rejected", "Row", "Shortfall", "Stiff", "advise"]
 
 COSTS: tuple[Cost, ...] = ("time", "evaluations")
 DTYPES: tuple[Dtypes, ...] = ("float64", "float32", "both")
@@ -183,12 +184,15 @@ def advise(
             need = spent.longest(each, fewest[each.name].k)
             reason = f"good enough, but takes {need:.3g} s{worst} of the {budget:.3g} s"
             rejected.append(Rejected(each.method.name, "budget", reason, each.by, each.dtype))
-    fastest = predict.fastest_oscillation(trials) if fits else None
+    rates = predict.rates_along(trials) if fits else None
+    fastest = None if rates is None or trials.scene.system.linear else rates.oscillation
     ranked = tuple(row(trials, each, fewest[each.name], spent, budget, fastest) for each in fits)
     shortfall = None if ranked else shortfall_of(candidates, fewest, spent, budget)
     runs = trials.runs + narrow.runs + adaptive.runs
     outcome = (trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, runs, known.cut, noise)
-    return Advice(*outcome, dtype=dtype)
+    explicit = dict.fromkeys(each.method for each in candidates)
+    stiff = stiff_of(ranked[0].method, ranked[0].dt, rates, explicit) if ranked else None
+    return Advice(*outcome, dtype=dtype, stiff=stiff)
 
 
 def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:

@@ -141,7 +141,7 @@ def motion_of(scene: Scene, frame: float | None, tolerance: float, single: bool 
         raise ArgumentError(f"scene: the true motion of {scene.name} is not known {far}, so there is no error to judge by")
     judged = replace(scene, exact=exact, until=math.inf, horizon=horizon)
     if scene.exact is None:
-        exact = tabled(exact, until, judged.scales, min(MAX_TABLE_ERROR, tolerance / TABLE_FACTOR))
+        exact = tabled(exact, until, judged.scales_of_numbers, min(MAX_TABLE_ERROR, tolerance / TABLE_FACTOR))
 
     judged = replace(judged, exact=Within(exact, until))
     return Motion(judged, grid, _marks(judged), cut, ERROR_SHARE if scene.exact is None else 1.0, until)
@@ -152,12 +152,11 @@ def _marks(scene: Scene) -> Array:
     assert scene.exact is not None
     t = even = np.linspace(0.0, scene.horizon, EVEN_SAMPLES + 1)
     path = np.linspace(0.0, 1.0, EVEN_SAMPLES + 1)
+    _ = scene.scales  # which checks what a function of the user returns
     blocks = scene.exact(t)
     for i in range(PATH_ITERATIONS):
-        length = np.zeros(len(t) - 1)
-        for block, scale in zip(blocks, scene.scales, strict=True):
-            change = np.diff(block.reshape(len(t), -1), axis=0)
-            length += np.sqrt((change * change).sum(axis=1)) / (scale or 1.0)
+        changes = scene.relative_lengths(*(np.diff(block, axis=0) for block in blocks))
+        length = np.where(np.isfinite(changes), changes, 0.0).sum(axis=0)
         reached = np.concatenate([[0.0], np.cumsum(length)])
         if len(path) == len(even) and reached[-1] * SAMPLES_PER_LENGTH > EVEN_SAMPLES:
             path = np.linspace(0.0, 1.0, min(MAX_SAMPLES, math.ceil(reached[-1] * SAMPLES_PER_LENGTH)) + 1)

@@ -51,7 +51,7 @@ class Spending:
 def row(
     trials: Trials, candidate: Candidate, fewest: Fewest, spent: Spending, budget: float | None, fastest: float | None
 ) -> Row:
-    """The row of a candidate that is good enough; ``fastest`` is the fastest oscillation along the motion, or None."""
+    """The row of a candidate that is good enough; ``fastest`` is the frequency of the fastest oscillation, or None."""
     method, trial, grid = candidate.method, fewest.trial, trials.grid
     ns, mean, longest = spent.times[candidate.name], spent.mean(candidate, trial), spent.longest(candidate, fewest.k)
     per_frame = candidate.evaluations * trial.steps / grid.spans

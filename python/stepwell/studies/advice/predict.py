@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...analysis.stability import Mode, analyse, maps
+from ...base.arrays import Array
 from ...errors import UnsupportedError
 from ...model.methods import Method
 from ...scenes import Scene
 from .trials import Trials
+
+Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
 #: Times at which a prediction is compared with the exact modes.
 SAMPLES = 10_000
@@ -22,6 +25,9 @@ MAX_CONDITION = 1e8
 #: The number of states of the true motion at which a nonlinear system is linearised; and the most numbers of a state for that,
 #: since eigenvalues take long.
 LINEARIZED_STATES, MAX_NUMBERS = 400, 128
+
+#: A rate that is so many times the fastest oscillation holds down steps before that does.
+MUCH_FASTER = 5.0
 
 #: A step that is this many times as long as an advised one must not blow up either. The margin is more than twice the distance
 #: between the steps at which the observed limit is searched.
@@ -43,6 +49,36 @@ class Prediction(NamedTuple):
     error: float
     frequency: float | None
     damping: float
+
+
+class Rates(NamedTuple):
+    """Eigenvalues of the rates at states of the true motion.
+
+    Attributes:
+        times: the times of these states.
+        values: the eigenvalues, shape (times, numbers of a state).
+    """
+
+    times: Array
+    values: Complex
+
+    @property
+    def fastest(self) -> tuple[complex, float] | None:
+        """The largest of those that do not grow, and its time; None if all are zero or grow."""
+        sizes = np.where(self.values.real <= 0.0, np.abs(self.values), 0.0)
+        i, k = np.unravel_index(int(sizes.argmax()), sizes.shape)
+        return (complex(self.values[i, k]), float(self.times[i])) if sizes[i, k] > 0.0 else None
+
+    @property
+    def oscillation(self) -> float | None:
+        """The largest frequency, in rad per unit of time; None if nothing oscillates, or if what decays is much faster.
+
+        Eigenvalues at fixed states do not bound the motion between them, but a method blows up at the fastest oscillation if that
+        lasts for some steps.
+        """
+        largest = float(np.abs(self.values.imag).max())
+        fastest = self.fastest
+        return None if not largest or (fastest is not None and abs(fastest[0]) > MUCH_FASTER * largest) else largest
 
 
 class Limit(NamedTuple):
@@ -84,10 +120,9 @@ def predicted(scene: Scene, method: Method, dt: float, steps: int) -> Prediction
         true = np.real(shapes @ (true_share[:, np.newaxis] * np.exp(rates[:, np.newaxis] * (k * dt))))
         difference = np.nan_to_num(x - true, nan=np.inf, posinf=np.inf, neginf=-np.inf)
         n_v = maps.size(system)[0]
-        blocks = (difference[:n_v], difference[n_v:])
-        errors = [
-            np.sqrt((b * b).sum(axis=0)).max() / scale for b, scale in zip(blocks, scene.scales, strict=True) if len(b) and scale
-        ]
+        blocks = difference[:n_v].T.reshape(len(k), *system.v_shape), difference[n_v:].T.reshape(len(k), *system.y_shape)
+        lengths = zip(scene.lengths(blocks), scene.group_scales, strict=True)
+        errors = [length.max() / scale for length, scale in lengths if scale]
         # The mode that drifts most, weighted by its share of the start.
         weight = np.abs(true_share) * np.sqrt((np.abs(shapes) ** 2).sum(axis=0))
         own = np.array([np.sqrt(weight[np.abs(rates - rate).argmin()]) for rate in analysis.rates])
@@ -99,7 +134,7 @@ def predicted(scene: Scene, method: Method, dt: float, steps: int) -> Prediction
 
 
 def limit(trials: Trials, method: Method, fastest: float | None) -> Limit:
-    """The limit of a method on a scene; ``fastest`` is the result of ``fastest_oscillation`` for a nonlinear one."""
+    """The limit of a method on a scene; ``fastest`` is the frequency of ``Rates.oscillation`` for a nonlinear one."""
     scene = trials.scene
     if scene.system.linear and scene.control is None:
         limits = trials.stability_limit(method)
@@ -131,28 +166,25 @@ def keeps_margin(trials: Trials, method: Method, dt: float) -> bool:
     return trials.scene.system.linear or not any(trials.unstable(method, horizon / n, n) for n in steps if n)
 
 
-def fastest_oscillation(trials: Trials) -> float | None:
-    """The largest frequency of a small disturbance along the true motion, in rad per unit of time, or None if none oscillates.
-
-    Eigenvalues at fixed states do not bound the motion between them, but a method blows up at the fastest oscillation if that
-    lasts for some steps.
-    """
+def rates_along(trials: Trials) -> Rates | None:
+    """The eigenvalues of the rates along the true motion, of a linear system at its start; None if they are not known."""
     scene = trials.scene
     system = scene.system
-    if system.linear or sum(maps.size(system)) > MAX_NUMBERS:
+    if sum(maps.size(system)) > MAX_NUMBERS:
         return None
     assert scene.exact is not None
-    t = trials.marks[:: max(1, len(trials.marks) // LINEARIZED_STATES)]
+    t = trials.marks[:1] if system.linear else trials.marks[:: max(1, len(trials.marks) // LINEARIZED_STATES)]
     v, y = (np.asarray(block) for block in scene.exact(t))
-    fastest = 0.0
+    times, values = [], []
     try:
         for i in range(len(t)):
             matrix = maps.rates(system.for_state_shapes(v[i], y[i]), float(t[i]), v[i], y[i])
             if np.isfinite(matrix).all():
-                fastest = max(fastest, float(np.abs(np.linalg.eigvals(matrix).imag).max()))
+                times.append(t[i])
+                values.append(np.linalg.eigvals(matrix))
     except UnsupportedError:
         return None
-    return fastest or None
+    return Rates(np.array(times), np.array(values)) if times else None
 
 
 def observed_limit(trials: Trials, method: Method, stable: int) -> float:

@@ -18,6 +18,7 @@ from ...runs.result import Run
 from ...scenes import Scene
 from .motion import grid_of
 from .rows import Rejected, Row, Shortfall
+from .stiff import Stiff
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,6 +54,7 @@ class Advice:
         cut: whether the scene's horizon is longer than its true motion is known.
         cost_noise: the relative difference of measured times that means nothing; 0 for evaluations.
         dtype: ``"float64"``, ``"float32"`` or ``"both"``, the precision of the tried steps.
+        stiff: why the best method is an implicit one: what stability leaves to explicit ones; None if that is not the reason.
     """
 
     scene: Scene
@@ -67,6 +69,7 @@ class Advice:
     cut: bool = False
     cost_noise: float = 0.0
     dtype: str = "float64"
+    stiff: Stiff | None = None
 
     @property
     def best(self) -> Row | None:
@@ -90,6 +93,7 @@ class Advice:
             "cut": self.cut,
             "cost_noise": self.cost_noise,
             "dtype": self.dtype,
+            "stiff": asdict(self.stiff) if self.stiff else None,
         }
         return dict(finite(whole))
 
@@ -144,7 +148,7 @@ class Advice:
             run = f"error {best.error:.2g} in the run of {best.steps} steps"
             single = " in float32" if best.dtype == "float32" else ""
             lines = [f"Use {best.method.name}{single} with {count}, dt = {best.dt:.4g}: {run}."]
-        lines += self._cut()
+        lines += [*([str(self.stiff)] if self.stiff else []), *self._cut()]
         ns = 1e9 * (best.seconds_per_frame if best.seconds_per_frame is not None else best.seconds_per_time)
         evaluations = best.evaluations_per_frame if best.evaluations_per_frame is not None else best.evaluations_per_time
         worst = f", {best.worst_evaluations} in the worst frame" if best.tolerance is not None and best.worst_evaluations else ""
@@ -345,6 +349,6 @@ def _margin(row: Row) -> str:
     sentence = f"It blows up beyond about dt = {row.observed_limit:.3g}, a step {row.margin:.3g} times as long."
     if math.isinf(row.observed_limit):
         sentence = "No step that was tried blows up."
-    if row.limit and row.mode_frequency:
+    if row.limit and row.mode_frequency and not math.isinf(row.limit):
         sentence += f" The fastest oscillation along the motion,{turns[3:]}, could be held up to dt = {row.limit:.3g}."
     return sentence

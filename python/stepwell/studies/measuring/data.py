@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...base import registry
 from ...base.checks import known
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 #: State errors for which the summary gives the cheapest cost.
 TARGETS = (1e-1, 1e-2, 1e-4)
+
+#: A scene is stiff if an implicit method has errors up to FEW_DIGITS with steps that are so many times the longest stable ones of
+#: explicit methods.
+FEW_DIGITS, MUCH_LONGER = 1e-2, 5.0
 
 #: Errors of a point, and costs: counted, or measured in a batch or alone.
 ERRORS = ("state_error", "end_error", "phase_error", "energy_error")
@@ -178,6 +182,28 @@ class Curve(ValueEquality):
         return min((point.cost for point in self.dependable() if point.state_error <= error), default=math.inf)
 
 
+class StiffSteps(NamedTuple):
+    """The longest stable step of explicit methods on a stiff scene, and one that accuracy bears.
+
+    Attributes:
+        explicit: the title of the method with the longest stable step; empty if none was stable with any step that was tried.
+        limit: that step, or the shortest that was tried.
+        implicit: the title of the implicit method with the longest step that has two digits right.
+        dt: that step, the mean of adaptive ones.
+    """
+
+    explicit: str
+    limit: float
+    implicit: str
+    dt: float
+
+    def __str__(self) -> str:
+        where = (
+            f"beyond dt = {self.limit:.2g} ({self.explicit})" if self.explicit else f"with every step to dt = {self.limit:.2g}"
+        )
+        return f"explicit methods blow up {where}; {self.implicit} has two digits with {self.dt:.2g}"
+
+
 @dataclass(frozen=True, eq=False)
 class WorkPrecision(Drawn, Table, ValueEquality):
     """Error against cost of several methods on one scene.
@@ -261,6 +287,31 @@ class WorkPrecision(Drawn, Table, ValueEquality):
         """The row of the front that is the cheapest with at most that state error, or None."""
         return next((row for row in self.front(cost=cost) if row["error"] <= error), None)
 
+    @property
+    def stiff(self) -> StiffSteps | None:
+        """How far explicit methods fall behind where stability holds down their steps; None where accuracy does.
+
+        An implicit method must reach ``FEW_DIGITS`` with steps that are ``MUCH_LONGER`` than any stable ones of explicit methods.
+        """
+        methods = [(curve, curve.method) for curve in self.curves if isinstance(curve.method, Method)]
+        explicit = [curve for curve, method in methods if not method.is_implicit and curve.by == "step"]
+        coarse = [
+            (point.dt, curve.title)
+            for curve, method in methods
+            if method.is_implicit
+            for point in curve.dependable()
+            if point.state_error <= FEW_DIGITS and point.dt is not None
+        ]
+        if not explicit or not coarse:
+            return None
+        most = max(explicit, key=lambda curve: curve.largest_stable_step)
+        least = min(point.dt for point in most.points if point.dt is not None)
+        limit = most.largest_stable_step or least
+        dt, title = max(coarse)
+        if not dt >= MUCH_LONGER * limit:
+            return None
+        return StiffSteps(most.title if most.largest_stable_step else "", limit, title, dt)
+
     def rows(self) -> list[dict[str, Any]]:
         """A row for each point, and one for each refused method. Columns named ``measured_…`` are not repeatable."""
         rows: list[dict[str, Any]] = []
@@ -303,6 +354,7 @@ class WorkPrecision(Drawn, Table, ValueEquality):
             "scene": scene,
             "floor": self.floor,
             "cut": self.cut,
+            "stiff": self.stiff._asdict() if self.stiff else None,
             "measured_on": measured,
             "rows": self.rows(),
             "front": self.front(),

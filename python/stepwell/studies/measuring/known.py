@@ -11,7 +11,8 @@ from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...errors import ArgumentError
 from ...scenes import Scene
-from ...scenes.truth import MAX_DIFFERENCE, with_truth
+from ...scenes.table import tabled
+from ...scenes.truth import MAX_DIFFERENCE, METHOD_IF_STIFF, Tight, with_truth
 
 #: Nodes of the polynomial that interpolates the state.
 INTERPOLATION_POINTS = 10
@@ -40,7 +41,11 @@ def chartable(scene: Scene) -> tuple[Scene, float]:
     until = min(known.horizon, known.until)
     if scene.exact is None:
         error = "as far from the true places or velocities as the largest true ones"
-        known = replace(known, exact=dense(known.exact, until), control=None, error=error)
+        if isinstance(known.exact, Tight) and known.exact.method == METHOD_IF_STIFF:  # what dies out is too short for even nodes
+            table = tabled(known.exact, until, replace(known, horizon=until).scales_of_numbers, MAX_INTERPOLATION_ERROR)
+        else:
+            table = dense(known.exact, until)
+        known = replace(known, exact=table, control=None, error=scene.error if scene.system.groups else error)
     return replace(known, horizon=until), floor
 
 

@@ -140,13 +140,14 @@ def _of_peer(scene: Scene, times: Array, solved: Solved, by: str, setting: float
 
 
 def _errors(scene: Scene, t: Array, v: Array, y: Array, energies: Callable[[], Array]) -> tuple[float, float, float]:
-    """The largest state error, that at the end, and the largest energy error."""
+    """The largest state error that is known, that at the end, and the largest energy error."""
     state = scene.state_error_at(t, v, y)
     try:
         energy = float(scene.energy_error_at(t, energies()).max())
     except UnsupportedError:  # a system without an energy of its own
         energy = math.nan
-    return float(state.max()), float(state[-1]), energy
+    # A run that ends within a step after the horizon has a last state that may not be known.
+    return float(np.nanmax(state)), float(state[-1]), energy
 
 
 def _phase(scene: Scene, t: Array, v: Array, y: Array, state_error: float) -> float | None:

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from ...analysis.stiffness import Stiff, course_of, stiff_members
 from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError, ShapeError, UnsupportedError
 from ...model.methods import Method
+from ...model.systems import System
+from ...runs import engine
 from ...runs.adaptive_options import check_times
-from ...runs.engine import PACE_NUMBERS
+from ...runs.diagnostics import may_be_stiff, why_steps_are_short
+from ...runs.engine import PACE_NUMBERS, WAYPOINTS
+from ...runs.integration import step
+from ...runs.options import Options
+from ...runs.request import Request
 from ...runs.result import Run, Status
-from ...runs.stops import WHY_STOPPED
+from ...runs.stops import why_stopped
 from ...runs.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
 from .axes import Grid
 from .exponents import Exponents
@@ -160,10 +168,59 @@ def lost(run: Run) -> int:
     return int(np.count_nonzero(lost_in_tolerance(run.controller_state.pace, groups)))
 
 
-def why(status: int) -> str:
-    """Why a member stopped, in words."""
-    hint = "; a run of that member alone tells the cause" if status == Status.UNDERFLOW else ""
-    return f"{WHY_STOPPED[Status(status)]}{hint}"
+def numbers_of_waypoints(state: int) -> int:
+    """The numbers of the waypoints of a member in memory, of the last pieces and of all: its state has so many numbers."""
+    return 2 * WAYPOINTS * (2 * state + 2 * PACE_NUMBERS)
+
+
+class Pieces:
+    """The pieces of the run of a chunk, and where its members stood on the way if stiffness is looked for.
+
+    Args:
+        system: the system of the chunk.
+        method: the name of the method.
+        looks: whether stiffness is looked for.
+    """
+
+    def __init__(self, system: System, method: str, *, looks: bool) -> None:
+        self.system, self._method, self._looks = system, method, looks
+        self._last: tuple[Run, Request] | None = None
+        self._waypoints: Array | None = None
+
+    def make(self, **options: Any) -> Run:
+        """A piece of the run, without findings and warnings."""
+        waypoints: list[Array] = []
+        request = Request.of(self.system, self._method, Options(**options))
+        run = step(request, waypoints if self._looks else None)
+        self._last = run, request
+        if waypoints:
+            (rows,) = waypoints
+            if self._waypoints is not None:  # a piece may come to none
+                numbers = 2 * (run.v[-1].size + run.y[-1].size) // run.status.size
+                passed = rows[:, [numbers + engine.COUNTS.start]] > 0.0
+                rows = np.where(passed, rows, self._waypoints)
+            self._waypoints = rows
+        return run
+
+    def stiff(self) -> Stiff | None:
+        """The members whose steps stability held down, and not the tolerance, or None."""
+        if self._last is None or self._waypoints is None:
+            return None
+        run, request = self._last
+        assert run.paces is not None
+        if not may_be_stiff(int(run.paces.accepted.max(initial=0)), run.v[-1].size + run.y[-1].size):
+            return None
+        return stiff_members(course_of(run, request), self._waypoints)
+
+    def why_stopped(self) -> str:
+        """Why the first member stopped that did so by itself, in words; "" if none did."""
+        assert self._last is not None
+        run, request = self._last
+        stopped = np.flatnonzero((run.status != Status.OK) & (run.status < Status.EVENT))
+        if not stopped.size:
+            return ""
+        waypoints = [] if self._waypoints is None else [self._waypoints]
+        return why_stopped(run, (int(stopped[0]),), partial(why_steps_are_short, run, request, waypoints))
 
 
 #: The warning for members whose motion is lost in the absolute tolerance.

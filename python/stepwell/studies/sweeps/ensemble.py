@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.growth import Growth
+from ...analysis.stiffness import HELD_DOWN, Stiff
 from ...base import checks
 from ...base.reprs import counted
-from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, ToleranceWarning
+from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, StiffnessWarning, ToleranceWarning
 from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import System
 from ...runs import float32
-from ...runs.findings import warn_of
+from ...runs.findings import is_heard, warn_of
 from . import adaptive, happenings
 from .adaptive import Evaluations
 from .axes import OF_THE_RUN, Chunk, Grid
@@ -162,6 +163,8 @@ def sweep(
         DivergenceWarning: how many members left the finite range, and which first. The others are not affected.
         ToleranceWarning: how many members stopped before the last time, which first, and why; or that an absolute tolerance is
             so large that the motion is lost in it.
+        StiffnessWarning: how many members had steps that stability held down, and not the tolerance, which first, with the limit
+            there, how much longer steps the tolerance allows, and the method to take.
         AccuracyWarning: if numbers are finite but meaningless: how many members grew a millionfold by fixed steps beyond the
             stability limit, and which first; or a pendulum turned so far that its angle has no sine. Encounters of bodies are not
             searched for here.
@@ -211,6 +214,7 @@ def sweep(
         outcomes=kept_of_each,
         memory=checks.number("memory", memory, positive=True, unit="bytes"),
         at=times,
+        looks=times is not None and not method.is_always_stable and is_heard(StiffnessWarning),
     )
     first, bits, names = _probe(task, grid)
     workers = Engine(engine, threads)
@@ -358,9 +362,10 @@ class _Tally:
 
     def __init__(self, grid: Grid, task: Task) -> None:
         self.grid, self.task, self.bad, self.members, self.first, self.step = grid, task, 0, 0, grid.members, -1
-        self.lost = self.status = 0
+        self.lost, self.why = 0, ""
         self.doubts: dict[int, str] = {}
         self.growths: dict[int, Growth] = {}
+        self.stiff: dict[int, Stiff] = {}
 
     def add(self, chunk: Chunk, done: Done) -> None:
         status = np.where(np.isin(done.results["status"].values, happenings.EVENTS), 0, done.results["status"].values)
@@ -370,19 +375,21 @@ class _Tally:
             member = int(np.flatnonzero(status)[0])
             if chunk.first + member < self.first:
                 self.first, self.step = chunk.first + member, int(done.results["first_bad_step"].values[member])
-                self.status = int(status[member])
+                self.why = done.why_stopped
         self.lost += done.lost
         if done.doubt is not None:
             self.doubts[chunk.first] = done.doubt
         if done.growth is not None:
             self.growths[chunk.first] = done.growth
+        if done.stiff is not None:
+            self.stiff[chunk.first] = done.stiff
 
     def warn(self) -> None:
         if self.bad and self.task.at is not None:
             warnings.warn(
                 f"{self.bad} of {counted(self.members, 'member')} stopped before t = {self.task.at[-1]:g}, "
                 f"{'the first of them' if self.bad > 1 else 'that'} at {self.grid.place(self.first)}: "
-                f"{adaptive.why(self.status)}; status tells which and why",
+                f"{self.why}; status tells which and why",
                 ToleranceWarning,
                 stacklevel=4,
             )
@@ -391,6 +398,15 @@ class _Tally:
                 f"{self.bad} of {counted(self.members, 'member')} diverged, {'the first of them' if self.bad > 1 else 'that'} at "
                 f"{self.grid.place(self.first)}, at step {self.step}; status and first_bad_step tell which and when",
                 DivergenceWarning,
+                stacklevel=4,
+            )
+        if self.stiff:
+            chunk, number = min(self.stiff), sum(each.number for each in self.stiff.values())
+            first = self.stiff[chunk]
+            warnings.warn(
+                f"{HELD_DOWN} {number} of {counted(self.members, 'member')}, {'the first of them' if number > 1 else 'that'} at "
+                f"{self.grid.place(chunk + first.first[0])}: {first.why}",
+                StiffnessWarning,
                 stacklevel=4,
             )
         if self.lost:
@@ -406,10 +422,10 @@ class _Tally:
             )
         if self.growths:
             chunk, number = min(self.growths), sum(each.number for each in self.growths.values())
-            first = self.growths[chunk]
+            grown = self.growths[chunk]
             warnings.warn(
-                f"{number} of {counted(self.members, 'member')} {first.size}, {'the first of them' if number > 1 else 'that'} at "
-                f"{self.grid.place(chunk + first.first[0])}: {first.why}",
+                f"{number} of {counted(self.members, 'member')} {grown.size}, {'the first of them' if number > 1 else 'that'} at "
+                f"{self.grid.place(chunk + grown.first[0])}: {grown.why}",
                 AccuracyWarning,
                 stacklevel=4,
             )

@@ -13,6 +13,7 @@ import numpy as np
 from ... import _core
 from ...analysis import growth as _growth
 from ...analysis.growth import Growth
+from ...analysis.stiffness import Stiff
 from ...base import checks
 from ...base.arrays import Array
 from ...errors import ShapeError, UnsupportedError
@@ -25,7 +26,7 @@ from ...runs.integration import quietly, step
 from ...runs.options import Options, spread
 from ...runs.request import Request
 from ...runs.result import Run
-from .adaptive import NUMBERS_OF_A_CONTROLLER, lost
+from .adaptive import NUMBERS_OF_A_CONTROLLER, Pieces, lost, numbers_of_waypoints
 from .axes import OF_THE_RUN
 from .exponents import Exponents
 from .observed import Piece
@@ -57,6 +58,7 @@ class Task(NamedTuple):
         outcomes: the outcomes.
         memory: the bytes that a chunk may take.
         at: with a tolerance, the times of the observed states, which are all that are saved; None with fixed steps.
+        looks: whether stiffness is looked for, with a tolerance.
     """
 
     system: Any
@@ -69,6 +71,7 @@ class Task(NamedTuple):
     outcomes: tuple[Outcome, ...]
     memory: float
     at: Array | None = None
+    looks: bool = False
 
     def kinds(self, kind: type[Outcome]) -> list[Any]:
         """The outcomes of a kind."""
@@ -102,7 +105,7 @@ class Task(NamedTuple):
         saved = 1 if self.every is None else self.steps // self.every + 2
         if self.at is not None:
             saved = self.at.size
-            numbers += NUMBERS_OF_A_CONTROLLER
+            numbers += NUMBERS_OF_A_CONTROLLER + (numbers_of_waypoints(state) if self.looks else 0)
         if "events" in self.options:  # whose run is one piece
             observed = 1 if self.between is None else self.steps // self.between + 2
             numbers += COPIES_OF_A_STATE * state * (observed if self.at is None else saved)
@@ -137,12 +140,16 @@ class Done(NamedTuple):
         doubt: a message if the numbers are finite but meaningless, or None.
         lost: the number of members whose absolute tolerance is so large that the motion is lost in it.
         growth: the members that grew by fixed steps beyond their stability limit, or None.
+        stiff: the members whose adaptive steps stability held down, or None.
+        why_stopped: why the first member stopped before the last time, or "".
     """
 
     results: Results
     doubt: str | None
     lost: int = 0
     growth: Growth | None = None
+    stiff: Stiff | None = None
+    why_stopped: str = ""
 
 
 def prepared(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
@@ -167,14 +174,15 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
         for each in _pieces(task, system, options, members, task.transient, None, stopped):
             start = _going_on(options, each)
         parts: list[Results] = []
-        functions = task.kinds(Function)
+        functions, pieces = task.kinds(Function), Pieces(system, task.method, looks=task.looks)
         if functions:
             saved: dict[str, Any] = {"steps": task.steps, "every": task.every} if task.at is None else {"at": task.at}
-            last = quietly(system, task.method, **saved, **start)
+            last = pieces.make(**saved, **start)
             _as_many(last, members)
             parts += [each.of_run(last) for each in functions]
         if task.reductions or not functions:
-            last, reduced = _reduced(task, system, start, members, stopped)
+            pieces = Pieces(system, task.method, looks=task.looks)
+            last, reduced = _reduced(task, pieces, start, members, stopped)
             parts += reduced
         for each in task.kinds(Exponents):
             look = partial(_stop, stopped)
@@ -185,7 +193,8 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
     parts.append({"status": status, "first_bad_step": bad})
     grown = _growth_of(task, options, last) if task.at is None else None
     doubt = last.system.doubt(last.y)
-    return Done(together(parts), None if doubt is None else doubt[0], lost(last), grown)
+    stiff, why = (None, "") if task.at is None else (pieces.stiff(), pieces.why_stopped())
+    return Done(together(parts), None if doubt is None else doubt[0], lost(last), grown, stiff, why)
 
 
 def _growth_of(task: Task, options: dict[str, Any], last: Run) -> Growth | None:
@@ -199,18 +208,18 @@ def _growth_of(task: Task, options: dict[str, Any], last: Run) -> Growth | None:
 
 
 def _reduced(
-    task: Task, system: System, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
+    task: Task, pieces: Pieces, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
 ) -> tuple[Run, list[Results]]:
     """The last piece of the run, and the results of the reductions."""
     between, reductions = task.between, [(each, each.begin()) for each in task.reductions]
     at, last = 0, None
     if task.at is not None:
-        for last in _pieces_between_times(task, system, start, members, stopped):
+        for last in _pieces_between_times(task, pieces, start, members, stopped):
             for _, reduction in reductions:
                 reduction.see(Piece(last, 0))
         assert last is not None
         return last, [reduction.results() for _, reduction in reductions]
-    for each in _pieces(task, system, start, members, task.steps, between, stopped):
+    for each in _pieces(task, pieces.system, start, members, task.steps, between, stopped):
         since = 0 if at == 0 else 1
         steps = at + (each.t.size - 1 if between else 0)  # number of the last saved state
         for outcome, reduction in reductions:
@@ -260,15 +269,15 @@ def _pieces(
 
 
 def _pieces_between_times(
-    task: Task, system: System, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
+    task: Task, pieces: Pieces, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
 ) -> Iterator[Run]:
     """A run with a tolerance in pieces, each with some of its times; its steps do not depend on the pieces."""
     assert task.at is not None
-    length = task.at.size if "events" in start else task.states_at_once(system, members)
+    length = task.at.size if "events" in start else task.states_at_once(pieces.system, members)
     going_on = start
     for first in range(0, task.at.size, length):
         _stop(stopped)
-        piece = quietly(system, task.method, at=task.at[first : first + length], **going_on)
+        piece = pieces.make(at=task.at[first : first + length], **going_on)
         _as_many(piece, members)
         if first + length < task.at.size:
             going_on = _going_on(start, piece)

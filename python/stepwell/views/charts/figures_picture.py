@@ -8,6 +8,7 @@ import numpy as np
 
 from ...analysis.stability.criterion import signed
 from ...base.arrays import Array
+from ...model.methods import stable_for
 from .figures import HARMONIC_PERIODS, Figures, HarmonicCase, Samples
 from .labels import at_ends, title
 from .style import FAMILIES, GREY, Axes, Figure, family, look, named, page
@@ -141,7 +142,7 @@ def one(chart: Figures, samples: Samples) -> Figure:
         method = samples.method
         figure.text(0.012, 0.925, f"{method.title} ({method.section}): y(t)", size=18, weight="bold")
         figure.text(0.012, 0.865, _start(chart, samples), size=12.5, color=GREY)
-        limit = f"Stable for Φ < {samples.limit:.6g}." if samples.limit else "Never stable."
+        limit = f"Stable for {stable_for(samples.limit)}." if samples.limit else "Never stable."
         figure.text(0.012, 0.805, f"{_words(samples)}. {limit}", size=12.5)
         figure.text(0.012, 0.03, "\n".join(MARKS), size=12, color=GREY, linespacing=1.35)
     return figure

@@ -68,7 +68,8 @@ def finding(chart: StabilityMap) -> str:
     for ratio in sorted({least, min(max(1.0, least), most)}):
         limit = float(stability_limit(Oscillator(damping=ratio), chart.method))
         where = "undamped" if ratio == 0.0 else f"at D = {ratio:g}"
-        limits.append(f"stable to Φ = {limit:.3g} {where}" if limit else f"never stable {where}")
+        stable = f"stable {'at every Φ' if limit == np.inf else f'to Φ = {limit:.3g}'}" if limit else "never stable"
+        limits.append(f"{stable} {where}")
     return f"{chart.method.title}: {', '.join(limits)}"
 
 

@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections import Counter
 
+from ...studies.measuring.data import StiffSteps
 from .labels import title as put_title
 from .panel import Panel
 from .picture import COUNTED, DIGITS_OF, ERRORS, draw_errors, family_of, known_to, name_curves, with_way
@@ -49,7 +50,7 @@ def draw(panel: Panel, error: str) -> Figure:
                 line.set_linewidth(line.get_linewidth() * 0.8)
             axes.minorticks_off()
             name_curves(axes, chart, kind, "evaluations", 10.5, all_of_them=False)
-            note = f"t up to {chart.scene.horizon:.4g}{known_to(chart)}"
+            note = f"t up to {chart.scene.horizon:.4g}{known_to(chart)}{_blows_up(chart.stiff)}"
             note = f"{kind.replace('_', ' ')}, {note}" if len(kinds) > 1 else note
             axes.set_title(f"{chart.scene.title}\n", size=14, weight="bold", loc="left")
             axes.text(0.0, 1.02, note, transform=axes.transAxes, size=11, color=GREY)
@@ -62,6 +63,13 @@ def draw(panel: Panel, error: str) -> Figure:
             0.012, 0.5, textwrap.fill(" and ".join(ERRORS[kind] for kind in kinds), 60), rotation=90, va="center", size=14
         )
     return figure
+
+
+def _blows_up(stiff: StiffSteps | None) -> str:
+    """Where explicit methods are unstable, in a few words."""
+    if stiff is None:
+        return ""
+    return f"; explicit: unstable {'beyond' if stiff.explicit else 'even with'} dt = {stiff.limit:.2g}"
 
 
 def leader(panel: Panel, error: str = "state_error") -> str:

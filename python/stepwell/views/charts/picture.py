@@ -259,7 +259,8 @@ def _text(figure: Figure, chart: WorkPrecision, error: str, time: str, unnamed: 
     scene = chart.scene
     put_title(figure, 0.012, 0.955, f"{scene.title}: {finding(chart, error)}", 20)
     where = f" ({scene.section})" if scene.section else ""
-    system = f"{scene.system!r} over {scene.horizon:.4g} units of time{known_to(chart)}{where}"
+    system = f"{scene.system!r} over {scene.horizon:.4g} units of time{known_to(chart)}"
+    system = f"{system}: {chart.stiff}" if chart.stiff else f"{system}{where}"
     figure.text(0.012, 0.915, textwrap.shorten(system, 150), size=13.5, color=GREY)
     what = f"one member of a batch of {chart.members}" if time == "batch" else "a single run"
     reasons: dict[str, list[str]] = {}

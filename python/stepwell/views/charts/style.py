@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 else:
     Axes = Figure = Any  # matplotlib is imported when something is drawn
 
-MARKERS: tuple[Any, ...] = (*"osD^vPh*<>pdX8H", (4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0), (3, 1, 180))
+MARKERS: tuple[Any, ...] = (*"osD^vPh*<>pdX8H", (4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0), (3, 1, 180), (4, 1, 45), (3, 1, 90))
 #: A colour for each family of methods, the same in every chart. No two are alike in grey, in print, or to an eye without green
 #: cones: tests/test_looks.py measures them.
 FAMILIES = {

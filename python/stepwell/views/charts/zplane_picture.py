@@ -10,6 +10,7 @@ import numpy as np
 
 from ...analysis.stability.eigen import Complex
 from ...base.arrays import Array
+from ...model.methods import stable_for
 from .style import FAMILIES, GREY, Axes, Figure, family, named, page
 from .zplane import Locus, Stability
 
@@ -36,6 +37,9 @@ ALIKE = 1e-6
 #: Letters in a line of names above a panel.
 LETTERS = 34
 
+#: The height of a number.
+HIGH = 0.125
+
 #: Ψ/Φ is shown up to here.
 TURNS = 2.3
 
@@ -44,7 +48,7 @@ def loci(chart: Stability) -> Figure:
     """The eigenvalues in the z-plane, a panel for each method."""
     shared = groups(chart)
     across, down = _grid(len(shared))
-    width, height = max(WIDTH, 3.7 * across + 0.9), 4.15 * down + 2.2
+    width, height = max(WIDTH, 3.7 * across + 0.9), 4.35 * down + 2.2
     with page(width, height) as figure:
         places = {
             "left": 0.8 / width,
@@ -52,7 +56,7 @@ def loci(chart: Stability) -> Figure:
             "bottom": 1.15 / height,
             "top": 1.0 - 1.6 / height,
             "wspace": 0.06,
-            "hspace": 0.2,
+            "hspace": 0.26,
         }
         panels: Any = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False, gridspec_kw=places)
         for axes in panels.ravel()[len(shared) :]:
@@ -138,7 +142,9 @@ def _room(place: complex, lines: Array, taken: list[tuple[float, float]]) -> flo
     """The distance of a number there from what is drawn; all that are far enough count alike."""
     to_line = float(np.hypot(lines[:, 0] - place.real, lines[:, 1] - place.imag).min())
     # A number is wider than high, and so is its neighbour.
-    to_names = min((math.hypot(0.6 * (x - place.real), y - place.imag) for x, y in taken), default=math.inf)
+    to_names = min((max(0.6 * abs(x - place.real), abs(y - place.imag)) for x, y in taken), default=math.inf)
+    if to_names < HIGH:
+        return 0.0
     to_edge = REACH - max(abs(place.real), abs(place.imag))
     return round(min(to_line, to_names, 1.5 * to_edge, 0.95 * ASIDE), 3)
 
@@ -154,7 +160,7 @@ def curves(chart: Stability) -> Figure:
     """r₁² − 1 and Ψ/Φ over Φ, a pair of panels for each method."""
     shared = groups(chart)
     across, down = _grid(len(shared))
-    width, height = max(WIDTH, 3.8 * across + 1.4), 4.6 * down + 2.2
+    width, height = max(WIDTH, 3.8 * across + 1.4), 4.75 * down + 2.2
     with page(width, height) as figure:
         from matplotlib.ticker import MaxNLocator
 
@@ -166,7 +172,7 @@ def curves(chart: Stability) -> Figure:
             bottom=1.3 / height,
             top=1.0 - 1.6 / height,
             wspace=0.06,
-            hspace=0.28,
+            hspace=0.33,
         )
         first: dict[int, Axes] = {}
         for i, same in enumerate(shared):
@@ -265,7 +271,7 @@ def _colour(same: tuple[Locus, ...]) -> str:
 
 
 def _limit(locus: Locus) -> str:
-    return f"stable for Φ < {locus.limit:.5g}" if locus.limit else "never stable"
+    return f"stable for {stable_for(locus.limit, digits=5)}" if locus.limit else "never stable"
 
 
 def _title(same: tuple[Locus, ...]) -> str:

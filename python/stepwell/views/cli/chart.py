@@ -93,7 +93,8 @@ def _summary(chart: WorkPrecision, files: list[str]) -> None:
             "ns a step>",
         ),
         rows,
-        _best(chart)
+        ([f"stiff: {chart.stiff}"] if chart.stiff else [])
+        + _best(chart)
         + [f"{title_of(name)} is refused: {reason}" for name, reason in chart.refused.items()]
         + ([f"written: {', '.join(files)}"] if files else []),
     )

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ...errors import ArgumentError
-from ...model.methods import Method, method, methods
+from ...model.methods import Method, method, methods, stable_for
 from . import options, show
 
 
@@ -35,7 +35,7 @@ def command(args: argparse.Namespace) -> None:
                 m.name,
                 str(m.order),
                 str(m.evaluations),
-                f"Φ < {m.limit:.6g}" if m.limit else "no Φ",
+                stable_for(m.limit),
                 m.section,
                 m.title,
                 "; ".join(m.other_names),

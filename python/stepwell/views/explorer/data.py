@@ -40,11 +40,15 @@ SAMPLES, MAX_SIZE_STEPS, SHARE_LEFT_OUT = 1000, 20_000, 0.005
 
 #: The longest step that goes into a page, in characters; and in operations, which are counted before a step is written.
 MAX_SOURCE, MAX_OPERATIONS = 400_000, 80_000
+#: The same of a step that solves equations: seven methods have such steps, and those of many unknowns would be most of a page.
+MAX_SOLVING, MAX_UNKNOWNS = 14_000, 8
 
 
 def of_method(method: Method) -> dict[str, Any]:
     """The record of a method for the page, with its colour in all pictures."""
     record = {name: getattr(method, name) for name in ("name", "title", "order", "evaluations", "limit", "carry", "section")}
+    if math.isinf(method.limit):
+        record["limit"] = None  # JSON has no infinity
     return record | {"colour": look(method)["color"]}
 
 
@@ -130,12 +134,16 @@ def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[s
 def _source(scene: Scene, method: Method, control: AnyControl | None) -> str:
     """A step as JavaScript."""
     options: dict[str, Any] = {"dt": scene.dt, "v": scene.v, "y": scene.y, "control": control}
+    numbers = scene.v.size + scene.y.size
+    if method.is_implicit and numbers > MAX_UNKNOWNS:
+        raise UnsupportedError(f"equations of {numbers} numbers are too long for a page; at most {MAX_UNKNOWNS} fit")
     count = about(Request.one_step(scene.system, method, Options(**options)).plan)
     if count > MAX_OPERATIONS:
         raise UnsupportedError(f"a step of about {count} operations is too long for a page; at most {MAX_OPERATIONS} fit")
     source = export(scene.system, method, "javascript", **options, name=CLASS).source
-    if len(source) > MAX_SOURCE:
-        raise UnsupportedError(f"a step of {len(source)} characters is too long for a page; at most {MAX_SOURCE} fit")
+    most = MAX_SOLVING if method.is_implicit else MAX_SOURCE
+    if len(source) > most:
+        raise UnsupportedError(f"a step of {len(source)} characters is too long for a page; at most {most} fit")
     return source
 
 

@@ -53,7 +53,7 @@ impl Executor {
             Action::Pass(stage) => {
                 Some(PreparedStage::with(stage, stage.compiled_for_lanes(level, stride), &no_parameters, clock, f64::INFINITY))
             }
-            Action::Ask { .. } | Action::Both { .. } => None,
+            Action::Ask { .. } | Action::Both { .. } | Action::Derive | Action::Solve(_) => None,
         };
         Executor { passes: schedule.actions.iter().map(pass).collect(), stride, stop: Stop::default() }
     }
@@ -91,6 +91,10 @@ impl Executor {
                             rates.dy(t, row(*v, sizes[0]), row(*y, sizes[1]), &mut out_row[..sizes[1].next_multiple_of(VECTOR)])
                         }
                         Rate::Velocity => rates.velocity(row(*y, sizes[1]), &mut out_row[..sizes[0]]),
+                        Rate::SolutionV => out_row[..sizes[0]].copy_from_slice(rates.solution()[0]),
+                        Rate::SolutionY => out_row[..sizes[1]].copy_from_slice(rates.solution()[1]),
+                        Rate::ByTimeV => out_row[..sizes[0]].copy_from_slice(rates.by_time()[0]),
+                        Rate::ByTimeY => out_row[..sizes[1]].copy_from_slice(rates.by_time()[1]),
                     }
                 }
                 (Action::Both { at, state: [v, y], out: [dv, dy] }, _) => {
@@ -101,6 +105,14 @@ impl Executor {
                     if let Ok([v, y, dv, dy]) = arena.get_disjoint_mut(rows) {
                         rates.both(at.at(t, h), v, y, [dv, dy]);
                     }
+                }
+                (Action::Derive, _) => {
+                    let (v, y) = arena.split_at(stride);
+                    rates.derive(t, h, &v[..sizes[0]], &y[..sizes[1]]);
+                }
+                (Action::Solve(right), _) => {
+                    let [v, y] = [right[0], right[1]].map(|row| &arena[row * stride..]);
+                    rates.solve([&v[..sizes[0]], &y[..sizes[1]]]);
                 }
                 (Action::Pass(_), None) => {} // there is a kernel for each pass
             }

@@ -26,5 +26,6 @@ pub mod matrix;
 mod panels;
 pub mod rates;
 pub mod schedule;
+pub mod solving;
 mod springs;
 pub mod tapes;

@@ -93,6 +93,22 @@ pub trait Rates: Send + Sync {
         }
     }
 
+    /// Takes the equations of an implicit step that starts at this state, and factors them.
+    fn derive(&mut self, _t: f64, _h: f64, _v: &[f64], _y: &[f64]) {}
+
+    /// Solves them, from right-hand sides of both blocks.
+    fn solve(&mut self, _right: [&[f64]; 2]) {}
+
+    /// The last solution, of both blocks.
+    fn solution(&self) -> [&[f64]; 2] {
+        [&[]; 2]
+    }
+
+    /// h times the derivatives of both rates by the time, at the state of the equations.
+    fn by_time(&self) -> [&[f64]; 2] {
+        [&[]; 2]
+    }
+
     /// Projects the state after a step onto what should be constant.
     fn project(&mut self, v: &mut [f64], y: &mut [f64]) {
         if let Some(inner) = self.inner_mut() {

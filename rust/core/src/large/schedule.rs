@@ -35,6 +35,14 @@ pub enum Rate {
     Dy,
     /// The velocity of an increment of y.
     Velocity,
+    /// The solution of the equations of an implicit step, its block of v.
+    SolutionV,
+    /// Likewise of y.
+    SolutionY,
+    /// h times the derivative of h·v̇ by the time, at the start of the step.
+    ByTimeV,
+    /// Likewise of y.
+    ByTimeY,
 }
 
 /// One action of a schedule.
@@ -61,6 +69,10 @@ pub enum Action {
         /// Rows of the results.
         out: [usize; 2],
     },
+    /// The equations of the step, from the state at its start.
+    Derive,
+    /// Their solution, from the rows of right-hand sides.
+    Solve([usize; 2]),
     /// One pass over the rows.
     Pass(Box<Stage>),
 }
@@ -165,6 +177,15 @@ impl PassPlan {
                 // Steps with a series are refused where they are too long for one tape (`trace.rs`), so this is never executed.
                 Entry::SeriesV(_, v, y) => (Node::Ask(Rate::Dv, Time::START, of(v), of(y)), true),
                 Entry::SeriesY(_, v, y) => (Node::Ask(Rate::Dy, Time::START, of(v), of(y)), false),
+                Entry::ImplicitV(_, v, y) => (Node::Ask(Rate::SolutionV, Time::START, of(v), of(y)), true),
+                Entry::ImplicitY(_, v, y) => (Node::Ask(Rate::SolutionY, Time::START, of(v), of(y)), false),
+                Entry::ByTimeV => (Node::Ask(Rate::ByTimeV, Time::START, V, Y), true),
+                Entry::ByTimeY => (Node::Ask(Rate::ByTimeY, Time::START, V, Y), false),
+                // A step with a mass matrix is one tape (`tapes.rs`), so this is the matrix of units.
+                Entry::Mass(a) => {
+                    made.push(made[a.index()]);
+                    continue;
+                }
             };
             let mut push = |node| {
                 nodes.push(node);
@@ -305,7 +326,8 @@ impl PassPlan {
 
         let row = |node: usize| rows[node].unwrap_or(V);
         let count = busy.len();
-        let mut actions = Vec::new();
+        let solves = |node: &Node| matches!(node, Node::Ask(Rate::SolutionV | Rate::SolutionY, ..));
+        let mut actions = if self.nodes.iter().any(solves) { vec![Action::Derive] } else { Vec::new() };
         for pass in 0..=turns {
             let mut writes: Vec<(usize, usize)> = self.writes[pass].iter().map(|node| (row(*node), *node)).collect();
             if pass == turns && goal == Goal::State {
@@ -316,9 +338,13 @@ impl PassPlan {
             if !writes.is_empty() {
                 actions.push(Action::Pass(Box::new(self.pass(pass, &writes, count, &row))));
             }
+            let mut solved = None;
             for (i, node) in self.nodes.iter().enumerate().filter(|(i, _)| self.turn[*i] == Some(pass)) {
                 if let Node::Ask(rate, at, v, y) = *node {
                     let (v, y, out) = (row(v), row(y), row(i));
+                    if solves(node) && solved.replace([v, y]) != Some([v, y]) {
+                        actions.push(Action::Solve([v, y]));
+                    }
                     let ask = match actions.last() {
                         Some(&Action::Ask { rate: Rate::Dv, at: before, v: of_v, y: of_y, out: dv })
                             if rate == Rate::Dy && (before, of_v, of_y) == (at, v, y) =>

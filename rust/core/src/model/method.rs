@@ -108,6 +108,7 @@ impl Record {
             ("limit", Fact::Number(self.limit)),
             ("nodes", Fact::Numbers(program.nodes(self.needs == Needs::Rates))),
             ("needs_acceleration", Fact::Truth(self.needs == Needs::Acceleration)),
+            ("is_implicit", Fact::Truth(program.is_implicit())),
             ("carry", Fact::MaybeText(self.carry.as_ref().map(|carry| carry.name))),
             ("starts", Fact::Texts(self.carry.as_ref().map_or(&[], |carry| carry.starts))),
             ("error_order", Fact::Whole(self.estimate.as_ref().map(|estimate| estimate.order as usize))),

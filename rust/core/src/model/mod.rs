@@ -2,8 +2,13 @@
 
 pub mod around;
 mod elimination;
+pub(crate) mod implicit;
 pub mod method;
+mod newton;
+pub(crate) mod ordering;
+mod pivoting;
 pub mod program;
+mod rosenbrock;
 pub(crate) mod signal;
 pub mod spec;
 pub mod steppers;

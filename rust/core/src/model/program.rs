@@ -12,7 +12,7 @@ use std::{
 
 use nalgebra::DVector;
 
-use super::system::System;
+use super::{implicit::Implicit, system::System};
 use crate::tape::number::{Branch, Number, Series};
 
 /// A velocity or coordinate block, by the number of the entry that makes it.
@@ -83,23 +83,34 @@ pub enum Entry {
     SeriesV(u32, Block, Block),
     /// Likewise of y.
     SeriesY(u32, Block, Block),
+    /// x of (M − γhJ)·x = r, its block of v, with the mass matrix M and J of the rates at the start of the step.
+    ImplicitV(f64, Block, Block),
+    /// Likewise of y.
+    ImplicitY(f64, Block, Block),
+    /// M·y, with the mass matrix of the system.
+    Mass(Block),
+    /// h times the derivative of h·v̇ by the time, at the start of the step.
+    ByTimeV,
+    /// Likewise of y.
+    ByTimeY,
 }
 
 impl Entry {
     /// The blocks that it reads.
     pub fn operands(self) -> Vec<Block> {
         match self {
-            Entry::V | Entry::Y => vec![],
-            Entry::Velocity(a) | Entry::Scale(_, a) => vec![a],
+            Entry::V | Entry::Y | Entry::ByTimeV | Entry::ByTimeY => vec![],
+            Entry::Velocity(a) | Entry::Scale(_, a) | Entry::Mass(a) => vec![a],
             Entry::Dv(_, a, b) | Entry::Dy(_, a, b) | Entry::Add(a, b) | Entry::Sub(a, b) => vec![a, b],
             Entry::SeriesV(_, a, b) | Entry::SeriesY(_, a, b) => vec![a, b],
+            Entry::ImplicitV(_, a, b) | Entry::ImplicitY(_, a, b) => vec![a, b],
         }
     }
 
     /// The same of the blocks that are now at other places.
     fn moved(self, to: impl Fn(Block) -> Block) -> Entry {
         match self {
-            Entry::V | Entry::Y => self,
+            Entry::V | Entry::Y | Entry::ByTimeV | Entry::ByTimeY => self,
             Entry::Dv(t, a, b) => Entry::Dv(t, to(a), to(b)),
             Entry::Dy(t, a, b) => Entry::Dy(t, to(a), to(b)),
             Entry::Velocity(a) => Entry::Velocity(to(a)),
@@ -108,6 +119,9 @@ impl Entry {
             Entry::Scale(c, a) => Entry::Scale(c, to(a)),
             Entry::SeriesV(k, a, b) => Entry::SeriesV(k, to(a), to(b)),
             Entry::SeriesY(k, a, b) => Entry::SeriesY(k, to(a), to(b)),
+            Entry::ImplicitV(gamma, a, b) => Entry::ImplicitV(gamma, to(a), to(b)),
+            Entry::ImplicitY(gamma, a, b) => Entry::ImplicitY(gamma, to(a), to(b)),
+            Entry::Mass(a) => Entry::Mass(to(a)),
         }
     }
 
@@ -124,6 +138,11 @@ impl Entry {
             Entry::Scale(c, a) => (7, c.to_bits(), a.0, 0),
             Entry::SeriesV(k, a, b) => (8, u64::from(k), a.0, b.0),
             Entry::SeriesY(k, a, b) => (9, u64::from(k), a.0, b.0),
+            Entry::ImplicitV(gamma, a, b) => (10, gamma.to_bits(), a.0, b.0),
+            Entry::ImplicitY(gamma, a, b) => (11, gamma.to_bits(), a.0, b.0),
+            Entry::ByTimeV => (12, 0, 0, 0),
+            Entry::ByTimeY => (13, 0, 0, 0),
+            Entry::Mass(a) => (14, 0, a.0, 0),
         }
     }
 }
@@ -190,6 +209,21 @@ impl Rates {
         (1..=order).map(|k| (write(Entry::SeriesV(k, v, y)), write(Entry::SeriesY(k, v, y)))).collect()
     }
 
+    /// x of (M − γhJ)·x = r, with J of the rates at the start of the step.
+    pub(crate) fn implicit(self, gamma: f64, (v, y): (Block, Block)) -> (Block, Block) {
+        (write(Entry::ImplicitV(gamma, v, y)), write(Entry::ImplicitY(gamma, v, y)))
+    }
+
+    /// The mass matrix times an increment of the state; the increment itself, if the system has none.
+    pub(crate) fn mass(self, (v, y): (Block, Block)) -> (Block, Block) {
+        (v, write(Entry::Mass(y)))
+    }
+
+    /// h times the derivatives of h·v̇ and h·ẏ by the time, at the start of the step.
+    pub(crate) fn by_time(self) -> (Block, Block) {
+        (write(Entry::ByTimeV), write(Entry::ByTimeY))
+    }
+
     /// The velocity whose increment of y is d, in a second-order system.
     pub(crate) fn velocity(self, d: Block) -> Block {
         write(Entry::Velocity(d))
@@ -248,6 +282,27 @@ impl Program {
         self.entries.iter().map(order).max().unwrap_or(0)
     }
 
+    /// Whether it needs derivatives of the rates, so that it goes over symbols only.
+    pub fn has_derivatives(&self) -> bool {
+        self.series_order() > 0 || self.is_implicit()
+    }
+
+    /// Whether it solves equations.
+    pub fn is_implicit(&self) -> bool {
+        self.entries.iter().any(|entry| matches!(entry, Entry::ImplicitV(..) | Entry::ImplicitY(..)))
+    }
+
+    /// γ of the equations that it solves, all with one matrix.
+    pub(crate) fn gamma(&self) -> Option<f64> {
+        let gamma = |entry: &Entry| if let Entry::ImplicitV(gamma, ..) = entry { Some(*gamma) } else { None };
+        self.entries.iter().find_map(gamma)
+    }
+
+    /// How many systems of linear equations a step solves.
+    pub(crate) fn solutions(&self) -> usize {
+        self.entries.iter().filter(|entry| matches!(entry, Entry::ImplicitV(..))).count()
+    }
+
     /// Times within a step at which the rates are evaluated, as fractions of the step, ascending.
     ///
     /// `of_y`: those of ẏ count too; of a second-order system it does not depend on the time.
@@ -257,7 +312,7 @@ impl Program {
             match entry {
                 Entry::Dv(t, ..) => nodes.push(t.0),
                 Entry::Dy(t, ..) if of_y => nodes.push(t.0),
-                Entry::SeriesV(..) | Entry::SeriesY(..) => nodes.push(0.0),
+                Entry::SeriesV(..) | Entry::SeriesY(..) | Entry::ByTimeV | Entry::ByTimeY => nodes.push(0.0),
                 _ => {}
             }
         }
@@ -270,6 +325,8 @@ impl Program {
     pub fn run<N: Number>(&self, s: &dyn System<N>, t: N, h: N, v: &DVector<N>, y: &DVector<N>) -> Vec<DVector<N>> {
         let mut blocks: Vec<DVector<N>> = Vec::with_capacity(self.entries.len());
         let mut series: Option<Vec<(DVector<N>, DVector<N>)>> = None;
+        let mut implicit: Option<Implicit<N>> = if self.is_implicit() { Implicit::new(s, t, h, v, y) } else { None };
+        let unknown = |block: &DVector<N>| block.map(|_| N::of(f64::NAN));
         for entry in &self.entries {
             let of = |block: Block| &blocks[block.0 as usize];
             let made = match *entry {
@@ -278,6 +335,7 @@ impl Program {
                 Entry::Dv(at, v, y) => s.dv(at.at(t, h), of(v), of(y)),
                 Entry::Dy(at, v, y) => s.dy(at.at(t, h), of(v), of(y)),
                 Entry::Velocity(d) => s.velocity(of(d)),
+                Entry::Mass(d) => s.mass().map_or_else(|| of(d).clone(), |mass| mass.times(of(d))),
                 Entry::Add(a, b) => of(a).zip_map(of(b), |a, b| a + b),
                 Entry::Sub(a, b) => of(a).zip_map(of(b), |a, b| a - b),
                 Entry::Scale(c, a) => of(a).map(|a| N::of(c) * a),
@@ -289,6 +347,13 @@ impl Program {
                     let (v, y) = &made[k as usize - 1];
                     if matches!(entry, Entry::SeriesV(..)) { v.clone() } else { y.clone() }
                 }
+                Entry::ImplicitV(gamma, r_v, r_y) | Entry::ImplicitY(gamma, r_v, r_y) => {
+                    let right = [of(r_v), of(r_y)];
+                    let [v, y] = implicit.as_mut().map_or_else(|| right.map(unknown), |it| it.solve(gamma, right));
+                    if matches!(entry, Entry::ImplicitV(..)) { v } else { y }
+                }
+                Entry::ByTimeV => implicit.as_ref().map_or_else(|| unknown(v), |it| it.by_time(h)[0].clone()),
+                Entry::ByTimeY => implicit.as_ref().map_or_else(|| unknown(y), |it| it.by_time(h)[1].clone()),
             };
             blocks.push(made);
         }

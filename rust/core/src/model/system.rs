@@ -5,7 +5,10 @@ use nalgebra::DVector;
 use super::spec::{Parameters, Signature};
 use crate::{
     error::Error,
-    tape::number::{Number, Symbol},
+    tape::{
+        mass::Mass,
+        number::{Number, Symbol},
+    },
 };
 
 /// A velocity or coordinate block: its numbers in order.
@@ -27,6 +30,11 @@ pub trait System<N: Number> {
 
     /// h·ẏ(t, v, y)
     fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N>;
+
+    /// M, if the equations are M·ẏ = f with another matrix than that of units; `dy` is then h·f.
+    fn mass(&self) -> Option<&Mass> {
+        self.inner()?.mass()
+    }
 
     /// The velocity whose increment of `y` is `d`: undoes `dy` in a second-order system, where ẏ is v times a number.
     ///
@@ -69,6 +77,13 @@ pub trait System<N: Number> {
     /// Its tally, the sum over the steps since it was made, if it has one.
     fn tally(&self) -> Option<N> {
         self.inner()?.tally()
+    }
+
+    /// Sets its tally, if it has one.
+    fn set_tally(&self, tally: N) {
+        if let Some(inner) = self.inner() {
+            inner.set_tally(tally);
+        }
     }
 }
 

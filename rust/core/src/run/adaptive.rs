@@ -17,10 +17,11 @@ use crate::{
 
 pub use super::adaptive_plan::{AdaptiveRun, Arrays};
 
-/// Attempts between two checks of the lanes.
-const ATTEMPTS_BETWEEN_CHECKS: usize = 16;
-/// The same while some lanes make extra steps.
-const ATTEMPTS_WITH_EXTRA_STEPS: usize = 4;
+/// Attempts between two checks of the lanes. A lane that comes to a saved time waits for half of them, and for all of the next ones
+/// but the first, its extra step; fewer attempts would take as much time for calls of the kernel.
+const ATTEMPTS_BETWEEN_CHECKS: usize = 4;
+/// The most of a series, and between two calls of the monitor.
+const MOST_ATTEMPTS: usize = 16;
 /// Numbers of a lane above which it is checked after every attempt, which may take long.
 const LARGE_MEMBER_NUMBERS: usize = 1000;
 /// Members of a small system below which a second thread costs more time than it saves.
@@ -115,50 +116,50 @@ impl<'a> Worker<'a> {
                 self.group.set_pace(lane, pace.idle());
             }
         }
-        // Of a series: which lanes have a step to try, and how many attempts were made since the monitor was last asked.
+        // Which lanes have a step to try, so that nothing is to be done for them; and how many attempts were made since the monitor
+        // was last asked.
         let (mut runs, mut unseen) = (vec![false; assignments.len()], 0);
         while assignments.iter().any(Option::is_some) {
             for (lane, assigned) in assignments.iter_mut().enumerate() {
-                if runs[lane] {
+                // An extra step whose error was not tolerated leaves a step to try.
+                if runs[lane] && assigned.as_ref().is_some_and(|assigned| assigned.origin.is_none()) {
                     continue;
                 }
                 if let Some(taken) = assigned.take() {
                     *assigned = self.update_lane(&mut part, lane, taken, &mut waiting, go_on)?;
                 }
             }
-            let numbers = self.plan.v.len() + self.plan.y.len();
-            if self.group.has_terms() {
-                let attempts = if self.plan.every > 0 { 1 } else { self.attempts_by_series() };
-                self.waypoints.attempt(&mut *self.group, &mut part, attempts, &mut assignments);
-                if self.plan.every == 0 {
-                    self.group.find_running(self.plan.budget as f64, &mut runs);
-                }
-                unseen += attempts;
-                if unseen >= ATTEMPTS_BETWEEN_CHECKS {
-                    unseen = 0;
-                    if !go_on(0) {
-                        return Err(Error::Interrupted);
-                    }
-                }
-                continue;
-            }
-            // A member that makes an extra step makes only that before the next check.
-            let (taken, extra) =
-                assignments.iter().flatten().fold((0, 0), |(n, m), assigned| (n + 1, m + usize::from(assigned.origin.is_some())));
-            let attempts = if numbers > LARGE_MEMBER_NUMBERS || 2 * extra > taken {
-                1
-            } else if extra > 0 {
-                ATTEMPTS_WITH_EXTRA_STEPS
-            } else {
-                ATTEMPTS_BETWEEN_CHECKS
-            };
-            let attempts = attempts.min(self.attempts_to_next_kept(&assignments));
+            let attempts = self.attempts_before_check(&assignments);
             self.waypoints.attempt(&mut *self.group, &mut part, attempts, &mut assignments);
-            if !go_on(0) {
-                return Err(Error::Interrupted);
+            if self.plan.every == 0 {
+                self.group.find_running(self.plan.budget as f64, &mut runs);
+            }
+            unseen += if self.is_large() { MOST_ATTEMPTS } else { attempts };
+            if unseen >= MOST_ATTEMPTS {
+                unseen = 0;
+                if !go_on(0) {
+                    return Err(Error::Interrupted);
+                }
             }
         }
         Ok(())
+    }
+
+    /// Whether an attempt of a member may take long.
+    fn is_large(&self) -> bool {
+        self.plan.v.len() + self.plan.y.len() > LARGE_MEMBER_NUMBERS
+    }
+
+    /// How many attempts are made before the next check of the lanes.
+    fn attempts_before_check(&self, assignments: &[Option<Assignment>]) -> usize {
+        if self.group.has_terms() {
+            return if self.plan.every > 0 { 1 } else { self.attempts_by_series() };
+        }
+        // A member that makes an extra step makes only that before the next check.
+        let (taken, extra) =
+            assignments.iter().flatten().fold((0, 0), |(n, m), assigned| (n + 1, m + usize::from(assigned.origin.is_some())));
+        let most = if self.is_large() || 2 * extra > taken { 1 } else { ATTEMPTS_BETWEEN_CHECKS };
+        most.min(self.attempts_to_next_kept(assignments))
     }
 
     /// After how many attempts a member may have made a step that is kept.
@@ -290,7 +291,7 @@ impl<'a> Worker<'a> {
     fn attempts_by_series(&self) -> usize {
         let left = self.group.steps_left() / 2.0;
         let attempts = if self.group.lanes() > 1 { left.sqrt() } else { left };
-        (attempts as usize).clamp(1, ATTEMPTS_BETWEEN_CHECKS)
+        (attempts as usize).clamp(1, MOST_ATTEMPTS)
     }
 
     /// Puts a member into a lane, which steps it from now on.

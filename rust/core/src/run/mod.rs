@@ -22,6 +22,7 @@ use crate::{
         hand_written::{HandWrittenRates, kernel_of, single},
         matrix::Matrix,
         rates::{Rates, RatesRequest},
+        solving::with_equations,
         tapes::{self, RateTapes, TapeRates},
     },
     model::{
@@ -134,6 +135,7 @@ impl Model<'_> {
             StepStrategy::HandWrittenRates(long) => single(long, &self.asked(traced, machine, clock.h)),
             StepStrategy::Rates(lanes) => Box::new(TapeRates::new(RateTapes::of(&self.key)?, spec, level, lanes, clock)),
         };
+        let rates = with_equations(rates, &self.key, spec, shape, level, clock)?;
         let schedules = Schedules::of(&self.key.how, rates.traits(), traced.shape)?;
         Ok(Box::new(LargeGroup::new(schedules, rates, shape, traced.recorded, level, clock)))
     }
@@ -174,6 +176,7 @@ impl Model<'_> {
                 }
             },
         };
+        let rates = with_equations(rates, &self.key, spec, traced.shape, level, &Clock::NONE)?;
         let schedules = Schedules::of(&self.key.how, rates.traits(), traced.shape)?;
         Ok(Box::new(LargeAdaptive::new(schedules, rates, traced, level, budget)?))
     }

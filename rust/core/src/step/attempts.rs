@@ -101,7 +101,7 @@ impl AttemptsOf<'_> {
     }
 
     /// The system under its control and the force, for a step of that length.
-    fn rates(&self, step: Symbol) -> Box<dyn System<Symbol>> {
+    pub(super) fn rates(&self, step: Symbol) -> Box<dyn System<Symbol>> {
         let signature = self.signature;
         if signature.equations.is_some() {
             return self.forced(step, self.scaled(step)); // the push of their control depends on the step

@@ -10,6 +10,7 @@ pub mod pace;
 mod properties;
 mod series_pace;
 mod sizes;
+pub(crate) mod solving;
 pub mod tapes;
 pub mod trace;
 mod watch;

@@ -17,7 +17,7 @@ use crate::{
         program::Program,
         system::{Block, Energies, System},
     },
-    tape::number::Number,
+    tape::{mass::Mass, number::Number},
 };
 
 /// A new step is the old one times SAFETY·r^(−5/32)·p^(1/16), r being the error over the tolerance and p that of the step before
@@ -78,7 +78,11 @@ impl<N: Number> Pace<N> {
         y: &Block<N>,
     ) -> (Self, Vec<N>) {
         let zero = N::of(0.0);
-        let rates = [s.dv(self.t, v, y), s.dy(self.t, v, y)];
+        let rates_at = |t: N, v: &Block<N>, y: &Block<N>| {
+            let dy = s.dy(t, v, y);
+            [s.dv(t, v, y), s.mass().map_or_else(|| dy.clone(), |mass| mass.rates(dy.clone()))]
+        };
+        let rates = rates_at(self.t, v, y);
         let longest = acceptance.sizes(v.as_slice(), y.as_slice());
         let counts = acceptance.counts(v.len(), y.len());
         let shortest = |rates: &[Block<N>; 2]| {
@@ -108,7 +112,7 @@ impl<N: Number> Pace<N> {
             let ahead = N::of(part) * chosen;
             let t = self.t + ahead;
             let [v, y] = [(v, &rates[0]), (y, &rates[1])].map(|(block, rate)| block.zip_map(rate, |x, rate| x + ahead * rate));
-            let time = N::of(FIRST) * shortest(&[s.dv(t, &v, &y), s.dy(t, &v, &y)]);
+            let time = N::of(FIRST) * shortest(&rates_at(t, &v, &y));
             h = N::choose(time.below(h), time, h);
         }
         let h = self.shortened(N::choose(zero.below(self.h), self.h, longer(h, least)), self.t);
@@ -136,6 +140,10 @@ impl<N: Number> System<N> for Stretched<N> {
 
     fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
         self.s.dy(t, v, y).map(|dy| self.h * dy)
+    }
+
+    fn mass(&self) -> Option<&Mass> {
+        self.s.mass()
     }
 
     fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
@@ -367,6 +375,10 @@ impl<N: Number> System<N> for Backward<N> {
 
     fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
         self.0.dy(-t, v, y)
+    }
+
+    fn mass(&self) -> Option<&Mass> {
+        self.0.mass()
     }
 
     fn project(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {

@@ -1,10 +1,11 @@
 //! What is known of a step before it is traced: sizes and approximate numbers of operations.
 
-use super::key::StepKind;
+use super::{key::StepKind, solving};
 use crate::{
     error::Error,
     model::{
         around::{self, contact, controls},
+        program::Program,
         spec::Signature,
         steppers::method,
         system::Shape,
@@ -44,9 +45,18 @@ pub(crate) fn recorded(signature: &Signature, names: &[String]) -> Result<usize,
     names.iter().try_fold(0, |sum, name| Ok(sum + quantity(signature, name)?))
 }
 
+/// Approximate numbers of operations.
+pub(super) struct Operations {
+    pub rates: usize,
+    pub step: usize,
+    /// Those of the equations of an implicit step, from the state.
+    pub equations: usize,
+}
+
 /// Approximate numbers of operations of the rates of a scene and of a step.
-pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) -> Result<(usize, usize), Error> {
-    Ok(match how {
+pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) -> Result<Operations, Error> {
+    let mut equations = 0;
+    let (rates, step) = match how {
         StepKind::Matrix { nodes, .. } => {
             let n = shape.v + shape.y;
             let products = n * (n + signature.whole("inputs") * nodes.len());
@@ -67,15 +77,37 @@ pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) ->
                 _ => program.series_order() as usize,
             };
             let evaluations = if order > 0 { order * (order + 1) / 2 } else { program.evaluations() };
-            (controls * rates, controls * rates * evaluations + contacts)
+            let mut solving = 0;
+            if program.is_implicit() {
+                // Of a full matrix; where ẏ is v times a number, only v is solved for. A column of the Jacobian takes about as long
+                // as the rates. Elimination has two choices and two operations for each of n³/3 entries, a solution three for n².
+                let n = if shape.v == shape.y { shape.v } else { shape.v + shape.y };
+                equations = rates * n;
+                solving = 4 * n * n * n / 3 + 3 * n * n * program.solutions();
+                if equations + solving > MAX_IMPLICIT_TAPE_OPERATIONS && rates <= MAX_LONG_TAPE_OPERATIONS {
+                    (equations, solving) = solving::operations(signature, &program, shape)?;
+                }
+                solving += equations;
+            }
+            (controls * rates, controls * rates * evaluations + contacts + solving)
         }
-    })
+    };
+    Ok(Operations { rates, step, equations })
 }
 
-/// Whether steps are made by a series of the solution.
+/// Whether steps are made by derivatives of the rates: by a series of the solution, or by solving equations.
+pub(super) fn has_derivatives(how: &StepKind) -> Result<bool, Error> {
+    of_method(how, Program::has_derivatives)
+}
+
+/// Whether they are made by a series of the solution.
 pub(super) fn has_series(how: &StepKind) -> Result<bool, Error> {
+    of_method(how, |program| program.series_order() > 0)
+}
+
+fn of_method(how: &StepKind, holds: impl Fn(&Program) -> bool) -> Result<bool, Error> {
     Ok(match how {
-        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => method(name)?.program().series_order() > 0,
+        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => holds(&method(name)?.program()),
         StepKind::Step(_) | StepKind::Matrix { .. } => false,
     })
 }
@@ -83,3 +115,12 @@ pub(super) fn has_series(how: &StepKind) -> Result<bool, Error> {
 /// The most operations, approximately, of a step that is one tape in any case: by a series, one that is given, one that is fused,
 /// or one of members that have times of their own. It takes some ten nanoseconds a byte to compile.
 pub(super) const MAX_LONG_TAPE_OPERATIONS: usize = 100_000;
+
+/// The same of a step that solves equations, or of these equations alone: to trace and compile so many takes some three seconds.
+pub(super) const MAX_IMPLICIT_OPERATIONS: usize = 500_000;
+
+/// The most operations of a step that solves equations and is one tape though it might be solved over rows.
+pub(super) const MAX_IMPLICIT_TAPE_OPERATIONS: usize = 20_000;
+
+/// The most unknowns of equations: their matrix is kept as a whole.
+pub(super) const MAX_UNKNOWNS: usize = 4096;

@@ -7,7 +7,10 @@ use super::{
     cache::Cache,
     key::{StepKind, TapeKey},
     leaves::BEGINS,
-    properties::{MAX_LONG_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, has_series, operations, recorded, shape},
+    properties::{
+        MAX_IMPLICIT_OPERATIONS, MAX_IMPLICIT_TAPE_OPERATIONS, MAX_LONG_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, MAX_UNKNOWNS,
+        Operations, has_derivatives, has_series, operations, recorded, shape,
+    },
     trace::{trace_begin, trace_by_terms, trace_judged, trace_record, trace_slot, trace_step},
     watch,
 };
@@ -64,7 +67,7 @@ pub struct Traced {
     pub recorded: usize,
     /// Whether the method has a carry instead of v between steps.
     pub carries: bool,
-    /// Whether steps are made by a series, which is one tape however long.
+    /// Whether steps are made by derivatives on one tape, however long.
     pub series: bool,
     /// Approximate numbers of operations of the rates and of a step.
     pub operations: (usize, usize),
@@ -79,15 +82,30 @@ impl TapeKey {
         static CACHE: LazyLock<Cache<TapeKey, Traced>> = LazyLock::new(Cache::default);
         CACHE.find(self, || {
             let shape = shape(&self.signature, &self.how)?;
-            let operations = operations(&self.signature, &self.how, shape)?;
-            let series = has_series(&self.how)?;
-            if series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
+            let Operations { rates, step, equations } = operations(&self.signature, &self.how, shape)?;
+            let operations = (rates, step);
+            let own_times = self.signature.count(BEGINS) > 0;
+            let mut series = has_series(&self.how)?;
+            let has_mass = self.signature.equations.as_ref().is_some_and(|equations| equations.mass.is_some());
+            if !series && has_derivatives(&self.how)? {
+                let is_one = self.fused
+                    || own_times
+                    || self.precision == Precision::Single
+                    || around::is_one_tape(&self.signature)
+                    || has_mass;
+                series = is_one || step <= MAX_IMPLICIT_TAPE_OPERATIONS;
+                let long = if series { step } else { equations };
+                let unknowns = shape.v + shape.y;
+                if long > MAX_IMPLICIT_OPERATIONS || unknowns > MAX_UNKNOWNS {
+                    let (most, most_unknowns) = (MAX_IMPLICIT_OPERATIONS, MAX_UNKNOWNS);
+                    return Err(Error::TooLongToSolve { operations: long, most, unknowns, most_unknowns });
+                }
+            } else if series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
                 return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
             }
             if self.fused && !series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
                 return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
             }
-            let own_times = self.signature.count(BEGINS) > 0;
             if own_times && operations.1 > MAX_LONG_TAPE_OPERATIONS {
                 return Err(Error::TooLongForTimes { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
             }

@@ -5,7 +5,7 @@ use std::{
     hash::{DefaultHasher, Hash, Hasher},
 };
 
-use super::{Id, Op};
+use super::{Id, Op, mass::Mass};
 
 /// An invariant that is kept, and its gradient.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -38,6 +38,8 @@ pub struct Equations {
     pub(crate) kept: Option<Invariant>,
     /// Values that are functions of others, whose operations do not tell their derivatives, for series.
     pub(crate) functions: Vec<Marked>,
+    /// The mass matrix, if the rates are those of M·ẏ = f.
+    pub(crate) mass: Option<Mass>,
     /// A digest that distinguishes it from others, computed once: traced steps are found by it.
     digest: u64,
 }
@@ -45,7 +47,7 @@ pub struct Equations {
 impl PartialEq for Equations {
     fn eq(&self, other: &Equations) -> bool {
         let parts = |e: &Equations| (e.dv.clone(), e.dy.clone(), e.quantities.clone(), e.kept.clone(), e.functions.clone());
-        self.digest == other.digest && self.ops == other.ops && parts(self) == parts(other)
+        self.digest == other.digest && self.ops == other.ops && parts(self) == parts(other) && self.mass == other.mass
     }
 }
 
@@ -68,7 +70,7 @@ impl Equations {
     ) -> Equations {
         let mut hasher = DefaultHasher::new();
         (&ops, &dv, &dy, &quantities, &kept).hash(&mut hasher);
-        Equations { ops, dv, dy, quantities, kept, functions: Vec::new(), digest: hasher.finish() }
+        Equations { ops, dv, dy, quantities, kept, functions: Vec::new(), mass: None, digest: hasher.finish() }
     }
 
     /// The same with values that are known as functions of others, for methods that need the series of a solution.
@@ -77,6 +79,15 @@ impl Equations {
         let mut hasher = DefaultHasher::new();
         (self.digest, &functions).hash(&mut hasher);
         Equations { functions, digest: hasher.finish(), ..self }
+    }
+
+    /// The same with a mass matrix.
+    #[must_use]
+    pub fn with_mass(self, mass: Option<Mass>) -> Equations {
+        let Some(mass) = mass else { return self };
+        let mut hasher = DefaultHasher::new();
+        (self.digest, &mass).hash(&mut hasher);
+        Equations { mass: Some(mass), digest: hasher.finish(), ..self }
     }
 
     /// The same without operations whose result is not used.
@@ -102,7 +113,7 @@ impl Equations {
         let functions = functions
             .map(|(value, by, bounds)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect(), bounds));
         let functions = functions.collect();
-        Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept).with_functions(functions)
+        Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept).with_functions(functions).with_mass(self.mass)
     }
 
     /// The quantities by name.
@@ -208,7 +219,7 @@ impl Equations {
     }
 
     /// Whether each operation comes after what it reads, no leaf is beyond so many parameters, tables and numbers of the state,
-    /// and an invariant has a derivative by each number of the blocks.
+    /// an invariant has a derivative by each number of the blocks, and a mass matrix goes with y alone.
     pub(crate) fn is_sound(&self, parameters: usize, tables: usize, states: usize) -> bool {
         let is_read = |(id, op): (usize, &Op)| {
             let (operands, n) = op.operands();
@@ -222,7 +233,9 @@ impl Equations {
             leaf && operands[..n].iter().all(|operand| (*operand as usize) < id)
         };
         let whole = self.kept.as_ref().is_none_or(|kept| [kept.along_v.len(), kept.along_y.len()] == self.blocks());
-        whole && self.ops.iter().enumerate().all(is_read) && self.roots().all(|id| (id as usize) < self.ops.len())
+        let [v, y] = self.blocks();
+        let mass_fits = self.mass.as_ref().is_none_or(|mass| v == 0 && mass.fits(y));
+        whole && mass_fits && self.ops.iter().enumerate().all(is_read) && self.roots().all(|id| (id as usize) < self.ops.len())
     }
 }
 

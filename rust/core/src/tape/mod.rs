@@ -11,6 +11,7 @@ pub mod eval;
 mod fast_hash;
 pub mod fuse;
 mod increments;
+pub mod mass;
 pub mod number;
 mod op;
 pub mod print;

@@ -3,7 +3,7 @@
 //! A step, a system, a control are written once, over any [`Number`]. With `f64` they compute; with [`Symbol`] they write the
 //! tape.
 
-pub use stepwell_base::number::{Branch, Function, Number, Series};
+pub use stepwell_base::number::{Branch, Derivatives, Function, Number, Series};
 
 pub use super::symbol::{Symbol, SymbolTruth, record};
 use super::{
@@ -61,5 +61,13 @@ impl Number for Symbol {
     }
     fn series(order: u32, start: &[Symbol], time: [Symbol; 3], rates: &mut dyn FnMut() -> Vec<Symbol>) -> Option<Series<Symbol>> {
         Some(series::of_solution(order, start, time, rates))
+    }
+    fn derivatives(
+        state: &[Symbol],
+        time: Symbol,
+        step: Symbol,
+        rates: &mut dyn FnMut() -> Vec<Symbol>,
+    ) -> Option<Derivatives<Symbol>> {
+        Some(series::derivatives(state, time, step, rates))
     }
 }

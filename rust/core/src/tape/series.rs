@@ -10,7 +10,7 @@ use std::{
     collections::{BTreeSet, HashMap},
 };
 
-use stepwell_base::number::{Branch, Function, Number, Series as SeriesOf};
+use stepwell_base::number::{Branch, Derivatives, Function, Number, Series as SeriesOf};
 
 use super::{
     Id, Op,
@@ -63,7 +63,7 @@ pub(crate) fn of_solution(
 ) -> SeriesOf<Symbol> {
     let outer = MARKS.replace(Some(HashMap::new()));
     let rates = rates();
-    let mut series = Series::new(start, time, &rates);
+    let mut series = Series::new(start, time, None, &rates);
     MARKS.set(outer);
     let mut made = Vec::with_capacity(order as usize);
     let mut own = BTreeSet::from([unit.0]);
@@ -82,6 +82,44 @@ pub(crate) fn of_solution(
     }
     note_evaluations(order, &rates, &series, &made, own);
     SeriesOf { terms: made, branches: series.branches() }
+}
+
+/// The derivatives of rates: of the series along one number of the state, or along the time, the coefficients of order 1.
+///
+/// The length of the step may have been chosen by the time, but does not change with it.
+pub(crate) fn derivatives(
+    state: &[Symbol],
+    time: Symbol,
+    step: Symbol,
+    rates: &mut dyn FnMut() -> Vec<Symbol>,
+) -> Derivatives<Symbol> {
+    let outer = MARKS.replace(Some(HashMap::new()));
+    let rates = rates();
+    let mut series = Series::new(state, time, Some(step), &rates);
+    MARKS.set(outer);
+    series.advance(0);
+    let readers = series.readers();
+    let mut along = |seed: Symbol| {
+        // Most rates of a large system depend on few numbers of the state.
+        let mut changed = BTreeSet::new();
+        let mut open = vec![seed.0];
+        while let Some(id) = open.pop() {
+            let places = readers.get(&id).into_iter().flatten();
+            open.extend(places.filter(|place| changed.insert(**place)).map(|place| series.values[*place]));
+        }
+        series.terms.entry(seed.0).or_default().push(Some(Symbol::of(1.0)));
+        for &place in &changed {
+            let id = series.values[place];
+            let term = series.next(id, 1);
+            series.terms.entry(id).or_default().push(term);
+        }
+        let derivatives = rates.iter().map(|rate| series.term(rate.0, 1)).collect();
+        for id in changed.iter().map(|place| series.values[*place]).chain([seed.0]) {
+            series.terms.entry(id).or_default().truncate(1);
+        }
+        derivatives
+    };
+    Derivatives { by_state: state.iter().map(|seed| along(*seed)).collect(), by_time: along(time) }
 }
 
 /// Notes what the coefficients cost in evaluations of the rates. The products by the unit and by 1/k are the method's `own`, as
@@ -120,13 +158,14 @@ struct Series {
 }
 
 impl Series {
-    fn new(start: &[Symbol], time: Symbol, rates: &[Symbol]) -> Series {
+    /// Of values that change with the state and the time; `fixed` does not, whatever it was made of.
+    fn new(start: &[Symbol], time: Symbol, fixed: Option<Symbol>, rates: &[Symbol]) -> Series {
         let mut terms: HashMap<Id, Vec<Term>> = start.iter().chain([&time]).map(|seed| (seed.0, vec![Some(*seed)])).collect();
         let (mut factors, mut bounds) = (HashMap::new(), HashMap::new());
         let mut needed = BTreeSet::new();
         let mut open: Vec<Id> = rates.iter().map(|rate| rate.0).collect();
         while let Some(id) = open.pop() {
-            if terms.contains_key(&id) || !needed.insert(id) {
+            if terms.contains_key(&id) || fixed.is_some_and(|fixed| fixed.0 == id) || !needed.insert(id) {
                 continue;
             }
             if let Some((of, within)) = factors_of(Symbol(id)) {
@@ -162,9 +201,23 @@ impl Series {
         bounded.map(|(id, [least, most])| Branch { terms: self.terms[id].clone(), least: *least, most: *most }).collect()
     }
 
+    /// The places among the values of those that each changes.
+    fn readers(&self) -> HashMap<Id, Vec<usize>> {
+        let mut readers: HashMap<Id, Vec<usize>> = HashMap::new();
+        for (place, id) in self.values.iter().enumerate() {
+            let (operands, n) = operation(*id).operands();
+            match self.factors.get(id) {
+                Some(of) => of.iter().for_each(|(argument, _)| readers.entry(argument.0).or_default().push(place)),
+                None => operands[..n].iter().for_each(|operand| readers.entry(*operand).or_default().push(place)),
+            }
+        }
+        readers
+    }
+
+    /// A coefficient; none is zero, or not there yet.
     fn term(&self, id: Id, k: usize) -> Term {
         match self.terms.get(&id) {
-            Some(terms) => terms[k],
+            Some(terms) => terms.get(k).copied().flatten(),
             None => (k == 0).then_some(Symbol(id)),
         }
     }

@@ -11,10 +11,10 @@ function fastest(scene, m) {
   return 2 * Math.sqrt(m.stiffness[0] / m.mass[0]) * Math.sin((0.5 * Math.PI * n) / (n + 1));
 }
 
-// The step above which a method is unstable: 0 if it is for every step, null if the page does not know.
+// The step above which a method is unstable: 0 if it is for every step, null if it is for none or the page does not know.
 // Method is what the page knows of it, values are those of the sliders, m the parameters of a step.
 export function limitOf(scene, method, values, m) {
-  if (scene.limit === null) return null;
+  if (scene.limit === null || method.limit === null) return null;
   if (scene.limit !== "scan") return method.limit / fastest(scene, m);
   const stable = (dt) => {
     const [[a, b], [c, d]] = new Trajectory(scene, method.name, dt, values).jacobian();

@@ -31,6 +31,9 @@ pub(crate) fn parts<N: Number>() -> Vec<Part<N>> {
 /// A system that passes this check can be made and stepped.
 pub fn fit(kind: &Kind, signature: &Signature, method: &Record) -> Result<Shape, Error> {
     let shape = (kind.shape)(signature)?;
+    if signature.equations.as_ref().is_some_and(|equations| equations.mass.is_some()) && !method.program().is_implicit() {
+        return Err(Error::MassMatrix { method: method.name });
+    }
     let mut term = (kind.velocity_term)(signature);
     for part in parts::<f64>().iter().filter(|part| (part.is_given)(signature)) {
         (part.check)(kind, signature, shape)?;

@@ -14,6 +14,7 @@ use crate::{
         Id, Op,
         equations::Equations,
         eval,
+        mass::Mass,
         number::{Number, Symbol},
         series,
     },
@@ -192,6 +193,10 @@ impl<N: Operand> System<N> for Own<N> {
             Some(dy) => self.rates(&self.of_y, dy, t, v, y),
             None => v * self.h,
         }
+    }
+
+    fn mass(&self) -> Option<&Mass> {
+        self.equations.mass.as_ref()
     }
 
     fn velocity(&self, d: &Block<N>) -> Block<N> {

@@ -93,4 +93,8 @@ impl<N: Number> System<N> for Controlled<N> {
     fn tally(&self) -> Option<N> {
         Some(self.work.get())
     }
+
+    fn set_tally(&self, tally: N) {
+        self.work.set(tally);
+    }
 }

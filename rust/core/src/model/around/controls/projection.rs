@@ -82,4 +82,8 @@ impl<N: Number> System<N> for Projected<N> {
     fn tally(&self) -> Option<N> {
         Some(self.work.get())
     }
+
+    fn set_tally(&self, tally: N) {
+        self.work.set(tally);
+    }
 }

@@ -1,0 +1,211 @@
+"""Where an implicit step has no Jacobian or no solution: every function, infinite derivatives, matrices without inverse."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.model.systems import LinearSystem
+
+IMPLICIT = [m.name for m in sw.methods() if m.is_implicit]
+ABLE = [name for name in IMPLICIT if sw.method(name).error_order is not None]
+
+# ---- every function of own equations has its derivative
+
+Rates = Callable[[Any], Any]
+
+
+def words(*lines: str) -> list[str]:
+    return " ".join(lines).split()
+
+
+def row(*numbers: Any) -> Any:
+    return np.stack(numbers)
+
+
+OF_ONE = words(
+    "abs absolute fabs acos arccos asin arcsin atan arctan cbrt ceil cos cosh deg2rad degrees exp exp2 expm1 floor log log10",
+    "log1p log2 negative positive rad2deg radians real rint round sign sin sinh sqrt square tan tanh trunc",
+)
+OF_TWO = words(
+    "add arctan2 atan2 copysign divide float_power fmax fmin hypot maximum minimum mod multiply pow power remainder subtract"
+)
+COMPARE = words("equal greater greater_equal less less_equal not_equal logical_and logical_or")
+OF_SEVERAL: dict[str, Rates] = {
+    "all": lambda x: np.where(np.all(row(x > 0.0, x < 1.0)), x * x, x),
+    "amax": lambda x: np.amax(row(x, x * x, 0.1)),
+    "amin": lambda x: np.amin(row(x, x * x, 0.9)),
+    "any": lambda x: np.where(np.any(row(x > 1.0, x < 0.5)), x * x, 3.0 * x),
+    "clip": lambda x: np.clip(x, 0.0, 0.9) + np.clip(x, 0.9, 2.0) + np.clip(x, 0.0, x * x),
+    "cross": lambda x: np.cross(row(x, 1.0, x * x), row(2.0, x, 1.0))[0],
+    "cumsum": lambda x: np.cumsum(row(x, x * x, 1.0))[2],
+    "diff": lambda x: np.diff(row(x, x * x * x))[0],
+    "dot": lambda x: np.dot(row(x, 1.0), row(x, x * x)),
+    "interp": lambda x: np.interp(x, [0.0, 0.5, 1.0, 2.0], [0.0, 1.0, 4.0, 5.0]),
+    "inner": lambda x: np.inner(row(x, 1.0), row(x, x * x)),
+    "logical_not": lambda x: np.where(np.logical_not(x < 0.5), x * x, x),
+    "matmul": lambda x: np.matmul(row(row(x, 1.0), row(2.0, x)), row(x, x * x))[1],
+    "max": lambda x: np.max(row(x, 0.2 * x)),
+    "mean": lambda x: np.mean(row(x, x * x)),
+    "min": lambda x: np.min(row(x, 0.2 * x)),
+    "norm": lambda x: np.linalg.norm(row(x, 2.0 * x * x)),
+    "outer": lambda x: np.outer(row(x, 1.0), row(x, x * x))[0, 1],
+    "prod": lambda x: np.prod(row(x, x, 2.0)),
+    "sum": lambda x: np.sum(row(x, x * x)),
+    "trace": lambda x: np.trace(row(row(x, 1.0), row(2.0, x * x))),
+    "vdot": lambda x: np.vdot(row(x, 1.0), row(x, x * x)),
+    "where": lambda x: np.where(x < 0.5, x, -2.0 * x * x),
+}
+#: These arrange numbers and compute none.
+ARRANGE = words(
+    "array_split atleast_1d atleast_2d broadcast_to column_stack concatenate copy diag diagonal dstack empty_like expand_dims",
+    "flip fliplr flipud full_like hstack moveaxis ndim ones_like ravel repeat reshape roll rollaxis rot90 shape size split",
+    "squeeze stack swapaxes take tile transpose tril triu vstack zeros_like",
+)
+
+
+def of_one(name: str) -> Rates:
+    return lambda x: getattr(np, name)(x)
+
+
+def of_two(name: str) -> Rates:
+    """By each of its arguments, and by both."""
+    return lambda x: getattr(np, name)(x, 0.3 + x * x) + getattr(np, name)(1.5, x)
+
+
+def comparing(name: str) -> Rates:
+    function = getattr(np, name)
+    return lambda x: np.where(function(x < 0.5, x > 0.2) if "logical" in name else function(x, 0.5), x * x, 3.0 * x)
+
+
+def rates() -> dict[str, Rates]:
+    """A rate for each function that own equations have."""
+    of = {name: of_one(name) for name in OF_ONE} | {name: of_two(name) for name in OF_TWO}
+    return of | {name: comparing(name) for name in COMPARE} | OF_SEVERAL
+
+
+def system_of(rate: Rates) -> sw.System:
+    return sw.system(order=1)(lambda t, y: [rate(y[0]) + 0.125])()
+
+
+def test_every_function_is_looked_at() -> None:
+    assert sorted([*rates(), *ARRANGE]) == sw.equations.functions()
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_every_function_has_its_derivative_in_the_jacobian(dtype: str) -> None:
+    """A linearly implicit step is f/(1 − h·f′) long; a rate without derivative would be taken for a constant without a word."""
+    h, x, wrong = 2.0**-4, 0.77, []
+    for name, rate in rates().items():
+        system = system_of(rate)
+        ends = [
+            float(sw.integrate(system, "standard_euler", y=[x + d], dt=1.0, steps=1).y[-1, 0]) - x - d for d in (0.0, 1e-6, -1e-6)
+        ]
+        slope = (ends[1] - ends[2]) / 2e-6
+        step = float(sw.integrate(system, "linearly_implicit_euler", y=[x], dt=h, steps=1, dtype=dtype).y[-1, 0]) - x
+        expected = h * ends[0] / (1.0 - h * slope)
+        if not abs(step - expected) <= (1e-8 if dtype == "float64" else 1e-6) * max(1.0, abs(expected)):
+            wrong.append((name, step, expected))
+    assert wrong == []
+
+
+# ---- derivatives that are not finite
+
+
+@sw.system(order=1)
+def filling(t: Any, y: Any) -> Any:
+    """The slope of the root is infinite at y[1] = 0, where all rates are finite."""
+    return [np.sqrt(y[1]) - y[0], 1.0 + 0.0 * y[0]]
+
+
+@pytest.mark.parametrize("method", [*ABLE, "taylor"])
+def test_a_derivative_that_is_not_finite_is_named(method: str) -> None:
+    words = f"{method} needs the derivative of the rate of y\\[0\\] by y\\[1\\], which is infinite at the start"
+    with pytest.warns(sw.ToleranceWarning, match=rf"the run stopped before t = 1, at t = 0; no step.*: {words}$"):
+        run = sw.integrate(filling, method, y=np.zeros(2), tolerance=1e-4, at=[1.0])
+    assert run.status == sw.Status.NOT_FINITE
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sw.integrate(filling, "dop853", y=np.zeros(2), tolerance=1e-4, at=[1.0])
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_its_neighbours_go_on(method: str) -> None:
+    y = np.array([[0.0, 0.0, 0.5], [1.0, 0.0, 2.0]])
+    with pytest.warns(
+        sw.DivergenceWarning, match=r"1 of 3 members diverged: member 1 at step 1 \(t = 0.1\), .*by y\[1\], which is inf"
+    ):
+        run = sw.integrate(filling, method, y=y, dt=0.1, steps=5)
+    assert run.status.tolist() == [0, 1, 0]
+    assert run.first_bad_step.tolist() == [-1, 1, -1]
+    alone = [sw.integrate(filling, method, y=y[:, k], dt=0.1, steps=5).y[-1] for k in (0, 2)]
+    assert np.array_equal(run.y[-1][:, [0, 2]], np.stack(alone, axis=1))
+
+
+def test_a_large_system_is_not_searched() -> None:
+    """Its derivatives would take more memory than the run."""
+    n = 1200
+    with pytest.warns(sw.DivergenceWarning, match=r"by linearly_implicit_euler with dt = 0.1$"):
+        sw.integrate(sw.Chain(n, stiffness=1e308), "linearly_implicit_euler", v=np.zeros(n), y=np.ones(n), dt=0.1, steps=1)
+
+
+# ---- matrices without an inverse
+
+
+@pytest.mark.parametrize("method", [*ABLE, "linearly_implicit_euler", "backward_euler"])
+def test_a_singular_matrix_stops_its_member_alone(method: str) -> None:
+    """With fixed steps: γ·h·λ = 1 in the one in the middle."""
+    gamma = getattr(sw.method(method).steps, "METHOD", None)
+    h = 0.25
+    rate = 1.0 / ((gamma.gamma if gamma else 1.0) * h)
+    system = LinearSystem(np.array([[[-1.0, rate, 0.5]]]), velocities=0)
+    if 1.0 - (gamma.gamma if gamma else 1.0) * (h * rate) != 0.0:
+        pytest.skip("rounding makes it a large number")
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 3 members diverged: member 1 at step 1 \(t = 0.25\)"):
+        run = sw.integrate(system, method, y=np.ones((1, 3)), dt=h, steps=4)
+    assert run.status.tolist() == [0, 1, 0]
+    for k, each in ((0, -1.0), (2, 0.5)):
+        assert run.y[-1, 0, k] == sw.integrate(LinearSystem([[each]], velocities=0), method, y=[1.0], dt=h, steps=4).y[-1, 0]
+    v, y = np.empty((0, 3)), np.ones((1, 3))
+    world = sw.World(system, method, v=v, y=y, dt=h)
+    world.step(4)
+    assert np.array_equal(y[:, [0, 2]], run.y[-1][:, [0, 2]])
+    assert not np.isfinite(y[0, 1])
+
+
+@pytest.mark.parametrize("method", ABLE)
+def test_with_a_tolerance_such_a_step_is_rejected(method: str) -> None:
+    """And a shorter one goes on; the neighbours have the bits that they have alone."""
+    gamma = sw.method(method).steps.METHOD.gamma  # type: ignore[attr-defined]
+    rates = np.array([-1.0, 2.0, 0.5])
+    first = 1.0 / (gamma * 2.0)
+    for backend in ("rust", "numpy"):
+        run = sw.integrate(
+            LinearSystem(rates[np.newaxis, np.newaxis], velocities=0),
+            method, y=np.ones((1, 3)), dt=first, tolerance=1e-6, at=[3.0], backend=backend,
+        )  # fmt: skip
+        assert run.status.tolist() == [0, 0, 0]
+        assert run.paces is not None
+        assert run.paces.rejected[1] > 0
+        assert run.y[-1, 0] == pytest.approx(np.exp(3.0 * rates), rel=1e-3)
+        for k, rate in enumerate(rates.tolist()):
+            alone = sw.integrate(
+                LinearSystem([[rate]], velocities=0), method, y=[1.0], dt=first, tolerance=1e-6, at=[3.0], backend=backend
+            )
+            assert run.y[-1, 0, k] == alone.y[-1, 0]
+
+
+def test_a_singular_matrix_within_a_run_says_when() -> None:
+    """ẏ = a(t)·y with a = 1/h from t = 0.9 on; a step has the Jacobian of its start."""
+    system = sw.system(order=1)(lambda t, y: y * np.where(t < 0.9, -1.0, 8.0))()
+    with pytest.warns(
+        sw.DivergenceWarning, match=r"the run diverged at step 9 \(t = 1.125\), by linearly_implicit_euler with dt = 0.125"
+    ):
+        run = sw.integrate(system, "linearly_implicit_euler", y=1.0, dt=0.125, steps=10)
+    assert int(run.first_bad_step) == 9
+    assert math.isfinite(float(sw.integrate(system, "linearly_implicit_euler", y=1.0, dt=0.125, steps=8).y[-1]))

@@ -1,0 +1,357 @@
+"""Mass matrices: M·ẏ = f, with algebraic equations where M is singular."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _core
+from stepwell.analysis import consistency
+from stepwell.model.equations.mass import mass_matrix
+from stepwell.reference.traced import Tracer
+from support.graphs import assert_one_graph, model
+
+IMPLICIT = [m.name for m in sw.methods() if m.is_implicit]
+ABLE = [name for name in IMPLICIT if sw.method(name).error_order is not None]
+EXPLICIT = [m.name for m in sw.methods() if not m.is_implicit and not m.needs_acceleration]
+
+
+@sw.system(order=1, mass=np.diag([1.0, 1.0, 0.0]))
+def robertson(t: Any, y: Any) -> Any:
+    """Robertson's reaction, of which the third equation says that nothing is lost."""
+    slow, fast = 0.04 * y[0] - 1e4 * y[1] * y[2], 3e7 * y[1] * y[1]
+    return [-slow, slow - fast, y[0] + y[1] + y[2] - 1.0]
+
+
+#: By the Test Set for IVP Solvers.
+ROBERTSON = {
+    0.4: (0.98517211386, 3.386395379e-5, 0.01479402218522),
+    40.0: (0.71582706871941, 9.18553476456e-6, 0.28416374574583),
+    1e2: (0.6172348823961, 6.15359127464e-6, 0.3827589640126),
+    1e5: (0.0178659211423, 7.27475146852e-8, 0.9821340061102),
+}
+
+
+@sw.system(order=1, mass=np.diag([1.0, 1.0, 1.0, 1.0, 0.0]))
+def pendulum(t: Any, s: Any, *, g: Any = 9.81) -> Any:
+    """A rod of length 1: x, y, their velocities, and the pull of the rod, for which the length has no acceleration (index 1)."""
+    x, y, u, v, pull = s
+    return [u, v, -pull * x, -pull * y - g, u * u + v * v - pull * (x * x + y * y) - g * y]
+
+
+#: The capacitances of the transistor amplifier join nodes, so its matrix is not diagonal: three of its rows depend on others.
+CAPACITANCES = 1e-6 * np.arange(1.0, 6.0)
+JOINED = np.zeros((8, 8))
+for (node, other), capacitance in zip([(0, 1), (2, 2), (3, 4), (5, 5), (6, 7)], CAPACITANCES, strict=True):
+    JOINED[node, node] -= capacitance
+    if other != node:
+        JOINED[other, other] -= capacitance
+        JOINED[node, other] += capacitance
+        JOINED[other, node] += capacitance
+
+
+@sw.system(order=1, mass=JOINED)
+def amplifier(t: Any, y: Any) -> Any:
+    """Two transistors; problem ``transamp`` of the Test Set for IVP Solvers."""
+    supply, voltage, gain = 6.0, 0.026, 0.99
+    first, second = (1e-6 * (np.exp((y[i] - y[i + 1]) / voltage) - 1.0) for i in (1, 4))
+    of_supply = supply / 9000.0
+    return [
+        (y[0] - 0.1 * np.sin(200.0 * np.pi * t)) / 1000.0,
+        y[1] / 4500.0 - of_supply + (1.0 - gain) * first,
+        y[2] / 9000.0 - first,
+        y[3] / 9000.0 - of_supply + gain * first,
+        y[4] / 4500.0 - of_supply + (1.0 - gain) * second,
+        y[5] / 9000.0 - second,
+        y[6] / 9000.0 - of_supply + gain * second,
+        y[7] / 9000.0,
+    ]
+
+
+AMPLIFIER_START = [0.0, 3.0, 3.0, 6.0, 3.0, 3.0, 6.0, 0.0]
+#: At t = 0.2, by the Test Set.
+AMPLIFIER_END = [
+    -0.55621450122627e-2, 0.30065224719030e1, 0.28499587886081e1, 0.29264225362062e1,
+    0.27046178650105e1, 0.27618377783931e1, 0.47709276316167e1, 0.12369958680915e1,
+]  # fmt: skip
+
+
+# The solutions.
+
+
+@pytest.mark.parametrize("method", ABLE)
+def test_robertsons_reaction_with_its_sum_as_an_equation(method: str) -> None:
+    tolerance = (1e-5, 1e-11) if method == "rosenbrock23" else (1e-7, 1e-13)
+    run = sw.integrate(robertson, method, y=[1.0, 0.0, 0.0], tolerance=tolerance, at=list(ROBERTSON))
+    assert np.abs(run.y / list(ROBERTSON.values()) - 1.0).max() < (3e-4 if method == "rosenbrock23" else 2e-6)
+    assert np.abs(run.y.sum(axis=1) - 1.0).max() < 1e-14
+
+
+@pytest.mark.parametrize(("method", "error"), [("rodas4", 5e-7), ("rodas5p", 1e-7)])
+def test_an_amplifier_whose_matrix_is_not_diagonal(method: str, error: float) -> None:
+    assert amplifier.mass is not None
+    assert amplifier.mass.algebraic == [1, 4, 7]
+    run = sw.integrate(amplifier, method, y=AMPLIFIER_START, tolerance=(1e-5, 1e-7), at=[0.2])
+    assert np.abs(run.y[-1] - AMPLIFIER_END).max() < error
+
+
+#: The orders of the state and of the pull of the rod by steps of fixed length, and the two numbers of steps.
+ORDERS = {
+    "backward_euler": (1, 1), "linearly_implicit_euler": (1, 1), "implicit_midpoint": (2, 2), "trapezoidal": (2, 2),
+    "rosenbrock23": (2, 2), "rodas4": (4, 4), "rodas5p": (5, 5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_orders_of_the_state_and_of_what_algebraic_equations_determine(method: str) -> None:
+    """A rod pendulum of index 1 from 60° off, against its angle by a method of order 8."""
+    start = [math.sin(1.0), -math.cos(1.0), 0.0, 0.0, 0.0]
+    start = sw.consistent_start(pendulum(), start)
+    true = sw.integrate(sw.Pendulum(omega=math.sqrt(9.81)), "dop853", v=0.0, y=1.0, tolerance=1e-13, at=[1.0])
+    angle, rate = float(true.y[-1]), float(true.v[-1])
+    place, pull = np.array([math.sin(angle), -math.cos(angle)]), rate**2 + 9.81 * math.cos(angle)
+    errors = []
+    counts = {4: (320, 640), 5: (40, 80)}.get(ORDERS[method][0], (160, 320))
+    for steps in counts:
+        end = sw.integrate(pendulum, method, y=start, dt=1.0 / steps, steps=steps).y[-1]
+        errors.append((np.abs(end[:2] - place).max(), abs(end[4] - pull)))
+    found = np.log2(np.array(errors[0]) / np.array(errors[1]))
+    assert found == pytest.approx(ORDERS[method], abs=0.35)
+
+
+@pytest.mark.parametrize("method", [*EXPLICIT, *IMPLICIT])
+def test_a_matrix_with_an_inverse_goes_with_every_method(method: str) -> None:
+    """The rates are M⁻¹·f, to rounding those of a function that has multiplied already."""
+    M = np.array([[2.0, 1.0, 0.0], [1.0, 3.0, 1.0], [0.0, 1.0, 2.0]])
+    A = np.array([[-1.0, 0.0, 1.0], [0.0, -2.0, 0.5], [1.0, 0.0, -3.0]])
+    inverse = np.linalg.inv(M)
+
+    @sw.system(order=1, mass=M)
+    def joined(t: Any, y: Any) -> Any:
+        return A @ y + np.sin(t)
+
+    @sw.system(order=1)
+    def multiplied(t: Any, y: Any) -> Any:
+        return inverse @ (A @ y + np.sin(t))
+
+    ends = [sw.integrate(each, method, y=[1.0, 2.0, 3.0], dt=0.01, steps=50).y[-1] for each in (joined, multiplied)]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-12)
+    matrices = [sw.jacobian(each(), y=[1.0, 2.0, 3.0]).matrix for each in (joined, multiplied)]
+    assert matrices[0] == pytest.approx(matrices[1], rel=1e-12, abs=1e-14)
+
+
+def test_the_matrix_of_units_changes_no_bit() -> None:
+    def rates(t: Any, y: Any) -> Any:
+        return [y[1] - 2.0 * y[0], y[2] * y[0], -(y[1] ** 2)]
+
+    for method in ("rk4", "rodas4"):
+        systems = (sw.system(order=1)(rates), sw.system(order=1, mass=np.eye(3))(rates))
+        runs = [sw.integrate(each, method, y=[1.0, 0.5, 0.2], dt=1e-2, steps=20) for each in systems]
+        assert np.array_equal(runs[0].y, runs[1].y)
+
+
+# The same bits everywhere.
+
+
+@pytest.mark.parametrize("system", [robertson(), amplifier(), pendulum()], ids=lambda system: system.definition.name)
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_the_core_has_the_graph_of_the_reference(system: Any, method: str) -> None:
+    known, chosen = system.for_state_shapes(), sw.method(method)
+    tape = _core.Tape()
+    assert_one_graph(tape, tape.trace(model(known, chosen), "step"), Tracer(known, tape).step(chosen))
+
+
+@pytest.mark.parametrize("options", [{}, {"fused": True}, {"dtype": "float32"}], ids=str)
+@pytest.mark.parametrize("method", ["trapezoidal", "rodas4"])
+def test_bits_of_members(method: str, options: dict[str, Any]) -> None:
+    y = np.array([[1.0, 0.9, 0.8], [0.0, 0.0, 0.0], [0.0, 0.1, 0.2]])
+    runs = [sw.integrate(robertson, method, y=y, dt=1e-3, steps=8, backend=backend, **options) for backend in ("rust", "numpy")]
+    assert np.array_equal(runs[0].y, runs[1].y)
+    alone = sw.integrate(robertson, method, y=y[:, 1], dt=1e-3, steps=8, **options)
+    assert np.array_equal(runs[0].y[..., 1], alone.y)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_bits_of_adaptive_steps(sign: float) -> None:
+    options: dict[str, Any] = {"y": sw.consistent_start(pendulum(), [0.6, -0.8, 0.0, 0.0, 0.0]), "tolerance": 1e-5}
+    runs = [sw.integrate(pendulum, "rodas5p", at=[sign * 0.3], backend=each, **options) for each in ("rust", "numpy")]
+    assert np.array_equal(runs[0].y, runs[1].y)
+    assert np.array_equal(runs[0].paces.accepted, runs[1].paces.accepted)
+
+
+def test_world_resume_and_saved_runs(tmp_path: Any) -> None:
+    start = [1.0, 0.0, 0.0]
+    y = np.array(start)
+    sw.World(robertson, "rodas4", y=y, dt=1e-3).step(20)
+    assert np.array_equal(y, sw.integrate(robertson, "rodas4", y=start, dt=1e-3, steps=20).y[-1])
+    options: dict[str, Any] = {"y": start, "tolerance": (1e-6, 1e-10)}
+    whole = sw.integrate(robertson, "rodas4", at=[1.0, 2.0], **options)
+    part = sw.integrate(robertson, "rodas4", at=[1.0], **options)
+    part.save(tmp_path / "part.npz")
+    for before in (part, sw.load(tmp_path / "part.npz", system=robertson())):
+        assert np.array_equal(sw.integrate(robertson, "rodas4", resume=before, at=[2.0]).y[-1], whole.y[-1])
+
+
+def test_a_run_of_another_matrix_is_not_gone_on_with(tmp_path: Any) -> None:
+    @sw.system(order=1, mass=np.diag([2.0, 1.0, 0.0]))
+    def other(t: Any, y: Any) -> Any:
+        return robertson.function(t, y)
+
+    assert robertson().digest != other().digest
+    sw.integrate(robertson, "rodas4", y=[1.0, 0.0, 0.0], tolerance=1e-4, at=[1.0]).save(tmp_path / "run.npz")
+    with pytest.raises(sw.errors.ArgumentError, match="system: other makes other operations"):
+        sw.load(tmp_path / "run.npz", system=other())
+
+
+# Events.
+
+
+@sw.system(order=1, mass=np.diag([1.0, 1.0, 0.0]))
+def shadow(t: Any, s: Any) -> Any:
+    """A swing, and a number that depends on it and on the time: z = x·sin t."""
+    x, u, z = s
+    return [u, -x, z - x * np.sin(t)]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_events_of_numbers_that_algebraic_equations_determine(sign: float) -> None:
+    """z = sin(2t)/2 has its maximum at ±π/4 + kπ, and is above 0.4999 for 0.02 around, much less than a step."""
+    event = sw.Event(lambda t, y: y[2] - 0.4999, name="high")
+    run = sw.integrate(shadow, "rodas5p", y=[1.0, 0.0, 0.0], tolerance=(1e-8, 1e-10), at=[sign * 10.0], events=[event])
+    half = 0.5 * math.acos(0.9998)
+    tops = (np.arange(3) + (0.25 if sign > 0 else 0.75)) * math.pi
+    expected = np.concatenate([[top - half, top + half] for top in tops])
+    assert np.abs(run.events["high"].t - sign * expected).max() < 2e-6
+
+
+def test_rates_of_what_algebraic_equations_determine() -> None:
+    t, x, u = 2.0, 0.3, 0.4
+    y = np.array([x, u, x * math.sin(t)])
+    rates = consistency.rates(shadow().for_state_shapes(0.0, y), y, t, 0.1)
+    assert rates == pytest.approx([u, -x, u * math.sin(t) + x * math.cos(t)], abs=1e-8)
+
+
+# Where a run starts.
+
+
+def test_a_start_is_made_consistent() -> None:
+    """What has a rate keeps its value."""
+    assert sw.consistent_start(robertson(), [0.5, 0.0, 9.0]).tolist() == [0.5, 0.0, 0.5]
+    start = sw.consistent_start(pendulum(g=[9.81, 1.62]), [0.6, -0.8, 0.3, 0.4, 0.0])
+    assert start.shape == (5, 2)
+    assert start[4] == pytest.approx(0.25 + 0.8 * np.array([9.81, 1.62]), rel=1e-14)
+    start = sw.consistent_start(amplifier(), AMPLIFIER_START, t0=0.0)
+    changed = start - AMPLIFIER_START
+    assert JOINED @ changed == pytest.approx(np.zeros(8), abs=1e-18)
+    # The equations are combinations of rows that add up to zero by M.
+    rates = np.array(amplifier.function(0.0, start))
+    assert np.abs(rates[[0, 3, 6]] + rates[[1, 4, 7]]).max() < 1e-15
+    with pytest.raises(sw.errors.UnsupportedError, match="expected one with algebraic equations"):
+        sw.consistent_start(sw.Oscillator(), 1.0)
+
+    @sw.system(order=1, mass=np.diag([1.0, 0.0]))
+    def never(t: Any, y: Any) -> Any:
+        return [-y[0], 1.0 + y[1] ** 2]
+
+    with pytest.raises(sw.errors.ArgumentError, match="no state at which"):
+        sw.consistent_start(never(), [1.0, 0.7])
+
+
+def test_an_inconsistent_start_is_refused_before_work() -> None:
+    y = np.array([[1.0, 0.5], [0.0, 0.0], [0.0, 0.5]])
+    y[2, 1] += 1e-3
+    for options in ({"dt": 1e-3, "steps": 2}, {"tolerance": 1e-4, "at": [1.0]}):
+        with pytest.raises(sw.errors.ArgumentError, match=r"y\[2\] \(of member \(1,\)\) would be about 0.5, got 0.501; take"):
+            sw.integrate(robertson, "rodas4", y=y, **options)
+    with pytest.raises(sw.errors.ArgumentError, match=r"algebraic equations hold"):
+        sw.World(robertson, "rodas4", y=np.array([1.0, 0.0, 0.5]), dt=1e-3)
+    sw.integrate(robertson, "rodas4", y=y, tolerance=1e-2, at=[1.0])  # within what is tolerated
+
+
+@pytest.mark.parametrize("relation", [lambda x, y, u, v: x * x + y * y - 1.0, lambda x, y, u, v: x * u + y * v])
+def test_an_index_above_one_is_refused(relation: Any) -> None:
+    """The length of a rod, or the velocity along it, does not determine its pull."""
+
+    @sw.system(order=1, mass=np.diag([1.0, 1.0, 1.0, 1.0, 0.0]))
+    def rod(t: Any, s: Any) -> Any:
+        x, y, u, v, pull = s
+        return [u, v, -pull * x, -pull * y - 9.81, relation(x, y, u, v)]
+
+    with pytest.raises(sw.errors.UnsupportedError, match="their index is above 1"):
+        sw.integrate(rod, "rodas4", y=[1.0, 0.0, 0.0, 0.0, 0.0], dt=1e-3, steps=1)
+
+
+# What is refused.
+
+
+@pytest.mark.parametrize("method", EXPLICIT)
+def test_explicit_methods_need_all_rates(method: str) -> None:
+    with pytest.raises(sw.errors.UnsupportedError, match="needs the rate of every number"):
+        sw.integrate(robertson, method, y=[1.0, 0.0, 0.0], dt=1e-3, steps=1)
+
+
+def test_what_needs_rates_says_so() -> None:
+    for ask in (
+        lambda: sw.jacobian(robertson(), y=[1.0, 0.0, 0.0]),
+        lambda: sw.stability_limit(robertson(), "rodas4", y=[1.0, 0.0, 0.0]),
+        lambda: sw.equilibria(robertson(), near=(None, [1.0, 0.0, 0.0])),
+    ):
+        with pytest.raises(sw.errors.UnsupportedError, match="give no rate"):
+            ask()
+
+    @sw.system(order=1, mass=np.diag([1.0, 0.0]))
+    def kept(t: Any, y: Any) -> Any:
+        return [y[1], y[1]]
+
+    @kept.invariant
+    def energy(y: Any) -> Any:
+        return y[0]
+
+    with pytest.raises(sw.errors.UnsupportedError, match=r"control: .* algebraic equations"):
+        sw.integrate(kept, "rodas4", y=[1.0, 0.0], dt=0.1, steps=1, control=sw.Projection("energy"))
+
+
+def test_wrong_matrices() -> None:
+    for value, error, words in (
+        (np.zeros((2, 3)), sw.errors.ShapeError, r"mass: expected a square matrix.* got shape \(2, 3\)"),
+        (np.zeros(3), sw.errors.ShapeError, r"mass: expected a square matrix.* got shape \(3,\)"),
+        (np.zeros((2, 2)), sw.errors.ArgumentError, "mass: expected an entry that is not zero"),
+        ([[np.nan]], sw.errors.ArgumentError, "mass"),
+        ("M", sw.errors.DTypeError, "mass: expected real numbers"),
+    ):
+        with pytest.raises(error, match=words):
+            sw.system(order=1, mass=value)
+    with pytest.raises(sw.errors.ArgumentError, match="mass: expected order=1"):
+        sw.system(mass=np.eye(2))
+    with pytest.raises(sw.errors.ShapeError, match="mass: expected 3 rows and columns, one for each number of the state, got 2"):
+        sw.system(order=1, mass=np.eye(2), shape=(3,))
+    with pytest.raises(sw.errors.ShapeError, match=r"declared shape \(3,\)"):
+        sw.integrate(robertson, "rodas4", y=[1.0, 0.0], dt=0.1, steps=1)
+
+
+# The form to which a matrix is brought.
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_rows_are_combinations_of_those_of_the_matrix(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n, rank = int(rng.integers(1, 8)), int(rng.integers(1, 8))
+    M = rng.normal(size=(n, rank)) @ rng.normal(size=(rank, n)) if seed % 2 else rng.integers(-2, 3, (n, n)).astype(float)
+    M *= 10.0 ** rng.integers(-9, 9, size=(n, 1))
+    if not M.any():
+        return
+    reduced = mass_matrix("mass", M)
+    L, rows = np.zeros((n, n)), np.zeros((n, n))
+    for matrix, of in ((L, reduced.combinations), (rows, reduced.rows)):
+        for i, row in enumerate(of):
+            for column, entry in row:
+                matrix[i, column] = entry
+    scale = np.abs(M).max(axis=1)
+    assert pytest.approx(rows, abs=1e-9) == L @ M
+    assert n - len(reduced.algebraic) == np.linalg.matrix_rank(M / np.where(scale > 0.0, scale, 1.0)[:, np.newaxis], tol=1e-9)
+    assert np.linalg.matrix_rank(L * np.where(scale > 0.0, scale, 1.0), tol=1e-12) == n
+    determined = [i for i in range(n) if i not in reduced.algebraic]
+    assert np.array_equal(rows[np.ix_(determined, determined)], np.eye(len(determined)))

@@ -1,0 +1,421 @@
+"""Implicit methods: the equations they solve, their orders and stability, and the problems on which explicit methods fail."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.model.systems import LinearSystem
+from stepwell.reference import pivoting
+from stepwell.reference.rosenbrock import Rosenbrock
+from stepwell.scenes import stiff_equations
+from support import stiff_problems as stiff
+
+IMPLICIT = [m.name for m in sw.methods() if m.is_implicit]
+ABLE = [name for name in IMPLICIT if sw.method(name).error_order is not None]
+LINEAR_OR_NOT = {"linearly_implicit_euler": 1, "backward_euler": 1, "implicit_midpoint": 2, "trapezoidal": 2}
+
+
+def test_the_methods_that_are_implicit() -> None:
+    assert sorted(IMPLICIT) == sorted([*LINEAR_OR_NOT, "rosenbrock23", "rodas4", "rodas5p"])
+    assert ABLE == ["rosenbrock23", "rodas4", "rodas5p"]
+    assert not any(sw.method(name).is_implicit for name in ("rk4", "taylor", "verlet"))
+
+
+# The linear equations.
+
+
+def residual(matrix: Any, x: Any, right: Any) -> float:
+    """|M·x − r| over |M|·|x| + |r|, computed exactly: the backward error of a solution, by rows."""
+    worst = Fraction(0)
+    for row, r in zip(matrix, right, strict=True):
+        terms = [Fraction(float(a)) * Fraction(float(b)) for a, b in zip(row, x, strict=True)]
+        size = sum(map(abs, terms)) + abs(Fraction(float(r)))
+        worst = max(worst, abs(sum(terms) - Fraction(float(r))) / size if size else Fraction(0))
+    return float(worst)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
+def test_elimination_has_the_backward_error_of_partial_pivoting(n: int) -> None:
+    """With factors of at most 1 the backward error is some n·eps times the growth of the entries, which is small in practice."""
+    rng = np.random.default_rng(n)
+    for _ in range(40):
+        matrix = rng.normal(size=(n, n)) * 10.0 ** rng.uniform(-8, 8, (n, 1))
+        matrix[rng.random((n, n)) < 0.3] = 0.0
+        np.fill_diagonal(matrix, np.where(rng.random(n) < 0.5, 0.0, np.diag(matrix)) if n > 1 else 1.0)
+        if n > 1 and np.linalg.cond(matrix / np.abs(matrix).max(axis=1, keepdims=True, initial=1e-300)) > 1e8:
+            continue
+        right = rng.normal(size=n)
+        entries = [[None if x == 0.0 else x for x in row] for row in matrix.tolist()]
+        x = pivoting.solved(pivoting.factored(entries), right.tolist())
+        scaled = np.linalg.norm(matrix @ np.array(x, float) - right)
+        assert scaled <= 64 * n * np.finfo(float).eps * np.abs(matrix).max() * np.abs(np.array(x, float)).sum() + 1e-13
+
+
+def test_without_pivoting_the_small_pivot_would_decide() -> None:
+    x = pivoting.solved(pivoting.factored([[1e-20, 1.0], [1.0, 1.0]]), [1.0, 2.0])
+    assert np.array(x, float) == pytest.approx([1.0, 1.0], rel=1e-15)
+    assert pivoting.solved(pivoting.factored([[None, 2.0], [4.0, None]]), [6.0, 8.0]) == [2.0, 3.0]
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_steps_of_random_stiff_linear_systems_are_those_of_the_stability_function(method: str) -> None:
+    """A step is R(h·A)·s, for A from −1e8 to 0 and far from normal. The truth is computed in fractions."""
+    rng, R = np.random.default_rng(7), sw.stability.function(method)
+    for _ in range(15):
+        n = int(rng.integers(2, 5))
+        A = stiff.random_stiff(rng, n)
+        h, s = 10.0 ** rng.uniform(-6, 1), rng.normal(size=n)
+        system = LinearSystem(A, velocities=0)
+        stepped = sw.integrate(system, method, y=s, dt=h, steps=1).y[-1]
+        assert np.array_equal(stepped, sw.integrate(system, method, y=s, dt=h, steps=1, backend="numpy").y[-1])
+        true = stiff.rational_of(R, h, A, s)
+        gamma = getattr(sw.method(method).steps, "METHOD", None)
+        condition = np.linalg.cond(np.eye(n) - (gamma.gamma if gamma else 1.0) * h * A)
+        assert np.linalg.norm(stepped - true) <= 1e-13 * condition * (np.linalg.norm(true) + np.linalg.norm(s))
+
+
+@pytest.mark.parametrize("method", ABLE)
+def test_runs_of_random_stiff_linear_systems(method: str) -> None:
+    """Against the exponential of the matrix in a hundred digits."""
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        n = int(rng.integers(2, 6))
+        A, s = stiff.random_stiff(rng, n), rng.normal(size=n)
+        run = sw.integrate(LinearSystem(A, velocities=0), method, y=s, tolerance=(1e-7, 1e-9), at=[0.01, 1.0])
+        for t, y in zip(run.t, run.y, strict=True):
+            true = stiff.exponential(A, float(t)) @ s
+            assert np.linalg.norm(y - true) <= 3e-5 * (np.linalg.norm(s) + np.linalg.norm(true)), (A, t)
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_the_matrix_form_lacks_the_derivatives_of_inputs(method: str) -> None:
+    """Rosenbrock methods take them; the form has values of inputs only, so what it would make is refused."""
+    ramp = sw.Sampled([1.0, 2.0, 3.0, 2.5], 0.4, interpolation="linear")
+    for x in (sw.Sinusoid(0.3, 2.0, 0.1), ramp, sw.Sampled([1.0, 2.0, 3.0], 0.4)):
+        system, options = sw.Oscillator(1.0, x=x), {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 10}
+        if sw.method(method).takes_derivatives_by_time and (isinstance(x, sw.Sinusoid) or x is ramp):
+            with pytest.raises(sw.errors.UnsupportedError, match="takes the derivatives of inputs too"):
+                sw.integrate(system, method, form="matrix", **options)
+            continue
+        ends = [sw.integrate(system, method, form=form, **options).y[-1] for form in ("direct", "matrix")]
+        assert ends[0] == pytest.approx(ends[1], abs=1e-13)
+
+
+def test_a_singular_factor_stops_its_member_alone() -> None:
+    """1 − h·λ = 0 by backward Euler at λ = 1/h: no solution, so the member diverges in that step, and its neighbours do not."""
+    system = LinearSystem(np.array([[[-1.0, 2.0, 0.5]]]), velocities=0)
+    with pytest.warns(sw.DivergenceWarning, match="1 of 3"):
+        run = sw.integrate(system, "linearly_implicit_euler", y=np.ones((1, 3)), dt=0.5, steps=4)
+    assert [status == 0 for status in run.status] == [True, False, True]
+    alone = [
+        sw.integrate(LinearSystem([[x]], velocities=0), "linearly_implicit_euler", y=[1.0], dt=0.5, steps=4) for x in (-1.0, 0.5)
+    ]
+    assert run.y[-1, 0, [0, 2]].tolist() == [each.y[-1, 0] for each in alone]
+
+
+# Stability.
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_the_stability_function(method: str) -> None:
+    R = sw.stability.function(method)
+    assert R.a_stable
+    assert R.l_stable == (method not in ("implicit_midpoint", "trapezoidal"))
+    z = np.array([-1e-3, -1.0, -50.0])
+    P = sw.analyse(LinearSystem([[-1.0]], velocities=0), method, dt=-z).P[0, 0]
+    assert R(z) == pytest.approx(P, rel=1e-12, abs=1e-14)
+    order = sw.method(method).order
+    h = 2.0**-3
+    leading = [abs(R(-x) - math.exp(-x)) for x in (h, h / 2)]
+    assert math.log2(leading[0] / leading[1]) == pytest.approx(order + 1, abs=0.45 if order < 5 else 1.2)
+
+
+def test_closed_forms_of_the_undamped_oscillator() -> None:
+    phi = np.array([0.1, 1.0, 10.0, 1e4])
+    radius = {m: sw.analyse(sw.Oscillator(), m, dt=phi).radius for m in IMPLICIT}
+    for euler in ("backward_euler", "linearly_implicit_euler"):
+        assert radius[euler] == pytest.approx(1 / np.sqrt(1 + phi**2), rel=1e-14)
+    for kept in ("implicit_midpoint", "trapezoidal"):
+        assert radius[kept] == pytest.approx(np.ones(4), rel=1e-14)
+    assert all((radius[m] < 1.0).all() for m in ("rosenbrock23", "rodas4", "rodas5p"))
+    assert all(radius[m][-1] < 2e-3 for m in ABLE)
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_every_step_is_stable(method: str) -> None:
+    for system in (sw.Oscillator(3.0), sw.Oscillator(3.0, 0.2), sw.Chain(5), LinearSystem(np.diag([-1.0, -1e9]), velocities=0)):
+        assert sw.stability_limit(system, method) == math.inf
+    assert sw.stability_limit(LinearSystem([[1.0]], velocities=0), method) == 0.0  # the exact solution grows
+    assert sw.method(method).limit == math.inf
+
+
+def test_methods_that_are_not_a_stable_are_known() -> None:
+    assert not any(sw.stability.function(m).a_stable for m in ("standard_euler", "rk4", "dop853", "taylor"))
+    with pytest.raises(sw.errors.UnsupportedError, match="false_euler treats velocities and coordinates differently"):
+        sw.stability.function("false_euler")
+    assert repr(sw.stability.function("backward_euler")) == "<R(z) = 1/(1 − z), L-stable>"
+    assert repr(sw.stability.function("trapezoidal")) == "<R(z) = (1 + z/2)/(1 − z/2), A-stable>"
+
+
+# Order conditions, of the coefficients as they are, in fractions.
+
+Tree = tuple[Any, ...]
+
+
+@cache
+def trees(vertices: int) -> tuple[Tree, ...]:
+    """All rooted trees with that many vertices; a tree is the sorted tuple of those that hang from its root."""
+
+    def forests(left: int, largest: tuple[int, Tree] | None) -> Iterator[tuple[Tree, ...]]:
+        if not left:
+            yield ()
+        for size in range(left, 0, -1):
+            for tree in trees(size):
+                if largest is None or (size, tree) <= largest:
+                    yield from ((tree, *rest) for rest in forests(left - size, (size, tree)))
+
+    return ((),) if vertices == 1 else tuple({tuple(sorted(forest)) for forest in forests(vertices - 1, None)})
+
+
+def vertices(tree: Tree) -> int:
+    return 1 + sum(map(vertices, tree))
+
+
+def density(tree: Tree) -> int:
+    return vertices(tree) * math.prod(map(density, tree))
+
+
+class Conditions:
+    """A Rosenbrock method by its αᵢⱼ and γᵢⱼ, from the transformed coefficients (Hairer and Wanner II, IV.7)."""
+
+    def __init__(self, method: Rosenbrock) -> None:
+        n = len(method.nodes)
+        a, c = (
+            [[Fraction(x) for x in (*row, *[0] * (n - len(row)))] for row in rows] for rows in (method.rows, method.of_solutions)
+        )
+        gamma = Fraction(method.gamma)
+        # Γ⁻¹ = I/γ − C is lower triangular.
+        self.gammas = [[Fraction(0)] * n for _ in range(n)]
+        for j in range(n):
+            for i in range(j, n):
+                right = Fraction(int(i == j)) + sum((c[i][k] * self.gammas[k][j] for k in range(j, i)), Fraction(0))
+                self.gammas[i][j] = right * gamma
+        self.alphas = [[sum((a[i][k] * self.gammas[k][j] for k in range(n)), Fraction(0)) for j in range(n)] for i in range(n)]
+        self.n = n
+
+    def weights(self, of_solutions: Any) -> list[Fraction]:
+        return [
+            sum((Fraction(m) * row[j] for m, row in zip(of_solutions, self.gammas, strict=True)), Fraction(0))
+            for j in range(self.n)
+        ]
+
+    def stages(self, tree: Tree) -> list[Fraction]:
+        """Σ over all stages for a tree: from a vertex with one branch goes α + γ, from others α (B-series of exact Jacobians)."""
+        if not tree:
+            return [Fraction(1)] * self.n
+        branches = [self.stages(branch) for branch in tree]
+        both = len(tree) == 1
+        factor = [[self.alphas[i][j] + (self.gammas[i][j] if both else 0) for j in range(self.n)] for i in range(self.n)]
+        sums = [[sum((f * b for f, b in zip(row, branch, strict=True)), Fraction(0)) for row in factor] for branch in branches]
+        return [math.prod(each, start=Fraction(1)) for each in zip(*sums, strict=True)]
+
+    def worst(self, of_solutions: Any, order: int) -> float:
+        """The largest residual of all order conditions up to this order."""
+        weights = self.weights(of_solutions)
+        return max(
+            float(
+                abs(
+                    sum((w * s for w, s in zip(weights, self.stages(tree), strict=True)), Fraction(0))
+                    - Fraction(1, density(tree))
+                )
+            )
+            for p in range(1, order + 1)
+            for tree in trees(p)
+        )
+
+
+@pytest.mark.parametrize(("name", "embedded"), [("rosenbrock23", 3), ("rodas4", 3), ("rodas5p", 4)])
+def test_order_conditions(name: str, embedded: int) -> None:
+    """All trees up to the order, and the sums of rows that make a step right for ∂f/∂t; to the roundings of the coefficients."""
+    assert [len(trees(p)) for p in range(1, 6)] == [1, 1, 2, 4, 9]
+    steps: Any = sw.method(name).steps
+    method, conditions = steps.METHOD, Conditions(steps.METHOD)
+    order = sw.method(name).order
+    assert conditions.worst(steps.WEIGHTS, order) < 4e-14
+    other = [w + e if name == "rosenbrock23" else w - e for w, e in zip(steps.WEIGHTS, steps.ERROR, strict=True)]
+    assert conditions.worst(other, embedded) < 4e-14
+    assert conditions.worst(steps.WEIGHTS, order + 1) > 1e-5
+    assert conditions.worst(other, embedded + 1) > 1e-5
+    for rows, printed in ((conditions.alphas, method.nodes), (conditions.gammas, method.by_time)):
+        assert [float(sum(row)) for row in rows] == pytest.approx(printed, abs=2e-14)
+
+
+# Orders as they are measured.
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_the_order_on_a_forced_and_on_a_nonlinear_problem(method: str) -> None:
+    order = sw.method(method).order
+    for system, start in stiff.SMOOTH:
+        true = np.concatenate([np.ravel(x) for x in stiff.end(system, "dop853", start, tolerance=1e-14, at=[1.0])])
+        steps = (32, 64) if order == 4 else (16, 32) if order == 5 else (128, 256)
+        errors = [
+            np.linalg.norm(np.concatenate([np.ravel(x) for x in stiff.end(system, method, start, dt=1 / n, steps=n)]) - true)
+            for n in steps
+        ]
+        assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.4), (system, errors)
+
+
+@pytest.mark.parametrize(
+    ("method", "order"),
+    [("backward_euler", 1), ("linearly_implicit_euler", 1), ("implicit_midpoint", 2), ("trapezoidal", 2), ("rosenbrock23", 2),
+     ("rodas4", 1), ("rodas5p", 3)],
+)  # fmt: skip
+def test_order_reduction(method: str, order: int) -> None:
+    """Prothero and Robinson's problem, ẏ = λ(y − φ) + φ̇ at λ = −1e6: the order that is left where h·λ is large.
+
+    Rodas4 falls to 1, as methods of its kind do; Rodas5P was made to keep 3.
+    """
+    errors = [
+        abs(sw.integrate(stiff.prothero_robinson, method, y=math.sin(0.5), dt=1 / n, steps=n).y[-1] - math.sin(1.5))
+        for n in (20, 40)
+    ]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
+    if method == "rodas5p":
+        assert errors[1] < 1e-12
+
+
+@pytest.mark.parametrize("method", ["backward_euler", "implicit_midpoint", "trapezoidal"])
+def test_newton_converges_in_its_passes(method: str) -> None:
+    """The residual of the implicit equation after three passes, against that of one, for a nonlinear oscillator."""
+    pendulum, h = sw.Pendulum(), 0.1
+    run = sw.integrate(pendulum, method, v=0.7, y=1.0, dt=h, steps=1)
+    v, y = run.v[-1], run.y[-1]
+    share = {"backward_euler": (0.0, 1.0), "trapezoidal": (0.5, 0.5)}.get(method)
+    if share:
+        rates = [share[0] * a + share[1] * b for a, b in ((-math.sin(1.0), -math.sin(y)), (0.7, v))]
+    else:
+        rates = [-math.sin(0.5 * (1.0 + y)), 0.5 * (0.7 + v)]
+    assert np.hypot(v - 0.7 - h * rates[0], y - 1.0 - h * rates[1]) < 2e-8
+
+
+# Stiff problems.
+
+
+@pytest.mark.parametrize("name", stiff.PROBLEMS)
+@pytest.mark.parametrize("method", ABLE)
+def test_reference_values(name: str, method: str) -> None:
+    """The error at the reference times follows the tolerance, on every problem; equal bits by the reference."""
+    problem = stiff.PROBLEMS[name]
+    times, values = list(problem.values), np.array(list(problem.values.values()))
+    tight = 1e-8 if method == "rosenbrock23" else 1e-10
+    for tolerance in (1e-5, tight):
+        options: dict[str, Any] = {"y": problem.start, "tolerance": (tolerance, tolerance * problem.least), "at": times}
+        run = sw.integrate(problem.system, method, **options)
+        error = np.abs(run.y / values - 1.0).max()
+        # Of the error of a step, of third order, follows the tolerance; Rosenbrock 2(3) makes one of second order in all.
+        share = tolerance ** (2 / 3 if method == "rosenbrock23" else 1.0)
+        assert error < problem.allowed * share, (tolerance, error)
+        if tolerance == 1e-5 and not problem.long:
+            other = sw.integrate(problem.system, method, backend="numpy", **options)
+            assert np.array_equal(run.y, other.y)
+    assert run.paces is not None
+
+
+def test_second_order_systems_solve_for_velocities_alone() -> None:
+    """Van der Pol's equation in two blocks has the values of its form of first order; its step has fewer operations."""
+    second = sw.integrate(stiff_equations.van_der_pol, "rodas5p", v=0.0, y=2.0, tolerance=(1e-10, 1e-13), at=[2000.0])
+    assert second.y[-1] == pytest.approx(1.706167732170469, rel=1e-7)
+    assert second.v[-1] == pytest.approx(-8.928097010248125e-4, rel=1e-6)
+    first = sw.integrate(stiff.van_der_pol_1, "rodas5p", y=[2.0, 0.0], tolerance=(1e-10, 1e-13), at=[2000.0])
+    assert first.y[-1, 0] == pytest.approx(1.706167732170469, rel=1e-7)
+    count = [sum(sw.stability.operations("rodas4", run.system)[:2]) for run in (second, first)]
+    assert count[0] < count[1]
+
+
+@pytest.mark.parametrize("method", ABLE)
+def test_batches_have_steps_of_their_own(method: str) -> None:
+    mu = np.array([1.0, 30.0, 1000.0])
+    run = sw.integrate(
+        stiff.van_der_pol_1(mu=mu), method, y=np.array([2.0, 0.0])[:, np.newaxis] * np.ones(3), tolerance=1e-6, at=[5.0]
+    )
+    for k, each in enumerate(mu.tolist()):
+        alone = sw.integrate(stiff.van_der_pol_1(mu=each), method, y=[2.0, 0.0], tolerance=1e-6, at=[5.0])
+        assert np.array_equal(run.y[..., k], alone.y)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("fused", [False, True])
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_every_form_has_the_bits_of_the_reference(method: str, fused: bool, dtype: str) -> None:
+    for problem in (stiff.PROBLEMS["rober"], stiff.PROBLEMS["hires"]):
+        ways: list[dict[str, Any]] = [{"dt": 1e-3, "steps": 20}]
+        if method in ABLE:
+            ways.append({"tolerance": 1e-3, "at": [0.05]})
+        for way in ways:
+            runs = [
+                sw.integrate(problem.system, method, y=problem.start, dtype=dtype, fused=fused, backend=b, **way)
+                for b in ("rust", "numpy")
+            ]
+            assert np.array_equal(runs[0].y, runs[1].y)
+
+
+def test_events_worlds_and_going_on() -> None:
+    """A stiff run meets events, goes on to the bit, and steps in place."""
+    problem = stiff.PROBLEMS["rober"]
+
+    def a_tenth(t: Any, y: Any) -> Any:
+        return y[2] - 0.1
+
+    run = sw.integrate(problem.system, "rodas4", y=problem.start, tolerance=(1e-8, 1e-12), at=[40.0], events=a_tenth)
+    (time,) = run.events["a_tenth"].t
+    at = sw.integrate(problem.system, "rodas4", y=problem.start, tolerance=(1e-8, 1e-12), at=[float(time)])
+    assert at.y[-1, 2] == pytest.approx(0.1, abs=1e-9)
+    parts = sw.integrate(problem.system, "rodas4", y=problem.start, tolerance=(1e-8, 1e-12), at=[10.0])
+    parts = sw.integrate(problem.system, "rodas4", resume=parts, at=[40.0])
+    whole = sw.integrate(problem.system, "rodas4", y=problem.start, tolerance=(1e-8, 1e-12), at=[10.0, 40.0])
+    assert np.array_equal(parts.y[-1], whole.y[-1])
+    y = np.array(problem.start)[:, np.newaxis] * np.ones(3)
+    world = sw.World(problem.system, "rosenbrock23", y=y, dt=1e-2)
+    world.step(50)
+    assert np.array_equal(y[:, 0], sw.integrate(problem.system, "rosenbrock23", y=problem.start, dt=1e-2, steps=50).y[-1])
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_a_system_that_is_too_large_is_refused_before_work(method: str) -> None:
+    """Bodies have a full matrix; that of a chain of masses has three diagonals."""
+    rng = np.random.default_rng(1)
+
+    def step(system: sw.System, *shape: int) -> sw.Run:
+        return sw.integrate(system, method, v=np.zeros(shape), y=rng.normal(size=shape), dt=0.1, steps=1)
+
+    for n in (200, 2000):
+        assert np.isfinite(step(sw.Chain(n), n).y).all()
+    assert np.isfinite(step(sw.NBody(np.ones(60)), 60, 2).y).all()
+    with pytest.raises(sw.errors.UnsupportedError, match=r"method: the equations .* 800 unknowns .* 500000; take an explicit"):
+        step(sw.NBody(np.ones(200)), 200, 2)
+    with pytest.raises(sw.errors.UnsupportedError, match=r"have 4098 unknowns .* may have 4096 and"):
+        step(sw.Chain(2049), 2049)
+
+
+def test_stiff_springs_at_sixty_frames_a_second() -> None:
+    """A hanging chain whose springs are a hundred times as stiff as leapfrog bears at 60 Hz."""
+    n, dt = 12, 1 / 60
+    limit = float(sw.stability_limit(sw.Chain(n, stiffness=1.0), "leapfrog"))
+    stiffness = 100.0 * (limit / dt) ** 2
+    chain = sw.Chain(n, stiffness=stiffness)
+    assert sw.stability_limit(chain, "leapfrog") == pytest.approx(dt / 10, rel=1e-9)
+    start = {"v": np.zeros(n), "y": 1e-3 * np.random.default_rng(1).normal(size=n)}
+    run = sw.integrate(chain, "linearly_implicit_euler", **start, dt=dt, steps=600, every=60)
+    energy = [float(chain.energy(v, y)) for v, y in zip(run.v, run.y, strict=True)]
+    assert all(later < 1e-10 * earlier for earlier, later in itertools.pairwise(energy[:6]))
+    kept = sw.integrate(chain, "implicit_midpoint", **start, dt=dt, steps=600)
+    assert float(chain.energy(kept.v[-1], kept.y[-1])) == pytest.approx(energy[0], rel=1e-8)
