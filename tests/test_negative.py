@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell.runs import negative
 from stepwell.scenes.stiff_equations import rober
 from support.advised import unmeasured  # noqa: F401
 from support.stiff import lorenz
@@ -111,3 +112,22 @@ def test_equations_that_depend_on_the_time_are_left_alone() -> None:
         warnings.simplefilter("error")
         run = sw.integrate(driven(), "merson", y=0.5, tolerance=1e-8, at=[1.5 * np.pi + 0.2])
     assert run.y[-1] < -0.1
+
+
+def test_members_are_looked_at_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which ones are told does not depend on how many are looked at together."""
+
+    @sw.system(order=1)
+    def species(t, y, *, a=0.8, b=1.3):  # type: ignore[no-untyped-def]
+        p, q, r = y
+        return [p * (1.0 - p - a * q - b * r), q * (1.0 - q - b * p - a * r), r * (1.0 - r - a * p - b * q)]
+
+    y = np.array([[0.5], [1.0], [2.0]]) * np.ones(7)
+    wholes = []
+    for at_once in (256, 2):
+        monkeypatch.setattr(negative, "AT_ONCE", at_once)
+        with pytest.warns(sw.AccuracyWarning, match="which no solution reaches"):
+            run = sw.integrate(species(b=np.linspace(1.3, 1.31, 7)), "rodas5p", y=y, tolerance=1e-2, at=[1500.0])
+        (finding,) = (each for each in run.findings if "no solution reaches" in each.message)
+        wholes.append(finding.members)
+    assert np.array_equal(*wholes)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, Whole
 from ..base.reprs import first_of, share
 from ..errors import AccuracyWarning
 from ..reference import adaptive
@@ -27,6 +27,8 @@ from .result import Run
 BEYOND, PART = 100.0, 0.01
 #: Rates are looked at in so many states, whose numbers are from the first to the second of these parts of the largest one.
 LOOKED_AT, LEAST_PART, MOST_PART = 64, 1e-4, 1e4
+#: Members are looked at so many at a time.
+AT_ONCE = 256
 
 
 def of_negative_amounts(run: Run, request: Request) -> Finding | None:
@@ -45,7 +47,10 @@ def of_negative_amounts(run: Run, request: Request) -> Finding | None:
     beyond = last < -_allowed(plan, end.pace)
     members = np.flatnonzero(beyond.any(axis=0) & (first >= 0.0).all(axis=0))
     ends = np.broadcast_to(run.t[-1], run.status.shape).reshape(-1)
-    members = members[[_stays_positive(plan, int(member), float(ends[member]), last[:, member]) for member in members]]
+    some = [members[i : i + AT_ONCE] for i in range(0, members.size, AT_ONCE)]
+    members = members[
+        np.concatenate([*(_stay_positive(plan, each, ends[each], last[:, each]) for each in some), np.empty(0, bool)])
+    ]
     if not members.size:
         return None
     one = int(members[0])
@@ -73,17 +78,17 @@ def _allowed(plan: engine.Plan, pace: Array) -> Array:
     return np.asarray(allowed).reshape(count, plan.members)[list(plan.acceptance.groups)]
 
 
-def _stays_positive(plan: engine.Plan, member: int, t: float, y: Array) -> bool:
-    """Whether no rate of a number that is 0 is negative in states of positive numbers, far smaller and far larger than these."""
-    n = len(y)
+def _stay_positive(plan: engine.Plan, members: Whole, t: Array, y: Array) -> Any:
+    """Of which members no rate of a number that is 0 is negative in states of positive numbers, far smaller and far larger."""
+    n, count = y.shape
     parts = LEAST_PART * (MOST_PART / LEAST_PART) ** np.random.default_rng(n).random((n, LOOKED_AT))
-    states = np.repeat(np.abs(y).max() * parts, n, axis=1)
+    states, looks = np.repeat(parts, n, axis=1), np.arange(n * LOOKED_AT)
     zero = np.tile(np.arange(n), LOOKED_AT)
-    states[zero, np.arange(n * LOOKED_AT)] = 0.0
-    several = Members(plan._replace(progress=None)).plan(np.full(n * LOOKED_AT, member))
+    states[zero, looks] = 0.0
+    several = Members(plan._replace(progress=None)).plan(np.repeat(members, looks.size))
     unit: Any = engine.attempted_system(several).unit
-    state = states.reshape(*plan.system.y_shape, n * LOOKED_AT)
+    state = (np.abs(y).max(axis=0)[:, np.newaxis] * states[:, np.newaxis]).reshape(*plan.system.y_shape, -1)
     with np.errstate(all="ignore"):
-        rates = unit.dy(np.full(n * LOOKED_AT, t), np.zeros((0, n * LOOKED_AT)), state)
-    rates = np.broadcast_to(rates, state.shape).reshape(n, -1)
-    return bool((rates[zero, np.arange(n * LOOKED_AT)] >= 0.0).all())
+        rates = unit.dy(np.repeat(t, looks.size), np.zeros((0, state.shape[-1])), state)
+    rates = np.broadcast_to(rates, state.shape).reshape(n, count, looks.size)
+    return (rates[zero, :, looks] >= 0.0).all(axis=0)
