@@ -235,7 +235,8 @@ def test_xarray_reads_it_by_itself(ending: str, tmp_path: Path) -> None:
 
 #: A sweep of some seconds in a process of its own.
 SLOW = """
-    import sys, time
+    import signal, sys, time
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # what a shell starts in the background ignores Ctrl-C
     sys.path.insert(0, {tests!r})
     from functools import partial
     import stepwell as sw
@@ -273,14 +274,7 @@ def test_after_a_signal_in_the_middle(sent: signal.Signals, ending: str, tmp_pat
     written: dict[Path, int] = {}
     chunks = 27  # three of two, two and one member for each of nine values
     for least in (3, 10):
-        # Processes begun from a shell's background ignore Ctrl-C, and so would this one.
-        process = subprocess.Popen(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        )
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         until = time.monotonic() + 60
         while finished_chunks(store) < least and process.poll() is None and time.monotonic() < until:
             time.sleep(0.01)

@@ -31,13 +31,8 @@ class Implicit:
         #: The entries of the mass matrix by row and column; None is the matrix of units.
         mass = getattr(s, "mass_matrix", None)
         self.mass = None if mass is None else [dict(row) for row in mass.rows]
-        work = getattr(s, "work", None)
-        all_numbers = range(self.of_v + self.of_y)
         #: Of each number of the state the derivatives of all rates by it; None is zero whatever the state is.
-        self.by_state = [self._along(number, s, t) for number in all_numbers]
-        self.time = self._along(None, s, t)
-        if work is not None:
-            s.work = work  # these rates push nothing
+        *self.by_state, self.time = self._derivatives(s, t)
         self.follows = bool(self.of_v and self.of_y) and all(
             derivative is None for by_y in self.by_state[self.of_v :] for derivative in by_y[self.of_v :]
         )
@@ -47,23 +42,30 @@ class Implicit:
         block = np.asarray(block)
         return [block[index] for index in np.ndindex(block.shape[: self.axes[which]])]
 
-    def _along(self, number: int | None, s: Any, t: Any) -> list[Any]:
-        """The derivatives of all rates by one number of the state, or by the time."""
-        book = Book()
+    def _derivatives(self, s: Any, t: Any) -> list[list[Any]]:
+        """The derivatives of all rates by each number of the state, and by the time. The rates are run once."""
+        work, book = getattr(s, "work", None), Book()
         blocks = [np.frompyfunc(lambda each: Series(book, each, None), 1, 1)(block) for block in (self.v, self.y)]
         times = np.frompyfunc(lambda each: Series(book, each, None), 1, 1)(t)
         rates = s.dv(times, *blocks), s.dy(times, *blocks)
-        seeds = [row for which, block in enumerate(blocks) for row in self._rows(block, which)]
-        for i, row in enumerate([*seeds, times]):
-            for seed in np.asarray(row, dtype=object).flat:
-                seed.terms.append(1.0 if i == (len(seeds) if number is None else number) else None)
-        book.advance(1)
+        if work is not None:
+            s.work = work  # these rates push nothing
+        seeds = [*(row for which, block in enumerate(blocks) for row in self._rows(block, which)), times]
         rows = [
             row
             for which, (rate, block) in enumerate(zip(rates, blocks, strict=True))
             for row in self._rows(np.broadcast_to(as_objects(rate), np.shape(block)), which)
         ]
-        return [self._first_order(row) for row in rows]
+        result = []
+        for number in range(len(seeds)):
+            for i, row in enumerate(seeds):
+                for seed in np.asarray(row, dtype=object).flat:
+                    seed.terms[1:] = [1.0 if i == number else None]
+            book.advance(1)
+            result.append([self._first_order(row) for row in rows])
+            for each in book.series:
+                del each.terms[1:]
+        return result
 
     @staticmethod
     def _first_order(row: Any) -> Any:
