@@ -21,6 +21,7 @@ LAST_LINES = {
     "neuron": "fires from 6.5 µA/cm² on, with 55 Hz; rest is unstable beyond 9.78",
     "oscillator_circuit": "period 6.2871 at µ = 0.1, 34.608 at µ = 20; the two laws say 6.2871 and 34.784",
     "predators": "mean prey over 1000 years: 4.0056 thousand; in equilibrium 4.0000",
+    "reaction": "one mixture: 819 steps of rodas5p, 158502 of dop853",
     "star_orbits": "5307 crossings at E = 1/8; stars escape beyond E = 0.166667",
     "turing": "8 stripes on a ring of 8 predicted wavelengths of 10.10",
 }
@@ -35,6 +36,7 @@ MISTAKES = {
     "neuron": ("/ (np.exp(3.0 - 0.1 * v) + 1.0)", "/ (np.exp(3.2 - 0.1 * v) + 1.0)"),
     "oscillator_circuit": ("(1.0 - y**2)", "(1.0 - 1.1 * y**2 * abs(y))"),
     "predators": ("births - hunted * np.exp(v)", "births - hunted * np.exp(v) + 0.001 * y"),
+    "reaction": ("x - z]", "x - 1.1 * z]"),
     "star_orbits": ("- y[0] ** 2 + y[1] ** 2", "- y[0] ** 2 + 1.01 * y[1] ** 2"),
     "turing": ("b * u - made + dy", "b * u - made + 0.7 * dy"),
 }

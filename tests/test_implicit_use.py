@@ -162,3 +162,21 @@ def test_events_of_a_large_system() -> None:
     true = sw.integrate(sw.Chain(N), "rk4", **CHAIN, events=event, dt=0.05, steps=16)
     assert run.events["back"].t.size == 1
     assert run.events["back"].t == pytest.approx(true.events["back"].t, rel=1e-3)
+
+
+def test_an_equation_may_ask_whether_a_number_is_zero() -> None:
+    """Where the comparison has the constant first, as equal operations may, the rates' series compare as numbers do."""
+
+    def ratio(x: Any) -> Any:
+        return np.where(x == 0.0, 1.0, x / np.expm1(np.where(x == 0.0, 1.0, x)))
+
+    @sw.system(order=1)
+    def gate(t: Any, y: Any) -> Any:
+        return [ratio(2.5 - 0.1 * y[0]) + ratio(1.0 - 0.1 * y[0]) - y[0]]
+
+    start = {"y": np.array([[0.0, 25.0]]), "dt": 0.1, "steps": 5}
+    run = sw.integrate(gate(), "rodas4", **start)
+    assert np.isfinite(run.y[-1]).all()
+    assert np.array_equal(run.y, sw.integrate(gate(), "rodas4", **start, backend="numpy").y)
+    crossed = sw.Event(lambda t, y: y[0] - 20.0, name="crossed")
+    assert sw.integrate(gate(), "rodas4", **start, events=crossed).events["crossed"].count.tolist() == [0, 1]

@@ -14,17 +14,24 @@ EXAMPLES = Path(__file__).resolve().parent.parent / "examples" / "sweeps"
 
 #: Equal bits make the last line the same everywhere.
 LAST_LINES: dict[str, str] = {
+    "axons": "fires from 8 µA/cm² on at 6.3 °C, up to 25.5 °C, 539 times a second at most",
     "basins": "31.9% have a neighbour that ends elsewhere; with half the step 0.0% end elsewhere",
     "bifurcation": "periods at γ = 0.20, 0.28, 0.29, 0.37, 0.50, 0.65: 1, 2, 4, 5, chaos, 2",
     "pushed_figure_eight": "together after 30 turns: 11.8% by leapfrog, 58.4% with adaptive steps",
 }
 #: A mistake in the equations of each, or in the start, which what is known must refute.
 MISTAKES: dict[str, tuple[str, str]] = {
+    "axons": ("/ (np.exp(3.0 - 0.1 * v) + 1.0)", "/ (np.exp(3.2 - 0.1 * v) + 1.0)"),
     "basins": ("1.0 / (r2 * np.sqrt(r2)) * away", "1.0 / r2 * away"),
     "bifurcation": ("- delta * v", "- 1.2 * delta * v"),
     "pushed_figure_eight": ("-2.0 * first", "-2.05 * first"),
 }
-SMALLER: dict[str, dict[str, Any]] = {"basins": {"size": 40}, "bifurcation": {"size": 3}, "pushed_figure_eight": {"size": 3}}
+SMALLER: dict[str, dict[str, Any]] = {
+    "axons": {},
+    "basins": {"size": 40},
+    "bifurcation": {"size": 3},
+    "pushed_figure_eight": {"size": 3},
+}
 
 
 @pytest.fixture(autouse=True)

@@ -358,6 +358,8 @@ def operation(book: Book, name: str, of: list[Any], extra: int) -> Any:
         return Truth(book, of[0]).choose(*of[1:])
     if name == "exclusive or":
         return ~of[0] if isinstance(of[0], Truth) else ~of[1]
+    if name == "equal" and not isinstance(of[0], Series):
+        of = of[::-1]
     return of_symbols(name, of, extra)
 
 
