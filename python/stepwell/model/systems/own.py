@@ -36,6 +36,8 @@ DERIVED = ("_core", "_single", "_with_functions", "_digest", "_bounds", "_met")
 MOST_SHAPES = 256
 #: A cache of the operations of traced functions, and its most entries.
 _TRACED: dict[Any, Any] = {}
+#: Operations with the derivatives of their functions, by those without, which are kept so that no others get their place.
+_WITH_FUNCTIONS: dict[int, tuple[Any, Any]] = {}
 MOST_TRACED = 256
 #: Without a state, the shapes that are tried: a number, and vectors up to this length.
 LONGEST_GUESS = 32
@@ -349,7 +351,11 @@ class OwnSystem(System):
     def _series_rates(self) -> Any:
         """The rates as operations, with the derivatives of the functions among them."""
         if self._with_functions is None or self._with_functions[0] is not self._core:
-            self._with_functions = self._core, self._rates({})
+            if (known := _WITH_FUNCTIONS.get(id(self._core))) is None:
+                if len(_WITH_FUNCTIONS) >= MOST_TRACED:
+                    _WITH_FUNCTIONS.clear()
+                known = _WITH_FUNCTIONS[id(self._core)] = self._core, self._rates({})
+            self._with_functions = known
         return self._with_functions[1]
 
     @property
