@@ -72,7 +72,7 @@ def test_python_blocks_run_and_print_what_they_say(page, tmp_path, monkeypatch):
 
 def test_blocks_are_found_and_compared():
     # Guards the two expressions above: a fence that is not seen would be a test that cannot fail.
-    assert len(blocks(ROOT / "README.md")) >= 3
+    assert len(blocks(ROOT / "README.md")) >= 1
     assert sum(len(SAID.findall(code)) for page in PAGES for _, code, _ in blocks(page)) >= 20
 
 

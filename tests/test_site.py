@@ -215,7 +215,7 @@ def test_every_public_name_is_in_the_reference_with_an_example(site: Path) -> No
 
 
 SEEN = (
-    *("index", "tutorials/first_run", "tutorials/sweep", "howto/usage", "gallery/index", "gallery/motion/heavy_top"),
+    *("index", "tutorials/first_run", "tutorials/sweep", "howto/runs", "gallery/index", "gallery/motion/heavy_top"),
     *(
         "reference/index",
         "reference/systems",
