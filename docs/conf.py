@@ -59,7 +59,12 @@ INCLUDED = {
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
-    "subsection_order": ["../examples/motion", "../examples/methods", "../examples/sweeps", "../examples/equations"],
+    "subsection_order": [
+        "../examples/motion",
+        "../examples/methods",
+        "../examples/sweeps",
+        "../examples/equations",
+    ],
     "within_subsection_order": "FileNameSortKey",
     "filename_pattern": r"\.py$",
     # The scripts right in examples/ print; those in its folders draw.
@@ -98,8 +103,14 @@ html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {
-    "light_css_variables": {"color-brand-primary": "#175ca6", "color-brand-content": "#175ca6"},
-    "dark_css_variables": {"color-brand-primary": "#6cb2f5", "color-brand-content": "#6cb2f5"},
+    "light_css_variables": {
+        "color-brand-primary": "#175ca6",
+        "color-brand-content": "#175ca6",
+    },
+    "dark_css_variables": {
+        "color-brand-primary": "#6cb2f5",
+        "color-brand-content": "#6cb2f5",
+    },
 }
 copybutton_exclude = ".linenos, .gp, .go"
 
@@ -131,7 +142,9 @@ def setup(app: Any) -> None:
     import site_parts
 
     app.add_directive("public", site_parts.Public)
-    app.connect("autodoc-process-docstring", site_parts.as_text, priority=400)  # before Napoleon
+    app.connect(
+        "autodoc-process-docstring", site_parts.as_text, priority=400
+    )  # before Napoleon
     app.connect("autodoc-process-signature", site_parts.without_constructor)
     app.connect("source-read", _page_read)
     app.connect("include-read", _file_included)

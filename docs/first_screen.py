@@ -35,13 +35,23 @@ def states(control: sw.EnergyControl | None) -> sw.Run:
     """Appendix D by Standard Euler."""
     scene = sw.scenes.energy_control()
     return sw.integrate(
-        scene.system, "standard_euler", v=scene.v, y=scene.y, dt=scene.dt, steps=STEPS, every=STEPS // 800, control=control
+        scene.system,
+        "standard_euler",
+        v=scene.v,
+        y=scene.y,
+        dt=scene.dt,
+        steps=STEPS,
+        every=STEPS // 800,
+        control=control,
     )
 
 
 def palette(paper: str, colours: tuple[str, ...]) -> Image.Image:
     """The page's own colours and their shades: one that is chosen from a frame would merge bodies."""
-    shades = [np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) for colour in (paper, *colours)]
+    shades = [
+        np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)])
+        for colour in (paper, *colours)
+    ]
     values = [
         round(float(value))
         for colour in shades[1:]
@@ -57,21 +67,35 @@ def energy_control(page: str) -> None:
     """Both runs side by side, as a GIF."""
     paper, ink, colours = PAGES[page]
     scene = sw.scenes.energy_control()
-    runs = (("without control", states(None)), ("with energy control", states(scene.control)))
+    runs = (
+        ("without control", states(None)),
+        ("with energy control", states(scene.control)),
+    )
     start = float(runs[0][1].energy[0])
     kinetic = 0.5 * float((scene.v**2).sum())
     figure: Any = style.new_figure(7.2, 4.1)
     figure.set_facecolor(paper)
     parts = []
     for i, (name, run) in enumerate(runs):
-        axes = figure.add_axes((0.01 + 0.5 * i, 0.02, 0.48, 0.82), aspect="equal", xlim=(-REACH, REACH), ylim=(-REACH, REACH))
+        axes = figure.add_axes(
+            (0.01 + 0.5 * i, 0.02, 0.48, 0.82),
+            aspect="equal",
+            xlim=(-REACH, REACH),
+            ylim=(-REACH, REACH),
+        )
         axes.set(xticks=[], yticks=[], facecolor=paper)
         for spine in axes.spines.values():
             spine.set_color(EDGE)
-        figure.text(0.25 + 0.5 * i, 0.93, name, color=ink, size=14, weight="bold", ha="center")
+        figure.text(
+            0.25 + 0.5 * i, 0.93, name, color=ink, size=14, weight="bold", ha="center"
+        )
         said = figure.text(0.25 + 0.5 * i, 0.865, "", color=ink, size=11, ha="center")
-        trails = [axes.plot([], [], color=colour, linewidth=1.8)[0] for colour in colours]
-        dots = [axes.plot([], [], "o", color=colour, markersize=9)[0] for colour in colours]
+        trails = [
+            axes.plot([], [], color=colour, linewidth=1.8)[0] for colour in colours
+        ]
+        dots = [
+            axes.plot([], [], "o", color=colour, markersize=9)[0] for colour in colours
+        ]
         parts.append((run, said, trails, dots))
     frames = []
     for k in np.linspace(0, len(runs[0][1].t) - 1, FRAMES).astype(int).tolist():
@@ -82,11 +106,20 @@ def energy_control(page: str) -> None:
                 trail.set_data(*run.y[max(0, k - TRAIL) : k + 1, body].T)
                 dot.set_data(*run.y[k : k + 1, body].T)
         figure.canvas.draw()
-        frames.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB"))
+        frames.append(
+            Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
+        )
     few = palette(paper, (ink, EDGE, *colours))
     drawn = [frame.quantize(palette=few, dither=Image.Dither.NONE) for frame in frames]
     written = IMAGES / f"energy-control-{page}.gif"
-    drawn[0].save(written, save_all=True, append_images=drawn[1:], duration=MILLISECONDS, loop=0, optimize=True)
+    drawn[0].save(
+        written,
+        save_all=True,
+        append_images=drawn[1:],
+        duration=MILLISECONDS,
+        loop=0,
+        optimize=True,
+    )
     print(written.name, written.stat().st_size)
 
 
@@ -102,19 +135,40 @@ def five_methods() -> None:
         axes = figure.add_axes((0.1, 0.12, 0.88, 0.72), xscale="log", yscale="log")
         given = []
         for curve in chart.curves:
-            points = np.array([(point.cost, point.state_error) for point in curve.usable])
+            points = np.array(
+                [(point.cost, point.state_error) for point in curve.usable]
+            )
             assert isinstance(curve.method, sw.Method)
             look = style.look(curve.method)
-            axes.plot(*points.T, **(look | {"linestyle": "-", "linewidth": 2.2, "markersize": 5.0}))
-            given.append(labels.Label(curve.title, points, {"color": look["color"], "weight": "bold", "size": 14}))
-        axes.set(ylim=(1e-14, 1.0), xlabel="function evaluations per unit of time", ylabel="largest error of the run")
+            axes.plot(
+                *points.T,
+                **(look | {"linestyle": "-", "linewidth": 2.2, "markersize": 5.0}),
+            )
+            given.append(
+                labels.Label(
+                    curve.title,
+                    points,
+                    {"color": look["color"], "weight": "bold", "size": 14},
+                )
+            )
+        axes.set(
+            ylim=(1e-14, 1.0),
+            xlabel="function evaluations per unit of time",
+            ylabel="largest error of the run",
+        )
         axes.grid(color="#e6e6e6", linewidth=0.8)
         axes.minorticks_off()
         axes.spines[["top", "right"]].set_visible(False)
         assert not labels.beside(axes, given)
         title = finding(chart)
         figure.text(0.012, 0.935, f"Of five methods, {title}", size=16, weight="bold")
-        figure.text(0.012, 0.88, "Three bodies on a clover leaf (Appendix C), 30 units of time.", size=12.5, color=style.GREY)
+        figure.text(
+            0.012,
+            0.88,
+            "Three bodies on a clover leaf (Appendix C), 30 units of time.",
+            size=12.5,
+            color=style.GREY,
+        )
         (IMAGES / "five-methods.png").write_bytes(png(figure))
     print("five-methods.png", (IMAGES / "five-methods.png").stat().st_size)
 

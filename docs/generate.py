@@ -20,7 +20,9 @@ import options
 import speed
 
 ROOT = Path(__file__).resolve().parent.parent
-PLACE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end generated -->)", re.DOTALL)
+PLACE = re.compile(
+    r"(<!-- generated: (\w+) -->\n).*?(<!-- end generated -->)", re.DOTALL
+)
 
 
 def limit(angle: float, digits: int) -> str:
@@ -44,7 +46,14 @@ def or_dash(names: Iterable[str]) -> str:
 
 def methods() -> str:
     """What each method is, costs and stands."""
-    head = "name", "title", "standard name", "order", "function evaluations", "stable for Φ below"
+    head = (
+        "name",
+        "title",
+        "standard name",
+        "order",
+        "function evaluations",
+        "stable for Φ below",
+    )
     return table(
         head,
         (
@@ -64,7 +73,16 @@ def methods() -> str:
 def names() -> str:
     """The document's names beside the standard ones."""
     head = "document", "section", "name", "also called", "not to be taken for"
-    rows = ((m.title, m.section, f"`{m.name}`", or_dash(m.other_names), or_dash(m.false_friends)) for m in sw.methods())
+    rows = (
+        (
+            m.title,
+            m.section,
+            f"`{m.name}`",
+            or_dash(m.other_names),
+            or_dash(m.false_friends),
+        )
+        for m in sw.methods()
+    )
     return table(head, rows)
 
 
@@ -88,7 +106,13 @@ def requirements() -> str:
 
 def criteria() -> str:
     """The undamped oscillator by each method: limits and series."""
-    head = "method", "stable for Φ below", "steps a period, more than", "r₁² − 1", "Ψ/Φ − 1"
+    head = (
+        "method",
+        "stable for Φ below",
+        "steps a period, more than",
+        "r₁² − 1",
+        "Ψ/Φ − 1",
+    )
     return table(
         head,
         (
@@ -121,11 +145,24 @@ def deviations() -> str:
 
 def operations() -> str:
     """The operations of a step of the undamped oscillator."""
-    head = "method", "additions", "products", "quotients", "roots", "function evaluations"
+    head = (
+        "method",
+        "additions",
+        "products",
+        "quotients",
+        "roots",
+        "function evaluations",
+    )
     rows = []
     for c in sw.criteria():
         o = c.operations
-        counts = (o.additions, o.multiplications, o.divisions, o.square_roots, o.rate_evaluations)
+        counts = (
+            o.additions,
+            o.multiplications,
+            o.divisions,
+            o.square_roots,
+            o.rate_evaluations,
+        )
         rows.append([c.method.title, *map(str, counts)])
     return table(head, rows)
 
@@ -135,10 +172,29 @@ def paper() -> str:
     parts = []
     for section in dict.fromkeys(entry.section for entry in sw.paper.entries()):
         entries = sw.paper.entries(section)
-        columns = [(entry.kind, entry.says, entry.corrected or "—", entry.here, entry.run().numbers) for entry in entries]
+        columns = [
+            (
+                entry.kind,
+                entry.says,
+                entry.corrected or "—",
+                entry.here,
+                entry.run().numbers,
+            )
+            for entry in entries
+        ]
         rows = [[cell.replace("|", "\\|") for cell in row] for row in columns]
         parts.append(
-            f"## {section}\n\n" + table(("kind", "statement of the document", "correction", "in stepwell", "numbers"), rows)
+            f"## {section}\n\n"
+            + table(
+                (
+                    "kind",
+                    "statement of the document",
+                    "correction",
+                    "in stepwell",
+                    "numbers",
+                ),
+                rows,
+            )
         )
     return "\n" + "\n".join(parts) + "\n"
 
@@ -151,7 +207,11 @@ def speeds() -> str:
 
 def from_report(begin: str) -> str:
     """A table of the report of the benches, as it stands there."""
-    title, rows = next((title, rows) for title, rows in speed.tables().items() if title.startswith(begin))
+    title, rows = next(
+        (title, rows)
+        for title, rows in speed.tables().items()
+        if title.startswith(begin)
+    )
     lines = list(rows.values())
     return f"{title}\n\n" + table(lines[0], (line.values() for line in lines))
 
@@ -159,9 +219,15 @@ def from_report(begin: str) -> str:
 TABLES = {
     "speeds": speeds,
     "stages": lambda: from_report("A call by stages"),
-    "one_orbit": lambda: from_report("Chosen steps: Kepler's ellipse, e = 0.9, 10 periods, one orbit"),
-    "many_orbits": lambda: from_report("Chosen steps: Kepler's ellipse, e = 0.9, 10 periods, 10,000"),
-    "one_round": lambda: from_report("Chosen steps: Arenstorf's orbit, once round, one"),
+    "one_orbit": lambda: from_report(
+        "Chosen steps: Kepler's ellipse, e = 0.9, 10 periods, one orbit"
+    ),
+    "many_orbits": lambda: from_report(
+        "Chosen steps: Kepler's ellipse, e = 0.9, 10 periods, 10,000"
+    ),
+    "one_round": lambda: from_report(
+        "Chosen steps: Arenstorf's orbit, once round, one"
+    ),
     "paper": paper,
     "methods": methods,
     "names": names,

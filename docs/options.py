@@ -43,7 +43,13 @@ def energy(v: Any, y: Any, *, omega: float = 1.0) -> Any:
 @sw.system(order=1, shape=(3,))
 def lorenz(t: Any, y: Any) -> Any:
     """Own equations of first order."""
-    return np.array([10.0 * (y[1] - y[0]), y[0] * (28.0 - y[2]) - y[1], y[0] * y[1] - 8.0 / 3.0 * y[2]])
+    return np.array(
+        [
+            10.0 * (y[1] - y[0]),
+            y[0] * (28.0 - y[2]) - y[1],
+            y[0] * y[1] - 8.0 / 3.0 * y[2],
+        ]
+    )
 
 
 def _blocks(*rows: Any) -> Any:
@@ -52,8 +58,18 @@ def _blocks(*rows: Any) -> Any:
 
 KINDS = (
     Kind("oscillator", lambda: sw.Oscillator(form="physical"), np.ones(MEMBERS)),
-    Kind("sampled input", lambda: sw.Oscillator(a=sw.Sampled([0.0, 1.0, 0.5], interval=0.02), form="physical"), np.ones(MEMBERS)),
-    Kind("sticking friction", lambda: sw.Oscillator(friction=0.1, form="physical"), np.ones(MEMBERS)),
+    Kind(
+        "sampled input",
+        lambda: sw.Oscillator(
+            a=sw.Sampled([0.0, 1.0, 0.5], interval=0.02), form="physical"
+        ),
+        np.ones(MEMBERS),
+    ),
+    Kind(
+        "sticking friction",
+        lambda: sw.Oscillator(friction=0.1, form="physical"),
+        np.ones(MEMBERS),
+    ),
     Kind("matrices", lambda: sw.LinearSystem([[0.0, -1.0], [1.0, 0.0]]), _blocks(1.0)),
     Kind("bodies", lambda: sw.NBody([1.0, 1.0]), _blocks([0.0, 0.0], [1.0, 0.0])),
     Kind(
@@ -70,9 +86,23 @@ KINDS = (
         sw.NormControl(1.0),
         sw.Projection("norm"),
     ),
-    Kind("springs", lambda: sw.Springs([[0, 1]], stiffness=1.0, rest=1.0, dim=2), _blocks([0.0, 0.0], [1.0, 0.0])),
-    Kind("points on a floor", lambda: sw.Particles(gravity=9.81, floor=sw.Floor(), dim=2), _blocks([0.0, 1.0])),
-    Kind("own equations", lambda: swing(), np.ones(MEMBERS), sw.Control("energy", 0.3), sw.Projection("energy")),
+    Kind(
+        "springs",
+        lambda: sw.Springs([[0, 1]], stiffness=1.0, rest=1.0, dim=2),
+        _blocks([0.0, 0.0], [1.0, 0.0]),
+    ),
+    Kind(
+        "points on a floor",
+        lambda: sw.Particles(gravity=9.81, floor=sw.Floor(), dim=2),
+        _blocks([0.0, 1.0]),
+    ),
+    Kind(
+        "own equations",
+        lambda: swing(),
+        np.ones(MEMBERS),
+        sw.Control("energy", 0.3),
+        sw.Projection("energy"),
+    ),
     Kind("own, first order", lambda: lorenz(), _blocks(1.0, 1.0, 1.0)),
 )
 
@@ -82,11 +112,17 @@ def _event(kind: Kind, **options: Any) -> sw.Event:
     place = (0,) * (np.ndim(kind.y) - 1)
     if kind.name == "own, first order":
         return sw.Event(lambda t, y: y[place] - 0.5, name="half", **options)
-    return sw.Event(lambda t, v, y: (y[place] if place else y) - 0.5, name="half", **options)
+    return sw.Event(
+        lambda t, v, y: (y[place] if place else y) - 0.5, name="half", **options
+    )
 
 
 def _as_it_is(kind: Kind) -> Any:
-    return (lambda t, y: y) if kind.name == "own, first order" else (lambda t, v, y: (v, y))
+    return (
+        (lambda t, y: y)
+        if kind.name == "own, first order"
+        else (lambda t, v, y: (v, y))
+    )
 
 
 def _with(**options: Any) -> Callable[[Kind, Request], None]:
@@ -109,7 +145,9 @@ OPTIONS: dict[str, Callable[[Kind, Request], None]] = {
     "projection": lambda kind, request: request.update(control=kind.projection),
     "energy": _with(record="energy"),
     "events": lambda kind, request: request.update(events=_event(kind)),
-    "then": lambda kind, request: request.update(events=_event(kind, then=_as_it_is(kind))),
+    "then": lambda kind, request: request.update(
+        events=_event(kind, then=_as_it_is(kind))
+    ),
     "fused": _with(fused=True),
     "float32": _with(dtype="float32"),
     "numpy": _with(backend="numpy"),
@@ -142,7 +180,10 @@ def _run(kind: Kind, request: Request) -> None:
         else:
             steps = {"steps": STEPS} if piece else {"dt": sign * DT, "steps": STEPS}
         run = sw.integrate(system, method, **start | options | steps)
-        start, options = {"resume": run}, {name: value for name, value in options.items() if name in OF_A_PIECE}
+        start, options = (
+            {"resume": run},
+            {name: value for name, value in options.items() if name in OF_A_PIECE},
+        )
 
 
 def refusal(kind: Kind, names: tuple[str, ...]) -> str | None:
@@ -171,9 +212,16 @@ class Reasons:
     def number(self, kind: Kind, text: str) -> int:
         """The number of a reason, in which the system of a kind and its controls are called so."""
         system = repr(kind.make())
-        for each, name in ((kind.control, "the control"), (kind.projection, "the projection")):
-            text = text.replace(f"{system[:-1]}, {each!r})", "the system").replace(repr(each), name)
-        return self._numbers.setdefault(text.replace(system, "the system"), len(self._numbers) + 1)
+        for each, name in (
+            (kind.control, "the control"),
+            (kind.projection, "the projection"),
+        ):
+            text = text.replace(f"{system[:-1]}, {each!r})", "the system").replace(
+                repr(each), name
+            )
+        return self._numbers.setdefault(
+            text.replace(system, "the system"), len(self._numbers) + 1
+        )
 
     def listed(self) -> Iterator[str]:
         """A line for each."""
@@ -186,16 +234,26 @@ def _row(*cells: str) -> str:
     return f"| {' | '.join(cells)} |\n"
 
 
-def _of_kinds(alone: dict[tuple[str, str], str | None], reasons: Reasons) -> Iterator[str]:
+def _of_kinds(
+    alone: dict[tuple[str, str], str | None], reasons: Reasons
+) -> Iterator[str]:
     """The table of options and kinds of systems."""
     yield _row("", *(kind.name for kind in KINDS))
     yield _row(*["---"] * (len(KINDS) + 1))
     for option in OPTIONS:
         each = ((kind, alone[option, kind.name]) for kind in KINDS)
-        yield _row(f"`{option}`", *(WORKS if why is None else str(reasons.number(kind, why)) for kind, why in each))
+        yield _row(
+            f"`{option}`",
+            *(
+                WORKS if why is None else str(reasons.number(kind, why))
+                for kind, why in each
+            ),
+        )
 
 
-def _of_pairs(alone: dict[tuple[str, str], str | None], reasons: Reasons) -> Iterator[str]:
+def _of_pairs(
+    alone: dict[tuple[str, str], str | None], reasons: Reasons
+) -> Iterator[str]:
     """The table of pairs of options, with the kinds of systems that go with each of both."""
     names = list(OPTIONS)
     yield _row("", *(f"`{name}`" for name in names[:-1]))
@@ -203,13 +261,19 @@ def _of_pairs(alone: dict[tuple[str, str], str | None], reasons: Reasons) -> Ite
     for i, option in enumerate(names[1:], 1):
         cells = [""] * (len(names) - 1)
         for j, other in enumerate(names[:i]):
-            able = [kind for kind in KINDS if alone[option, kind.name] is None and alone[other, kind.name] is None]
+            able = [
+                kind
+                for kind in KINDS
+                if alone[option, kind.name] is None and alone[other, kind.name] is None
+            ]
             refused = [(kind, refusal(kind, (other, option))) for kind in able]
             if not able or any(why == "" for _, why in refused):
                 cells[j] = EXCLUDES
                 continue
             works = [WORKS] if any(why is None for _, why in refused) else []
-            numbers = dict.fromkeys(str(reasons.number(kind, why)) for kind, why in refused if why)
+            numbers = dict.fromkeys(
+                str(reasons.number(kind, why)) for kind, why in refused if why
+            )
             cells[j] = " ".join([*works, *numbers])
         yield _row(f"`{option}`", *cells)
 
@@ -217,6 +281,16 @@ def _of_pairs(alone: dict[tuple[str, str], str | None], reasons: Reasons) -> Ite
 def tables() -> str:
     """Both tables, and the reasons below them."""
     reasons = Reasons()
-    alone = {(option, kind.name): refusal(kind, (option,)) for option in OPTIONS for kind in KINDS}
-    each = [*_of_kinds(alone, reasons), "\n", *_of_pairs(alone, reasons), "\n", *reasons.listed()]
+    alone = {
+        (option, kind.name): refusal(kind, (option,))
+        for option in OPTIONS
+        for kind in KINDS
+    }
+    each = [
+        *_of_kinds(alone, reasons),
+        "\n",
+        *_of_pairs(alone, reasons),
+        "\n",
+        *reasons.listed(),
+    ]
     return "".join(each)

@@ -61,7 +61,9 @@ def save(drawn: Image.Image, path: Path) -> None:
     _, place, times = np.unique(code, return_inverse=True, return_counts=True)
     rare = (times < RARE * code.size)[place].reshape(code.shape)
     rounded = (np.rint(pixels / SHADE) * SHADE).astype(np.uint8)
-    Image.fromarray(np.where(rare[..., np.newaxis], rounded, pixels)).save(path, optimize=True)
+    Image.fromarray(np.where(rare[..., np.newaxis], rounded, pixels)).save(
+        path, optimize=True
+    )
     print(f"docs/images/{path.name}")
 
 
@@ -69,11 +71,25 @@ def save(drawn: Image.Image, path: Path) -> None:
 #: enough for the cloth.
 FAMILIES: dict[str, tuple[str, ...]] = {
     "work-precision.png": (
-        *("oscillator", "forced_oscillator", "chain", "pendulum", "clover", "figure_eight"),
+        *(
+            "oscillator",
+            "forced_oscillator",
+            "chain",
+            "pendulum",
+            "clover",
+            "figure_eight",
+        ),
         *("kepler", "arenstorf", "pythagorean", "energy_control", "plummer"),
     ),
     "work-precision-bodies.png": (
-        *("conical_pendulum", "double_pendulum", "triple_pendulum", "dzhanibekov", "symmetric_top", "heavy_top"),
+        *(
+            "conical_pendulum",
+            "double_pendulum",
+            "triple_pendulum",
+            "dzhanibekov",
+            "symmetric_top",
+            "heavy_top",
+        ),
         *("aircraft", "gimbal_trap"),
     ),
     "work-precision-springs.png": ("rope_bridge", "jelly_cube"),
@@ -91,10 +107,21 @@ def write_best(charts: Iterable[sw.charts.WorkPrecision]) -> None:
     lines = [head, ["---"] * len(head)]
     for chart in charts:
         found = [chart.best(error) for error in ERRORS]
-        lines.append([f"`{chart.scene.name}`", *(f"{row['method']}: {row['cost']:.3g}" if row else "—" for row in found)])
+        lines.append(
+            [
+                f"`{chart.scene.name}`",
+                *(
+                    f"{row['method']}: {row['cost']:.3g}" if row else "—"
+                    for row in found
+                ),
+            ]
+        )
     made = "".join(f"| {' | '.join(line)} |\n" for line in lines)
     page = DOCS / "benchmarks" / "work-precision.md"
-    page.write_text(PLACE.sub(lambda m: m[1] + made + m[2], page.read_text(encoding="utf-8")), encoding="utf-8")
+    page.write_text(
+        PLACE.sub(lambda m: m[1] + made + m[2], page.read_text(encoding="utf-8")),
+        encoding="utf-8",
+    )
     print("docs/benchmarks/work-precision.md")
 
 
@@ -102,7 +129,9 @@ def wing_nut() -> None:
     """The picture of the example of that name."""
     with tempfile.TemporaryDirectory() as folder:
         drawn = Path(folder) / "wing-nut.png"
-        runpy.run_path(str(DOCS.parent / "examples" / "wing_nut.py"))["picture"](str(drawn))
+        runpy.run_path(str(DOCS.parent / "examples" / "wing_nut.py"))["picture"](
+            str(drawn)
+        )
         save(Image.open(drawn), IMAGES / "wing-nut.png")
 
 
@@ -114,7 +143,9 @@ def examples() -> None:
             drawn = Image.open(Path(folder) / f"{file.stem}.png").convert("RGB")
             written = IMAGES / "equations" / file.name.replace(".py", ".png")
             for colours in (256, COLOURS, 32, 16):
-                few = drawn.convert("P", palette=Image.Palette.ADAPTIVE, colors=colours).convert("RGB")
+                few = drawn.convert(
+                    "P", palette=Image.Palette.ADAPTIVE, colors=colours
+                ).convert("RGB")
                 few.save(written, optimize=True)
                 if written.stat().st_size <= MOST_BYTES:
                     break
@@ -129,7 +160,9 @@ def impacts(floor: sw.Floor) -> Any:
     """The energy after an impact over that before it, by leapfrog; a point that a spring holds has left it after 12 steps."""
     y = (1.0 + 0.5 * KICK) * np.linspace(0.0, 1.0, PHASES, endpoint=False)
     ball = sw.Particles(gravity=KICK, floor=floor, dim=1)
-    run = sw.integrate(ball, "leapfrog", v=-1.0, y=y[np.newaxis, np.newaxis], dt=1.0, steps=12, every=1)
+    run = sw.integrate(
+        ball, "leapfrog", v=-1.0, y=y[np.newaxis, np.newaxis], dt=1.0, steps=12, every=1
+    )
     energy = (0.5 * run.v**2 + KICK * run.y)[:, 0, 0]
     away = (run.y[:, 0, 0] >= 0.0) & (run.v[:, 0, 0] > 0.0)
     return energy[np.argmax(away, axis=0), np.arange(PHASES)] / energy[0]
@@ -139,7 +172,11 @@ def mirrored() -> Any:
     """The same where v and y are both turned over, which no way does."""
     y = (1.0 + 0.5 * KICK) * np.linspace(0.0, 1.0, PHASES, endpoint=False)
     v = np.full(PHASES, -1.0)
-    before, out, hit = 0.5 * v * v + KICK * y, np.ones(PHASES), np.zeros(PHASES, dtype=bool)
+    before, out, hit = (
+        0.5 * v * v + KICK * y,
+        np.ones(PHASES),
+        np.zeros(PHASES, dtype=bool),
+    )
     for _ in range(3):
         y, v = y + v - 0.5 * KICK, v - KICK
         now = (y < 0.0) & ~hit
@@ -155,8 +192,18 @@ def contact() -> Figure:
     from stepwell.views.charts.style import COLOURS, FONT, GREY
 
     lines = (
-        ("one-sided spring, Φ = 1.5", impacts(sw.Floor(way="spring", omega=1.5)), COLOURS[2], (0.12, 0.83)),
-        ("one-sided spring, Φ = 0.5", impacts(sw.Floor(way="spring", omega=0.5)), COLOURS[1], (0.55, 0.92)),
+        (
+            "one-sided spring, Φ = 1.5",
+            impacts(sw.Floor(way="spring", omega=1.5)),
+            COLOURS[2],
+            (0.12, 0.83),
+        ),
+        (
+            "one-sided spring, Φ = 0.5",
+            impacts(sw.Floor(way="spring", omega=0.5)),
+            COLOURS[1],
+            (0.55, 0.92),
+        ),
         ("v and y turned over", mirrored(), COLOURS[4], (0.12, 1.78)),
         ("safe, and flip", impacts(sw.Floor()), "black", (0.24, 1.02)),
     )
@@ -169,13 +216,25 @@ def contact() -> Figure:
             axes.text(*place, name, color=colour, weight="bold")
         axes.set_xlim(0.0, 1.0)
         axes.set_ylim(0.78, 1.92)
-        axes.set_xlabel("phase: height above the floor at the start of the step, as a share of the way of that step")
+        axes.set_xlabel(
+            "phase: height above the floor at the start of the step, as a share of the way of that step"
+        )
         axes.set_ylabel("energy after the impact / before it")
         axes.spines[["top", "right"]].set_visible(False)
         figure.text(
-            0.012, 0.94, "An impact adds energy or takes it, by its phase; the safe way does neither", size=19, weight="bold"
+            0.012,
+            0.94,
+            "An impact adds energy or takes it, by its phase; the safe way does neither",
+            size=19,
+            weight="bold",
         )
-        figure.text(0.012, 0.885, "Leapfrog, e = 1, h·g = 0.2 of the speed of impact.", size=13, color=GREY)
+        figure.text(
+            0.012,
+            0.885,
+            "Leapfrog, e = 1, h·g = 0.2 of the speed of impact.",
+            size=13,
+            color=GREY,
+        )
     return figure
 
 
@@ -185,10 +244,22 @@ def tumbling() -> Figure:
     from matplotlib.figure import Figure
     from stepwell.views.charts.style import COLOURS, FONT, GREY
 
-    thrown = sw.Rods([1.0, 2.0], [(0, 1)], 1.0, gravity=9.81, floor=sw.Floor(restitution=0.5, friction=0.3), dim=2)
-    start: dict[str, Any] = {"v": [[3.6, 1.0], [2.4, 1.8]], "y": [[0.0, 0.8], [0.8, 1.4]]}
+    thrown = sw.Rods(
+        [1.0, 2.0],
+        [(0, 1)],
+        1.0,
+        gravity=9.81,
+        floor=sw.Floor(restitution=0.5, friction=0.3),
+        dim=2,
+    )
+    start: dict[str, Any] = {
+        "v": [[3.6, 1.0], [2.4, 1.8]],
+        "y": [[0.0, 0.8], [0.8, 1.4]],
+    }
     control = sw.Projection("length")
-    run = sw.integrate(thrown, "rk4", **start, dt=1 / 240, steps=600, every=8, control=control)
+    run = sw.integrate(
+        thrown, "rk4", **start, dt=1 / 240, steps=600, every=8, control=control
+    )
     angle = np.linspace(0.0, 0.5 * np.pi, 91)
     rod = np.stack([np.sin(angle), np.cos(angle)])
     y = np.stack([np.zeros_like(rod), rod])
@@ -197,7 +268,9 @@ def tumbling() -> Figure:
     bell = sw.Rods([1.0, 1.0], [(0, 1)], 1.0, gravity=0.0, floor=sw.Floor(), dim=2)
     together = sw.integrate(bell, "rk4", v=v, y=y, dt=1e-6, steps=1, control=control)
     bare = sw.Rods([1.0, 1.0], [(0, 1)], 1.0, gravity=0.0, dim=2)
-    v[0, 1] = np.where(angle < 0.5 * np.pi, 1.0, v[0, 1])  # the point alone returns, then velocities along the rod are removed
+    v[0, 1] = np.where(
+        angle < 0.5 * np.pi, 1.0, v[0, 1]
+    )  # the point alone returns, then velocities along the rod are removed
     apart = sw.integrate(bare, "rk4", v=v, y=y, dt=1e-6, steps=1, control=control)
     with rc_context(FONT):
         figure = Figure(figsize=(12.0, 5.2), dpi=100)
@@ -205,7 +278,14 @@ def tumbling() -> Figure:
         for i, place in enumerate(run.y):
             late = 0.25 + 0.75 * i / len(run.y)
             axes.plot(*place.T, color="black", alpha=late, linewidth=1.2, zorder=1)
-            axes.scatter(*place.T, s=[22.0, 44.0], color=[COLOURS[1], COLOURS[2]], alpha=late, zorder=2, linewidths=0.0)
+            axes.scatter(
+                *place.T,
+                s=[22.0, 44.0],
+                color=[COLOURS[1], COLOURS[2]],
+                alpha=late,
+                zorder=2,
+                linewidths=0.0,
+            )
         axes.axhline(0.0, color="black", linewidth=1.5, zorder=0)
         axes.set_aspect("equal")
         axes.set_axis_off()
@@ -216,12 +296,26 @@ def tumbling() -> Figure:
         ):
             right.plot(np.degrees(angle), ended.energy[-1], color=colour, linewidth=2.2)
             right.text(*at, name, color=colour, weight="bold")
-        right.set(xlim=(0.0, 89.0), ylim=(0.0, 1.15), xlabel="angle between rod and vertical, degrees")
+        right.set(
+            xlim=(0.0, 89.0),
+            ylim=(0.0, 1.15),
+            xlabel="angle between rod and vertical, degrees",
+        )
         right.set_ylabel("energy after / before")
         right.spines[["top", "right"]].set_visible(False)
-        figure.text(0.012, 0.92, "An impulse at one end of a rod acts on the other at the same instant", size=19, weight="bold")
         figure.text(
-            0.012, 0.855, "Left: e = 0.5, μ = 0.3, until it rests. Right: e = 1, an end meets the floor.", size=13, color=GREY
+            0.012,
+            0.92,
+            "An impulse at one end of a rod acts on the other at the same instant",
+            size=19,
+            weight="bold",
+        )
+        figure.text(
+            0.012,
+            0.855,
+            "Left: e = 0.5, μ = 0.3, until it rests. Right: e = 1, an end meets the floor.",
+            size=13,
+            color=GREY,
         )
     return figure
 
@@ -240,24 +334,74 @@ def tape() -> Figure:
     axes.set(xlim=(0, 100), ylim=(0, 46))
 
     def box(
-        x: float, y: float, width: float, height: float, title: str, text: str, shade: str = "#ffffff", mono: bool = True
+        x: float,
+        y: float,
+        width: float,
+        height: float,
+        title: str,
+        text: str,
+        shade: str = "#ffffff",
+        mono: bool = True,
     ) -> None:
         axes.add_patch(
-            FancyBboxPatch((x, y), width, height, boxstyle="round,pad=0,rounding_size=0.8", facecolor=shade, edgecolor="#333333")
+            FancyBboxPatch(
+                (x, y),
+                width,
+                height,
+                boxstyle="round,pad=0,rounding_size=0.8",
+                facecolor=shade,
+                edgecolor="#333333",
+            )
         )
         axes.text(x + 1, y + height - 1, title, fontsize=12, weight="bold", va="top")
         family = "monospace" if mono else "sans-serif"
-        axes.text(x + 1, y + height - 3.9, text, fontsize=11, family=family, va="top", linespacing=1.45)
+        axes.text(
+            x + 1,
+            y + height - 3.9,
+            text,
+            fontsize=11,
+            family=family,
+            va="top",
+            linespacing=1.45,
+        )
 
     def arrow(start: tuple[float, float], end: tuple[float, float]) -> None:
         axes.annotate(
-            "", end, start, arrowprops={"arrowstyle": "-|>", "color": "#333333", "linewidth": 1.6, "mutation_scale": 18}
+            "",
+            end,
+            start,
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": "#333333",
+                "linewidth": 1.6,
+                "mutation_scale": 18,
+            },
         )
 
-    for x, head in ((2, "Source, once in each language"), (41, "Tape of one step"), (67, "Readers")):
+    for x, head in (
+        (2, "Source, once in each language"),
+        (41, "Tape of one step"),
+        (67, "Readers"),
+    ):
         axes.text(x, 44.5, head, fontsize=15, va="top")
-    box(2, 29, 30, 12, "A method, over blocks: False Euler", "v = v + s.dv(t, v, y)\ny = y + s.dy(t, v, y)", "#f2f2f2")
-    box(2, 15, 30, 12, "A system, over numbers: the oscillator", "dv = -(stiffness * y)\ndy = speed * v", "#f2f2f2")
+    box(
+        2,
+        29,
+        30,
+        12,
+        "A method, over blocks: False Euler",
+        "v = v + s.dv(t, v, y)\ny = y + s.dy(t, v, y)",
+        "#f2f2f2",
+    )
+    box(
+        2,
+        15,
+        30,
+        12,
+        "A system, over numbers: the oscillator",
+        "dv = -(stiffness * y)\ndy = speed * v",
+        "#f2f2f2",
+    )
     box(
         2,
         1,
@@ -269,11 +413,27 @@ def tape() -> Figure:
         mono=False,
     )
     box(41, 1, 20, 40, "v, y → v, y", symbols.listing(y).rstrip(), "#dcdcdc")
-    axes.text(42, 12.6, "%6 is the same in every step:\ncomputed once, before them", fontsize=10, va="top", style="italic")
-    axes.text(42, 7.6, "the last four lines\nare the hot loop", fontsize=10, va="top", style="italic")
+    axes.text(
+        42,
+        12.6,
+        "%6 is the same in every step:\ncomputed once, before them",
+        fontsize=10,
+        va="top",
+        style="italic",
+    )
+    axes.text(
+        42,
+        7.6,
+        "the last four lines\nare the hot loop",
+        fontsize=10,
+        va="top",
+        style="italic",
+    )
     for height in (35, 21, 7):
         arrow((32.3, height), (40.7, height))
-    axes.text(36.4, 36.2, "run once\nwith symbols", fontsize=10, ha="center", va="bottom")
+    axes.text(
+        36.4, 36.2, "run once\nwith symbols", fontsize=10, ha="center", va="bottom"
+    )
     readers = (
         ("Kernel writer", "machine code at run time (AVX2, AVX-512, NEON)"),
         ("Interpreter", "the same bits, on any machine"),
@@ -300,7 +460,10 @@ def cloth() -> Figure:
     for i, (t, y) in enumerate(zip(run.t, run.y, strict=True)):
         axes = figure.add_axes((0.01 + 0.245 * i, 0.02, 0.24, 0.9))
         net = y.reshape(n, n, 3)
-        seen = np.stack([net[..., 0] + 0.55 * net[..., 1], net[..., 2] + 0.35 * net[..., 1]], axis=-1)
+        seen = np.stack(
+            [net[..., 0] + 0.55 * net[..., 1], net[..., 2] + 0.35 * net[..., 1]],
+            axis=-1,
+        )
         for line in (*seen, *seen.transpose(1, 0, 2)):
             axes.plot(*line.T, color="#333333", linewidth=0.6)
         axes.plot(*seen[0, [0, -1]].T, "o", color="#000000", markersize=6)
@@ -335,7 +498,9 @@ def where_methods_fail() -> Figure:
     def exact(t: Any) -> Any:
         return np.outer(-np.sin(t), [1, 1]), np.outer(np.cos(t), [1, 1])
 
-    scene = sw.Scene(sw.Chain(2, stiffness=[1.0, 1e6, 1.0]), v=0.0, y=1.0, horizon=10.0, exact=exact)
+    scene = sw.Scene(
+        sw.Chain(2, stiffness=[1.0, 1e6, 1.0]), v=0.0, y=1.0, horizon=10.0, exact=exact
+    )
     limits = {name: float(sw.stability_limit(scene.system, name)) for name in EXPLICIT}
     most = max(limits.values())
     with rc_context(FONT):
@@ -344,11 +509,20 @@ def where_methods_fail() -> Figure:
         axes.set(xscale="log", yscale="log", xlim=(1e-4, 1.0), ylim=(1e-16, 10.0))
         for names, colour in ((EXPLICIT, EXPLICIT_COLOUR), (IMPLICIT, IMPLICIT_COLOUR)):
             for name, (x, y, turn) in names.items():
-                steps = 10.0 / np.rint(10.0 / np.geomspace(1e-4, min(limits.get(name, 1.0), 1.0), 40))
-                errors = [error_of(scene, name, dt) for dt in steps if dt < limits.get(name, np.inf)]
+                steps = 10.0 / np.rint(
+                    10.0 / np.geomspace(1e-4, min(limits.get(name, 1.0), 1.0), 40)
+                )
+                errors = [
+                    error_of(scene, name, dt)
+                    for dt in steps
+                    if dt < limits.get(name, np.inf)
+                ]
                 steps = steps[: len(errors)]
                 if name in limits:
-                    steps, errors = np.append(steps, [limits[name]] * 2), [*errors, errors[-1], 10.0]
+                    steps, errors = (
+                        np.append(steps, [limits[name]] * 2),
+                        [*errors, errors[-1], 10.0],
+                    )
                 axes.plot(steps, np.maximum(errors, 1e-16), color=colour, linewidth=2.2)
                 axes.text(
                     x,
@@ -361,7 +535,13 @@ def where_methods_fail() -> Figure:
                     ha="right" if turn else "left",
                 )
         axes.axvspan(most, 1.0, color="#f0f0f0", zorder=0)
-        axes.text(most * 1.1, 2.0, f"no explicit method is stable beyond {most:.2g}", size=12.5, color="#333333")
+        axes.text(
+            most * 1.1,
+            2.0,
+            f"no explicit method is stable beyond {most:.2g}",
+            size=12.5,
+            color="#333333",
+        )
         axes.set_xlabel("step")
         axes.set_ylabel("largest error over 10 units of time, relative")
         axes.spines[["top", "right"]].set_visible(False)
@@ -381,7 +561,9 @@ def where_methods_fail() -> Figure:
 
 def error_of(scene: sw.Scene, method: str, dt: float) -> float:
     """The largest state error of a run."""
-    return float(scene.state_error(scene.run(method, dt, every=max(1, round(0.01 / dt)))).max())
+    return float(
+        scene.state_error(scene.run(method, dt, every=max(1, round(0.01 / dt)))).max()
+    )
 
 
 ROOT = DOCS.parent
@@ -389,22 +571,41 @@ ROOT = DOCS.parent
 
 def layers_of_package() -> list[tuple[str, str]]:
     """The layers of the linter's contract, from the top, each with the first line of its docstring."""
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
-    names = next(contract["layers"] for contract in contracts if contract["type"] == "layers")
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))[
+        "tool"
+    ]["importlinter"]["contracts"]
+    names = next(
+        contract["layers"] for contract in contracts if contract["type"] == "layers"
+    )
     source = ROOT / "python" / "stepwell"
-    texts = [ast.get_docstring(ast.parse((source / name / "__init__.py").read_text(encoding="utf-8"))) or "" for name in names]
-    return [(name, text.splitlines()[0]) for name, text in zip(names, texts, strict=True)]
+    texts = [
+        ast.get_docstring(
+            ast.parse((source / name / "__init__.py").read_text(encoding="utf-8"))
+        )
+        or ""
+        for name in names
+    ]
+    return [
+        (name, text.splitlines()[0]) for name, text in zip(names, texts, strict=True)
+    ]
 
 
 def layers_of_core() -> list[tuple[str, str]]:
     """The layers of the test of imports, from the top, each with the first line of its file."""
     core = ROOT / "rust" / "core"
-    order = re.search(r"const LAYERS: .*?\[([^\]]*)\];", (core / "tests" / "layers.rs").read_text(encoding="utf-8"))
+    order = re.search(
+        r"const LAYERS: .*?\[([^\]]*)\];",
+        (core / "tests" / "layers.rs").read_text(encoding="utf-8"),
+    )
     assert order is not None
     layers = []
     for name in reversed(re.findall(r"\w+", order[1])):
         files = [core / "src" / name / "mod.rs", core / "src" / f"{name}.rs"]
-        first = next(file for file in files if file.exists()).read_text(encoding="utf-8").splitlines()[0]
+        first = (
+            next(file for file in files if file.exists())
+            .read_text(encoding="utf-8")
+            .splitlines()[0]
+        )
         layers.append((name, first.removeprefix("//! ")))
     return layers
 
@@ -414,7 +615,10 @@ def layers() -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.patches import FancyBboxPatch
 
-    columns = {"Package: python/stepwell/": layers_of_package(), "Core: rust/core/src/": layers_of_core()}
+    columns = {
+        "Package: python/stepwell/": layers_of_package(),
+        "Core: rust/core/src/": layers_of_core(),
+    }
     figure = Figure(figsize=(14, 7.4))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
@@ -426,11 +630,27 @@ def layers() -> Figure:
             y = 48.0 - height * (i + 1)
             shape = "round,pad=0,rounding_size=0.6"
             axes.add_patch(
-                FancyBboxPatch((x, y + 0.35), 47, height - 0.7, boxstyle=shape, facecolor="#f2f2f2", edgecolor="#333333")
+                FancyBboxPatch(
+                    (x, y + 0.35),
+                    47,
+                    height - 0.7,
+                    boxstyle=shape,
+                    facecolor="#f2f2f2",
+                    edgecolor="#333333",
+                )
             )
             sentence = text.replace("``", "").partition(". ")[0].removesuffix(".")
-            axes.text(x + 1, y + height / 2, name, fontsize=12.5, weight="bold", va="center")
-            axes.text(x + 9, y + height / 2, textwrap.fill(sentence, 60), fontsize=11, va="center", linespacing=1.3)
+            axes.text(
+                x + 1, y + height / 2, name, fontsize=12.5, weight="bold", va="center"
+            )
+            axes.text(
+                x + 9,
+                y + height / 2,
+                textwrap.fill(sentence, 60),
+                fontsize=11,
+                va="center",
+                linespacing=1.3,
+            )
     return figure
 
 
@@ -443,14 +663,22 @@ if __name__ == "__main__":
     write("where-methods-fail.png", where_methods_fail())
     examples()
     turns = sw.scenes.aircraft()
-    write("aircraft.png", sw.charts.run_picture(turns, turns.run("false_euler", every=1)).plot())
+    write(
+        "aircraft.png",
+        sw.charts.run_picture(turns, turns.run("false_euler", every=1)).plot(),
+    )
     wing_nut()
     top = sw.scenes.heavy_top()
     write("heavy-top.png", sw.charts.run_picture(top, top.run("rk4", every=1)).plot())
     panels = {name: sw.charts.panel(scenes) for name, scenes in FAMILIES.items()}
     for name, panel in panels.items():
         write(name, panel.plot(), PANEL_DPI)
-    write_best(chart for name, panel in panels.items() if name not in NO_ROWS for chart in panel.charts)
+    write_best(
+        chart
+        for name, panel in panels.items()
+        if name not in NO_ROWS
+        for chart in panel.charts
+    )
     stability = sw.charts.stability()
     write("stability-loci.png", stability.plot(kind="loci"))
     write("stability-curves.png", stability.plot(kind="curves"))
@@ -463,6 +691,12 @@ if __name__ == "__main__":
     eight = sw.scenes.figure_eight()
     assert eight.period is not None
     periods: dict[str, Any] = {"horizon": 100 * eight.period, "evaluations": 100_000}
-    write("control-figure-eight.png", sw.charts.control(eight, **periods, title="Figure-eight, 100 periods").plot())
-    write("control-appendix-d.png", sw.charts.control("energy_control", title="Appendix D").plot())
+    write(
+        "control-figure-eight.png",
+        sw.charts.control(eight, **periods, title="Figure-eight, 100 periods").plot(),
+    )
+    write(
+        "control-appendix-d.png",
+        sw.charts.control("energy_control", title="Appendix D").plot(),
+    )
     write("control-rods.png", sw.charts.control("conical_pendulum").plot())

@@ -34,7 +34,9 @@ class Public(SphinxDirective):
         names = []
         for name in getattr(module, "__all__", None) or dir(module):
             thing = getattr(module, name)
-            if name.startswith("_") or not (inspect.isclass(thing) or inspect.isfunction(thing)):
+            if name.startswith("_") or not (
+                inspect.isclass(thing) or inspect.isfunction(thing)
+            ):
                 continue
             # What stepwell itself lists is told of by the name that it has there; what a module only imports, elsewhere.
             here = _within(thing.__module__, (module.__name__,)) and (
@@ -44,15 +46,30 @@ class Public(SphinxDirective):
                 names.append((name, thing))
         if not names:
             raise self.error(f"{self.arguments[0]} lists nothing from {wanted}")
-        lines = ["````{eval-rst}", f".. currentmodule:: {module.__name__}", "", ".. autosummary::", "   :nosignatures:", ""]
+        lines = [
+            "````{eval-rst}",
+            f".. currentmodule:: {module.__name__}",
+            "",
+            ".. autosummary::",
+            "   :nosignatures:",
+            "",
+        ]
         lines += [f"   {name}" for name, _ in names]
         for name, thing in names:
             kind = "autofunction" if inspect.isfunction(thing) else "autoclass"
             if kind == "autoclass" and issubclass(thing, BaseException):
                 kind = "autoexception"
-            lines += ["", f".. {kind}:: {name}", *(["   :members:"] if kind == "autoclass" else [])]
+            lines += [
+                "",
+                f".. {kind}:: {name}",
+                *(["   :members:"] if kind == "autoclass" else []),
+            ]
         node = nodes.Element()
-        self.state.nested_parse(StringList([*lines, "````"], self.get_source_info()[0]), self.content_offset, node)
+        self.state.nested_parse(
+            StringList([*lines, "````"], self.get_source_info()[0]),
+            self.content_offset,
+            node,
+        )
         return node.children
 
 
@@ -60,7 +77,9 @@ def _within(module: str, wanted: tuple[str, ...]) -> bool:
     return any(module == each or module.startswith(f"{each}.") for each in wanted)
 
 
-def as_text(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+def as_text(
+    app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]
+) -> None:
     """Stars and bars of a docstring mean themselves, as in a shape or a length; examples stay as they are."""
     example = False
     for i, line in enumerate(lines):
@@ -76,14 +95,26 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory()
 
 
-def folder_for_pictures(gallery_conf: dict[str, Any], script: dict[str, Any]) -> list[str]:
+def folder_for_pictures(
+    gallery_conf: dict[str, Any], script: dict[str, Any]
+) -> list[str]:
     """Arguments of an example: the folder for its picture, which the site does not need, since it takes the figure itself."""
     return [_folder().name]
 
 
 def without_constructor(
-    app: Any, what: str, name: str, thing: Any, options: Any, signature: str | None, returns: str | None
+    app: Any,
+    what: str,
+    name: str,
+    thing: Any,
+    options: Any,
+    signature: str | None,
+    returns: str | None,
 ) -> tuple[str, str | None] | None:
     """What is returned and not made by a user, and so has attributes and no arguments, is shown without its arguments."""
     told = inspect.getdoc(thing) or ""
-    return ("", returns) if what == "class" and "Attributes:" in told and "Args:" not in told else None
+    return (
+        ("", returns)
+        if what == "class" and "Attributes:" in told and "Args:" not in told
+        else None
+    )

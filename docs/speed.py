@@ -66,9 +66,15 @@ def tables() -> dict[str, dict[str, dict[str, str]]]:
     """The tables of the report: by title, contestant and head of a column."""
     found: dict[str, dict[str, dict[str, str]]] = {}
     for part in RESULTS.read_text(encoding="utf-8").split("\n## ")[1:]:
-        rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in part.splitlines() if line.startswith("|")]
+        rows = [
+            [cell.strip() for cell in line.strip("|").split(" | ")]
+            for line in part.splitlines()
+            if line.startswith("|")
+        ]
         if len(rows) > 2:
-            found[part.partition("\n")[0]] = {row[0]: dict(zip(rows[0], row, strict=False)) for row in rows[2:]}
+            found[part.partition("\n")[0]] = {
+                row[0]: dict(zip(rows[0], row, strict=False)) for row in rows[2:]
+            }
     return found
 
 
@@ -77,24 +83,34 @@ def ratios() -> list[Ratios]:
     made = []
     every = tables()
     for begin, name in WORKS.items():
-        table = next((rows for title, rows in every.items() if title.startswith(begin)), None)
+        table = next(
+            (rows for title, rows in every.items() if title.startswith(begin)), None
+        )
         if table is None:
             continue
         peer = "C" if "C" in table else "numba"
         unit = list(next(iter(table.values())))[1]
         slow = unit.endswith("/step")  # a time, not a speed
-        plain, fused = table["stepwell, 1 thread"], table.get("stepwell, fused, 1 thread", table["stepwell, 1 thread"])
-        (own, exact), (own_best, best) = (
-            [float(row[unit]) for row in pair] for pair in ((plain, table[f"{peer}, exact"]), (fused, table[peer]))
+        plain, fused = (
+            table["stepwell, 1 thread"],
+            table.get("stepwell, fused, 1 thread", table["stepwell, 1 thread"]),
         )
-        both = (exact / own, best / own_best) if slow else (own / exact, own_best / best)
+        (own, exact), (own_best, best) = (
+            [float(row[unit]) for row in pair]
+            for pair in ((plain, table[f"{peer}, exact"]), (fused, table[peer]))
+        )
+        both = (
+            (exact / own, best / own_best) if slow else (own / exact, own_best / best)
+        )
         made.append(Ratios(name, peer, *both, plain["error"]))
     return made
 
 
 def rows() -> list[list[str]]:
     """The table, row by row."""
-    return [[r.name, r.peer, f"{r.exact:.2f}", f"{r.best:.2f}", r.error] for r in ratios()]
+    return [
+        [r.name, r.peer, f"{r.exact:.2f}", f"{r.best:.2f}", r.error] for r in ratios()
+    ]
 
 
 def draw() -> None:
@@ -103,23 +119,40 @@ def draw() -> None:
     from stepwell.base.pictures import png
 
     found = ratios()
-    figure, axes = plt.subplots(figsize=(8.6, 0.31 * len(found) + 1.3), layout="constrained")
+    figure, axes = plt.subplots(
+        figsize=(8.6, 0.31 * len(found) + 1.3), layout="constrained"
+    )
     exact, best = "#175ca6", "#c75a22"
     for place, r in enumerate(found):
         y = len(found) - 1 - place
         axes.plot([r.exact, r.best], [y, y], color="#bbbbbb", linewidth=1.2, zorder=1)
         axes.plot(r.exact, y, "o", color=exact, markersize=7, zorder=3)
-        axes.plot(r.best, y, "D", color="white", markeredgecolor=best, markeredgewidth=1.6, markersize=6, zorder=2)
+        axes.plot(
+            r.best,
+            y,
+            "D",
+            color="white",
+            markeredgecolor=best,
+            markeredgewidth=1.6,
+            markersize=6,
+            zorder=2,
+        )
     axes.axvline(1.0, color="#222222", linewidth=1.0, zorder=0)
     axes.set_xscale("log")
     every = [each for r in found for each in (r.exact, r.best)]
     low, high = min(0.45, *every) / 1.08, max(2.0, *every) * 1.08  # no point is cut off
-    ticks = [tick for tick in (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0) if low <= tick <= high]
+    ticks = [
+        tick
+        for tick in (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
+        if low <= tick <= high
+    ]
     axes.set_xticks(ticks, [f"{tick:g}×" for tick in ticks])
     axes.minorticks_off()
     axes.set_xlim(low, high)
     axes.set_ylim(-0.7, len(found) + 1.2)
-    axes.set_yticks(range(len(found)), [f"{r.name}  ({r.peer})" for r in reversed(found)])
+    axes.set_yticks(
+        range(len(found)), [f"{r.name}  ({r.peer})" for r in reversed(found)]
+    )
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="x", color="#e4e4e4", linewidth=0.8)
     axes.set_axisbelow(True)

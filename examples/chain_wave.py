@@ -1,7 +1,8 @@
 """A kick runs along a chain of 400 masses between two walls.
 
-Long waves run at √(k/m) masses per unit of time, short ones slower, so the front arrives first and a wake follows. The
-fastest mode of a long chain has nearly ω = 2√(k/m), so Verlet and False Euler are stable for steps up to 1/√(k/m).
+Long waves run at √(k/m) masses per unit of time, short ones slower, so the front
+arrives first and a wake follows. The fastest mode of a long chain has nearly ω =
+2√(k/m), so Verlet and False Euler are stable for steps up to 1/√(k/m).
 """
 
 import warnings
@@ -23,7 +24,10 @@ def main() -> None:
     for saved in (20, 100, 200):
         y = run.y[saved]
         front = np.flatnonzero(abs(y) > 0.25 * abs(y).max()).max()
-        print(f"t = {run.t[saved]:5.1f}: front at mass {front:3d}, a wave of speed √(k/m) at {SPEED * run.t[saved]:3.0f}")
+        print(
+            f"t = {run.t[saved]:5.1f}: front at mass {front:3d}, a wave of speed "
+            f"√(k/m) at {SPEED * run.t[saved]:3.0f}"
+        )
     wander = abs(run.energy - run.energy[0]).max() / run.energy[0]
 
     for dt in (0.999 / SPEED, 1.001 / SPEED):

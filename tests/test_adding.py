@@ -118,7 +118,9 @@ def test_the_command_line_and_the_docs_show_it(tree: Path) -> None:
     assert "midpoint" in run(tree, "-m", "stepwell", "methods", "--json")
     # All pages with tables of methods; what the document says of its own ones does not change.
     run(tree, "docs/generate.py", "docs/howto/methods.md", "docs/developing/naming.md", "docs/theory/stability.md")
-    assert "| `midpoint` | Midpoint | explicit midpoint rule | 2 | 2 |" in (tree / "docs" / "howto" / "methods.md").read_text(encoding="utf-8")
+    assert "| `midpoint` | Midpoint | explicit midpoint rule | 2 | 2 |" in (tree / "docs" / "howto" / "methods.md").read_text(
+        encoding="utf-8"
+    )
     run(tree, "-m", "stepwell", "chart", "oscillator", "-o", "out", "--methods", "midpoint,rk4")
     assert "midpoint" in (tree / "out" / "oscillator.csv").read_text(encoding="utf-8")
 

@@ -21,7 +21,11 @@ PAGES = [ROOT / name for name in AT_THE_ROOT] + sorted((ROOT / "docs").rglob("*.
 FOLDERS = ["benches", "docs", "examples", "python", "rust", "tests"]
 
 FENCE = re.compile(r"(?:<!-- file: python/(\S+)\.py -->\n)?^```([^`\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-SAID = re.compile(r"#\s*→ (.*)$", re.MULTILINE)
+SAID = re.compile(r"#\s*→ (.*(?:\n\s*#   \S.*)*)$", re.MULTILINE)
+#: A line of output that is too long for the page goes on behind ``#`` and three spaces.
+GOES_ON = re.compile(r"\n\s*#   ")
+#: The columns of a page.
+COLUMNS = 88
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 NAMED = re.compile(r"`([\w.*{},/-]+(?:/|\.(?:rs|py|pyi|md|toml|txt|png)))`")
 INTRODUCED = re.compile(r"<!-- file: (\S+) -->")
@@ -66,8 +70,22 @@ def test_python_blocks_run_and_print_what_they_say(page, tmp_path, monkeypatch):
             exec(compile("\n" * line + code, str(page), "exec"), namespace)
         if module:  # later blocks may import it
             monkeypatch.setitem(sys.modules, module, types.SimpleNamespace(**namespace))
-        expected = SAID.findall(code)
+        expected = [GOES_ON.sub(" ", said) for said in SAID.findall(code)]
         assert printed.getvalue().splitlines() == expected, f"{page.name}, block at line {line}"
+
+
+@pages
+def test_code_is_as_wide_as_the_page(page):
+    """Wider code scrolls sideways, on the site and on a screen of a laptop."""
+    if page.name == "CHANGELOG.md":
+        return
+    shown = [m[3] for m in FENCE.finditer(text(page)) if m[2] == "python" or m[2].startswith("{code-cell}")]
+    assert [line for code in shown for line in code.splitlines() if len(line) > COLUMNS] == []
+
+
+def test_links_have_words_as_texts():
+    files = re.compile(r"\[`?[\w/.-]+\.(?:md|rst)`?\]\(")
+    assert [(page.name, link) for page in PAGES for link in files.findall(prose(page))] == []
 
 
 def test_blocks_are_found_and_compared():

@@ -3,8 +3,9 @@
 
 Neurons: which current makes Hodgkin and Huxley's axon fire, and how often.
 
-Firing is possible from 6.26 µA/cm² on, and rest loses its stability at 9.78 (Rinzel and Miller 1980). A current that is switched
-on at rest makes the axon fire for good soon beyond the first, and at once fifty times a second: there is no slow firing.
+Firing is possible from 6.26 µA/cm² on, and rest loses its stability at 9.78 (Rinzel and
+Miller 1980). A current that is switched on at rest makes the axon fire for good soon
+beyond the first, and at once fifty times a second: there is no slow firing.
 """
 
 import sys
@@ -22,7 +23,9 @@ def ratio(x):
 @sw.system(order=1)
 def axon(t, y, *, current=0.0):  # mV, ms, µA/cm², with rest at 0 mV, at 6.3 °C
     v, m, h, n = y
-    ionic = 120.0 * m**3 * h * (v - 115.0) + 36.0 * n**4 * (v + 12.0) + 0.3 * (v - 10.613)
+    ionic = (
+        120.0 * m**3 * h * (v - 115.0) + 36.0 * n**4 * (v + 12.0) + 0.3 * (v - 10.613)
+    )
     return np.array(
         [
             current - ionic,
@@ -35,7 +38,8 @@ def axon(t, y, *, current=0.0):  # mV, ms, µA/cm², with rest at 0 mV, at 6.3 �
 
 FIRING, UNSTABLE = 6.26, 9.78  # Rinzel and Miller (1980), in µA/cm²
 REST = np.array([0.0, 0.053, 0.596, 0.318])
-DT, STEPS, SETTLING = 0.025, 24_000, 12_000  # in ms; 600 ms, of which the last 300 count
+# in ms; 600 ms, of which the last 300 count
+DT, STEPS, SETTLING = 0.025, 24_000, 12_000
 
 
 def growth(current):
@@ -48,10 +52,14 @@ def main(folder: Path) -> None:
     assert growth(UNSTABLE - 0.01) < 0.0 < growth(UNSTABLE + 0.01)
 
     current = np.linspace(0.0, 20.0, 81)
-    run = sw.integrate(axon(current=current), "rk4", y=REST[:, None], dt=DT, steps=STEPS, every=4)
+    run = sw.integrate(
+        axon(current=current), "rk4", y=REST[:, None], dt=DT, steps=STEPS, every=4
+    )
     v = run.y[SETTLING // 4 :, 0]
     spikes = (v[:-1] < 50.0) & (v[1:] >= 50.0)
-    first_to_last = len(spikes) - 1 - spikes[::-1].argmax(axis=0) - spikes.argmax(axis=0)
+    first_to_last = (
+        len(spikes) - 1 - spikes[::-1].argmax(axis=0) - spikes.argmax(axis=0)
+    )
     rate = np.maximum(spikes.sum(axis=0) - 1, 0) / (4e-3 * DT * first_to_last)  # in Hz
     onset, slowest = current[rate > 0.0].min(), rate[rate > 0.0].min()
     assert FIRING < onset < FIRING + 0.25, onset  # the next current of the sweep
@@ -61,15 +69,27 @@ def main(folder: Path) -> None:
     axes = figure.add_subplot()
     axes.plot(current, rate, "o", color="#0072b2", markersize=4)
     axes.axvline(UNSTABLE, color="#666666", linestyle="--")
-    axes.text(UNSTABLE + 0.2, 8, f"rest is unstable beyond\n{UNSTABLE} µA/cm²", color="#444444")
     axes.text(
-        onset - 0.3, slowest, f"fires from {onset:g} µA/cm² on,\nat once with {slowest:.0f} Hz", color="#0072b2", ha="right"
+        UNSTABLE + 0.2,
+        8,
+        f"rest is unstable beyond\n{UNSTABLE} µA/cm²",
+        color="#444444",
+    )
+    axes.text(
+        onset - 0.3,
+        slowest,
+        f"fires from {onset:g} µA/cm² on,\nat once with {slowest:.0f} Hz",
+        color="#0072b2",
+        ha="right",
     )
     axes.set(xlabel="current in µA/cm²", ylabel="spikes per second", xlim=(0, 20))
     axes.set_title("An axon is silent, or fires fast: 81 currents in one call")
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(folder / "neuron.png")
-    print(f"fires from {onset:g} µA/cm² on, with {slowest:.0f} Hz; rest is unstable beyond {UNSTABLE}")
+    print(
+        f"fires from {onset:g} µA/cm² on, with {slowest:.0f} Hz; rest is unstable "
+        f"beyond {UNSTABLE}"
+    )
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """Methods swing too fast or too slow
 ==================================
 
-The frequency that each method gives an undamped oscillator, over the angle Φ of a step. False Euler is 4.7 % too fast with six
-steps a period; Runge-Kutta 4 half a percent too slow.
+The frequency that each method gives an undamped oscillator, over the angle Φ of a step.
+False Euler is 4.7 % too fast with six steps a period; Runge-Kutta 4 half a percent too
+slow.
 """
 
 import matplotlib.pyplot as plt
@@ -23,7 +24,17 @@ for name, (colour, place) in METHODS.items():
     found = sw.analyse(sw.Oscillator(), name, dt=phi)
     axes.plot(phi, 100.0 * (found.frequency_ratio - 1.0), color=colour, linewidth=2)
     axes.text(*place, sw.method(name).title, color=colour, weight="bold")
-assert abs(sw.analyse(sw.Oscillator(), "false_euler", dt=1.0).frequency_ratio - np.pi / 3.0) < 1e-12
+assert (
+    abs(
+        sw.analyse(sw.Oscillator(), "false_euler", dt=1.0).frequency_ratio - np.pi / 3.0
+    )
+    < 1e-12
+)
 axes.axhline(0.0, color="#b8b8b8", linewidth=1)
-axes.set(xlabel="Φ = ω₀·dt, the angle of a step", ylabel="frequency too high by, in %", xlim=(0, 1.55), ylim=(-20, 14))
+axes.set(
+    xlabel="Φ = ω₀·dt, the angle of a step",
+    ylabel="frequency too high by, in %",
+    xlim=(0, 1.55),
+    ylim=(-20, 14),
+)
 axes.spines[["top", "right"]].set_visible(False)

@@ -1,8 +1,9 @@
 """A comet's step is set where it passes the sun
 =============================================
 
-The longest step for which leapfrog is stable, at every state of one turn on an ellipse. Far out it may be eighty times as long
-as where the two bodies are nearest; a fixed step has to be the shortest.
+The longest step for which leapfrog is stable, at every state of one turn on an ellipse.
+Far out it may be eighty times as long as where the two bodies are nearest; a fixed step
+has to be the shortest.
 """
 
 import matplotlib.pyplot as plt
@@ -21,6 +22,11 @@ drawn = axes.scatter(*apart.T, c=np.log10(at), s=26, cmap="cividis")
 axes.plot(0.0, 0.0, "o", color="#c75a22", markersize=10)
 bar = figure.colorbar(drawn, label="longest stable step, in units of time", shrink=0.8)
 bar.set_ticks([-1, 0], labels=["0.1", "1"])
-axes.annotate(f"no more than {float(along.dt):.3f} here", apart[0], (-0.9, 0.75), arrowprops={"arrowstyle": "->"})
+axes.annotate(
+    f"no more than {float(along.dt):.3f} here",
+    apart[0],
+    (-0.9, 0.75),
+    arrowprops={"arrowstyle": "->"},
+)
 axes.set(aspect="equal")
 axes.set_axis_off()

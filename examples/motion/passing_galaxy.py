@@ -1,8 +1,9 @@
 """A galaxy that passes by draws a tail out of another one
 =======================================================
 
-Toomre and Toomre (1972): rings of stars without mass circle one heavy centre, and a second one passes. One side of the disc is
-drawn out into a bridge, the other into a tail.
+Toomre and Toomre (1972): rings of stars without mass circle one heavy centre, and a
+second one passes. One side of the disc is drawn out into a bridge, the other into a
+tail.
 """
 
 import matplotlib.pyplot as plt
@@ -12,17 +13,22 @@ import stepwell as sw
 STARS = (80, 120, 160, 200, 240)  # in each ring
 
 radii = np.repeat([0.2, 0.3, 0.4, 0.5, 0.6], STARS)
-angle = np.concatenate([np.linspace(0.0, 2.0 * np.pi, n, endpoint=False) for n in STARS])
+angle = np.concatenate(
+    [np.linspace(0.0, 2.0 * np.pi, n, endpoint=False) for n in STARS]
+)
 masses = np.r_[1.0, 1.0, np.zeros(len(radii))]
 ring = np.stack([radii * np.cos(angle), radii * np.sin(angle)], axis=1)
 turn = np.stack([-np.sin(angle), np.cos(angle)], axis=1) / np.sqrt(radii)[:, None]
 
-# Two centres on a parabola, nearest at distance 1 at t = 0, begun when they are 4 apart; the disc is round the first.
+# Two centres on a parabola, nearest at distance 1 at t = 0, begun when they are 4
+# apart; the disc is round the first.
 apart = 4.0
-tangent = np.sqrt(apart - 1.0)  # tan of half the angle along the parabola r = 1 + tangent²
+# tan of half the angle along the parabola r = 1 + tangent²
+tangent = np.sqrt(apart - 1.0)
 place = np.array([1.0 - tangent**2, -2.0 * tangent])
 along = np.sqrt(2.0 * 2.0) * np.array([tangent, 1.0]) / (1.0 + tangent**2)
-before = np.sqrt(2.0 / 2.0) * (tangent + tangent**3 / 3.0)  # Barker's equation, for a total mass of 2
+# Barker's equation, for a total mass of 2
+before = np.sqrt(2.0 / 2.0) * (tangent + tangent**3 / 3.0)
 y = np.vstack([[0.0, 0.0], place, ring])
 v = np.vstack([[0.0, 0.0], along, turn])
 bodies = sw.NBody(masses, force="newton", softening=0.05)

@@ -1,8 +1,8 @@
 """A rope of rods falls over a ball and rests
 ==========================================
 
-Eight points joined by seven rods, let go level. After each step a projection resets the lengths, so that the rods stay rods to
-the last digits, whatever they hit.
+Eight points joined by seven rods, let go level. After each step a projection resets the
+lengths, so that the rods stay rods to the last digits, whatever they hit.
 """
 
 import matplotlib.pyplot as plt
@@ -11,10 +11,26 @@ import stepwell as sw
 
 joined = [(i, i + 1) for i in range(7)]
 ball = sw.Sphere((1.2, 0.0), 0.5, restitution=0.3, friction=0.4)
-rope = sw.Rods(np.ones(8), joined, 0.5, gravity=9.81, floor=[sw.Floor(restitution=0.3, friction=0.4), ball])
+rope = sw.Rods(
+    np.ones(8),
+    joined,
+    0.5,
+    gravity=9.81,
+    floor=[sw.Floor(restitution=0.3, friction=0.4), ball],
+)
 level = np.stack([0.5 * np.arange(8.0), np.ones(8)], axis=1)
 keep = sw.Projection("length")
-run = sw.integrate(rope, "rk4", v=0.0, y=level, dt=1 / 120, steps=1200, every=6, control=keep, record="length_error")
+run = sw.integrate(
+    rope,
+    "rk4",
+    v=0.0,
+    y=level,
+    dt=1 / 120,
+    steps=1200,
+    every=6,
+    control=keep,
+    record="length_error",
+)
 assert run.recorded["length_error"].max() < 1e-9
 assert np.abs(run.v[-1]).max() < 1e-6
 
@@ -24,10 +40,20 @@ for k, saved in enumerate(shown):
     shade = 0.75 - 0.15 * k
     last = saved == shown[-1]
     axes.plot(
-        *run.y[saved].T, "o-", color="#175ca6" if last else str(max(shade, 0.3)), linewidth=3 if last else 1.5, markersize=6
+        *run.y[saved].T,
+        "o-",
+        color="#175ca6" if last else str(max(shade, 0.3)),
+        linewidth=3 if last else 1.5,
+        markersize=6,
     )
     if k < 3:
-        axes.text(run.y[saved, -1, 0] + 0.08, run.y[saved, -1, 1], f"t = {run.t[saved]:.2f}", color="#444444", va="center")
+        axes.text(
+            run.y[saved, -1, 0] + 0.08,
+            run.y[saved, -1, 1],
+            f"t = {run.t[saved]:.2f}",
+            color="#444444",
+            va="center",
+        )
 axes.text(2.2, 0.12, f"at rest, t = {run.t[-1]:.0f}", color="#175ca6", weight="bold")
 axes.add_patch(plt.Circle((1.2, 0.0), 0.5, color="#e8e2d8", zorder=0))
 axes.axhline(0.0, color="black", linewidth=1.5)
