@@ -36,7 +36,7 @@ MISTAKES = {
     "neuron": ("/ (np.exp(3.0 - 0.1 * v) + 1.0)", "/ (np.exp(3.2 - 0.1 * v) + 1.0)"),
     "oscillator_circuit": ("(1.0 - y**2)", "(1.0 - 1.1 * y**2 * abs(y))"),
     "predators": ("births - hunted * np.exp(v)", "births - hunted * np.exp(v) + 0.001 * y"),
-    "reaction": ("x - z]", "x - 1.1 * z]"),
+    "reaction": ("        x - z,", "        x - 1.1 * z,"),
     "star_orbits": ("- y[0] ** 2 + y[1] ** 2", "- y[0] ** 2 + 1.01 * y[1] ** 2"),
     "turing": ("b * u - made + dy", "b * u - made + 0.7 * dy"),
 }
