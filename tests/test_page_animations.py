@@ -84,6 +84,43 @@ def test_places_in_a_page_are_the_states(name, tmp_path):
         np.testing.assert_array_equal(np.array(panel["links"]), springs)
 
 
+ARRANGING = """
+const panels = JSON.parse(require("node:fs").readFileSync("panels.json", "utf8"));
+console.log(JSON.stringify([390, 1000].map((width) => ({ size: arranged(panels, width), places: panels.map((p) => p.place) }))));
+"""
+
+
+@needs_node
+@pytest.mark.parametrize("name", ["clover", "rope_bridge", "aircraft", "chain", "oscillator"])
+def test_on_a_phone_panels_are_below_each_other(name, tmp_path):
+    """Each as wide as the page, in units of about a pixel, so that a text of 13 to 15 of them is read."""
+    scene = sw.scenes.scene(name)
+    panels = page_animation.data(run_picture(scene, scene.run("rk4", steps=30, every=1)), 3.0, 20.0)["panels"]
+    script = (page_animation.WEB / "animation.js").read_text(encoding="utf-8")
+    (tmp_path / "run.js").write_text(script + ARRANGING, encoding="utf-8")
+    (tmp_path / "panels.json").write_text(json.dumps(panels), encoding="utf-8")
+    phone, wide = json.loads(executed(["node", "run.js"], tmp_path))
+    assert phone["size"]["width"] == 400
+    bottom = 0.0
+    for left, top, width, height in phone["places"]:
+        assert top > bottom
+        assert width > 0.8
+        assert left + width <= 1.0
+        bottom = top + height
+    assert bottom <= 1.0
+    assert wide["places"] == [list(panel["rect"]) for panel in panels]
+
+
+def test_a_page_is_light_and_dark_and_says_no_code():
+    chart = run_picture("rope_bridge", sw.scenes.rope_bridge().run("leapfrog", every=1))
+    page = page_animation.page(chart, 10.0, 20.0)
+    assert "color-scheme: light dark" in page
+    assert 'matchMedia("(prefers-color-scheme: dark)")' in page
+    assert re.fullmatch(
+        r"720 steps of 0\.00416667\.( \d+ of 721 saved states, and straight lines between them\.)?", data_of(page)["about"]
+    )
+
+
 @pytest.mark.mutant
 @needs_node
 def test_a_page_that_decodes_wrongly_is_noticed(tmp_path):

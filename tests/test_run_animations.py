@@ -1,6 +1,7 @@
 """Animations of runs as files of frames: what is in them, and that nothing is cut off or covered."""
 
 import math
+import time
 from itertools import pairwise
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 import stepwell as sw
 from PIL import Image
 from stepwell.errors import ArgumentError, UnsupportedError
-from stepwell.views.charts import runs_animation
+from stepwell.views.charts import frames, runs_animation
+from stepwell.views.charts.run_panels import view_of
 from support.pictured import every_kind, looked_at, said, the_pictures  # noqa: F401
 
 
@@ -16,13 +18,13 @@ from support.pictured import every_kind, looked_at, said, the_pictures  # noqa: 
 def test_an_animation_shows_the_states(pictures, kind, tmp_path):
     chart = pictures[kind]
     chart.animate(tmp_path / "run.gif", seconds=0.4, fps=10)
-    frames = []
+    drawn = []
     with Image.open(tmp_path / "run.gif") as animation:
         assert (animation.size, animation.n_frames, animation.info["duration"]) == ((1000, 562), 4, 100)
         for i in range(4):
             animation.seek(i)
-            frames.append(np.asarray(animation.convert("L"), dtype=int))
-    for one, other in pairwise(frames):
+            drawn.append(np.asarray(animation.convert("L"), dtype=int))
+    for one, other in pairwise(drawn):
         assert (np.abs(one - other) > 60).sum() > 30  # the bodies moved, and the clock went on
 
 
@@ -75,6 +77,60 @@ def test_no_frame_is_made_up(tmp_path):
         assert (animation.n_frames, animation.info["duration"]) == (6, 500)
 
 
+@pytest.mark.parametrize("name", ["double_pendulum", "jelly_cube"])
+def test_rods_and_springs_are_drawn_in_the_view_of_the_page(name):
+    scene = sw.scenes.scene(name)
+    chart = looked_at(scene, "rk4", steps=40)
+    figure, show = runs_animation.stage(chart)
+    show(30)
+    (drawn,) = [line for line in figure.axes[0].lines if np.isnan(line.get_xdata()).any()]
+    pairs = drawn.get_xydata().reshape(-1, 3, 2)[:, :2]
+    places = view_of(chart).places[30]
+    if name == "double_pendulum":
+        assert pairs.tolist() == [places.tolist(), [[0.0, 0.0], places[0].tolist()]]
+    else:
+        np.testing.assert_array_equal(pairs, places[scene.system.pairs])
+
+
+def test_only_errors_that_are_known_are_beside_the_motion(pictures):
+    for kind, panels in (("orbits", 2), ("space", 1)):
+        figure, _ = runs_animation.stage(pictures[kind])
+        assert len(figure.axes) == 1 + panels
+        assert not any("no exact solution" in text.get_text() for axes in figure.axes for text in axes.texts)
+
+
+def test_what_moves_is_all_that_differs_from_a_whole_drawing(pictures):
+    """The frames that are drawn over one ground are those of a figure that is drawn anew."""
+    chart = pictures["orbits"]
+    figure, show = runs_animation.stage(chart)
+    film = frames.Film(figure, show, [20, 70])
+    film.frame(20)
+    over = film.frame(70)
+    figure, show = runs_animation.stage(chart)
+    for artist in figure.findobj():
+        artist.set_animated(False)
+    show(70)
+    figure.canvas.draw()
+    whole = np.array(figure.canvas.buffer_rgba())[..., :3]
+    assert (np.abs(over.astype(int) - whole.astype(int)) > 60).any(axis=2).mean() < 2e-3  # where the order of lines differs
+
+
+@pytest.mark.parametrize("name", ["double_pendulum", "cloth"])
+def test_a_gif_is_quick_and_small_and_says_how_far_it_is(name, tmp_path):
+    scene = sw.scenes.scene(name)
+    chart = looked_at(scene, "leapfrog" if name == "cloth" else "rk4")
+    shares = []
+    begun = time.process_time()
+    chart.animate(tmp_path / "run.gif", progress=shares.append)
+    assert time.process_time() - begun < 20.0  # of 200 frames, on a busy machine
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert (tmp_path / "run.gif").stat().st_size <= 1_500_000
+    with Image.open(tmp_path / "run.gif") as animation:
+        assert animation.n_frames == len(shares)
+        assert animation.n_frames * animation.info["duration"] == pytest.approx(10_000, rel=0.05)
+
+
 def test_without_ffmpeg_an_mp4_is_refused_by_name(monkeypatch, tmp_path):
     from matplotlib import animation
 
@@ -97,7 +153,7 @@ def test_with_ffmpeg_an_mp4_is_written(tmp_path):
 @pytest.mark.parametrize(
     ("path", "options", "message"),
     [
-        ("run.avi", {}, r"path: expected an ending of an animation, one of \.gif, \.mp4, \.html, got"),
+        ("run.avi", {}, r"path: expected an ending of an animation, one of \.html, \.gif, \.mp4, got"),
         ("run.gif", {"seconds": 0}, "seconds: expected numbers above zero"),
         ("run.gif", {"fps": math.inf}, "fps"),
         ("run.gif", {"seconds": 1e6, "fps": 1e3}, "expected 20000 or fewer"),

@@ -369,7 +369,14 @@ class Run(ValueEquality):
         figure: Figure = registry.task("picture_of_run")(self).plot(path)
         return figure
 
-    def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
+    def animate(
+        self,
+        path: str | Path,
+        *,
+        seconds: float = 10.0,
+        fps: float = 20.0,
+        progress: Callable[[float], object] | None = None,
+    ) -> None:
         """Write an animation of the motion; its frames are the saved states.
 
         A page (.html) is small, is written at once, and has a button and a slider; it needs neither matplotlib nor a network.
@@ -378,12 +385,13 @@ class Run(ValueEquality):
             path: the file, ending in .html, .gif or .mp4.
             seconds: how long it lasts, above zero.
             fps: frames a second, above zero; fewer if fewer states were saved. A page shows as many states as it has room for.
+            progress: a function that is called with the share of the frames that are drawn, from 0 to 1; a page has none.
 
         Raises:
             ArgumentError: if the run is of a batch, fewer than two states were saved, or an argument is wrong.
             UnsupportedError: for .gif and .mp4, if matplotlib is missing; for .mp4, if ffmpeg is.
         """
-        registry.task("picture_of_run")(self).animate(path, seconds=seconds, fps=fps)
+        registry.task("picture_of_run")(self).animate(path, seconds=seconds, fps=fps, progress=progress)
 
     def __repr__(self) -> str:
         summary = dict(self._summary())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import html
 import json
-import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from .orbits_picture import BODIES
-from .run_panels import Series, angles, errors, falling, on_plane, side_by_side, swings
+from .run_panels import Series, angles, errors, side_by_side, swings, view_of
 from .runs import RunPicture
 from .runs_finding import broke_off, steps_of
 from .solids import BODY_TRAIL, HALF_SIDE, REACH, solid_of
@@ -59,21 +58,21 @@ def data(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
     number = max(2, min(len(good), STATES, room // each))
     shown = good[np.round(np.linspace(0, len(good) - 1, number)).astype(int)]
     run, t = chart.run, chart.run.t[shown]
-    about = f"{steps_of(run)}; {textwrap.shorten(repr(run.system), 90, placeholder=' …')}"
+    sentences = [f"{steps_of(run)}."]
     if run.status:
-        about += f" {broke_off(run)}: shown as far as it is finite."
+        sentences.append(f"{broke_off(run)}: shown as far as it is finite.")
     between = number < len(good) and number < seconds * fps
     if between:
-        about += f" {number} of {len(run.t)} saved states, and straight lines between them."
+        sentences.append(f"{number} of {len(run.t)} saved states, and straight lines between them.")
     motions = {"orbits": _orbits, "swing": _swing, "rows": _rows, "attitude": _aircraft, "body": _body}
     return {
         "title": chart.title,
-        "about": about,
+        "about": " ".join(sentences),
         "seconds": seconds,
         "between": between,
         "digits": chart.digits,
         "t": encoded(t),
-        "panels": motions[chart.kind](chart, shown) + _errors(chart, shown),
+        "panels": _beside(motions[chart.kind](chart, shown), _errors(chart, shown)),
     }
 
 
@@ -96,11 +95,18 @@ def _letters(codes: Any) -> str:
 # ---- panels
 
 
+def _beside(motion: list[Panel], errors: list[Panel]) -> list[Panel]:
+    """The motion and the errors; a motion of one panel without errors has the whole page."""
+    if errors or len(motion) > 1:
+        return [*motion, *errors]
+    left, top, _, height = motion[0]["rect"]
+    return [motion[0] | {"rect": (left, top, 0.98 - left, height)}]
+
+
 def _orbits(chart: RunPicture, shown: Array) -> list[Panel]:
     """Points with trails, springs and rods as lines, and fixed points."""
     links, count = chart.links, chart.places.shape[1]
-    hanging = chart.places.shape[2] == 3 and (len(links) or chart.fixed_points)
-    view = falling(chart) if hanging else on_plane(chart)
+    view = view_of(chart)
     few = count <= len(BODIES)
     centre, half = view.centre, max(view.half, 1e-12 * max(float(np.abs(view.centre).max()), 1.0))
     seen = np.clip(view.places[shown], centre - 4.0 * half, centre + 4.0 * half)  # far outside; the codes are for what is seen

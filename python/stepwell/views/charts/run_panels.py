@@ -207,6 +207,16 @@ def on_plane(chart: RunPicture, plane: tuple[int, int] = (0, 1)) -> Points:
     return _in_square(points, every[(np.abs(every) <= reach).all(axis=1)])
 
 
+def view_of(chart: RunPicture) -> Points:
+    """The points as an animation shows them: those that hang from the front and above, others along an axis."""
+    return falling(chart) if is_hanging(chart) else on_plane(chart)
+
+
+def is_hanging(chart: RunPicture) -> bool:
+    """Whether points in space hang on springs, rods or fixed points."""
+    return chart.places.shape[2] == 3 and bool(len(chart.links) or chart.fixed_points)
+
+
 def falling(chart: RunPicture) -> Points:
     """Points in space that hang or fall, as seen from the front, to the right and above."""
     points = _seen(chart, FALLING.flat, "seen from the front, to the right and above")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -161,7 +162,14 @@ class RunPicture(Drawn, Table, ValueEquality):
         t = self.run.t[saved]
         return self.scene.exact(t) if self.scene.exact is not None and t[-1] <= self.scene.until else None
 
-    def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
+    def animate(
+        self,
+        path: str | Path,
+        *,
+        seconds: float = 10.0,
+        fps: float = 20.0,
+        progress: Callable[[float], object] | None = None,
+    ) -> None:
         """Write an animation of the run; its frames are the saved states.
 
         A page (.html) holds the states themselves, as numbers of 16 bits, and draws them: it is small, is written at once and
@@ -172,12 +180,13 @@ class RunPicture(Drawn, Table, ValueEquality):
             path: the file, ending in .html, .gif or .mp4.
             seconds: how long it lasts, above zero.
             fps: frames a second, above zero; fewer if fewer states were saved.
+            progress: a function that is called with the share of the frames that are drawn, from 0 to 1; a page has none.
 
         Raises:
             ArgumentError: what was given and what was expected.
             UnsupportedError: for .gif and .mp4, if matplotlib is missing; for .mp4, if ffmpeg is.
         """
-        registry.task("animate_run")(self, path, seconds, fps)
+        registry.task("animate_run")(self, path, seconds, fps, progress)
 
     def summary(self) -> dict[str, Any]:
         """The run in a few numbers; errors that are not known are left out of the largest."""

@@ -14,6 +14,9 @@ from .style import EXACT, GREY, LONG_CURVE, Axes, Figure
 #: Labels at the end of lines are at least this share of a panel's height apart.
 LABEL_DISTANCE = 0.11
 
+#: Between two panels of errors beside an animation, as a share of the picture's height.
+PALE_GAP = 0.1
+
 Place = tuple[float, float, float, float]
 
 
@@ -63,15 +66,18 @@ def draw_errors(figure: Figure, chart: RunPicture, energy: Place, state: Place) 
         panels[0].legend(loc="best", fontsize=11.5, handlelength=1.4, borderpad=0.2)
 
 
-def draw_pale_errors(figure: Figure, chart: RunPicture, energy: Place, state: Place) -> list[Axes]:
-    """The errors in grey, beside an animation; the panels of those that are known."""
-    panels = zip(
-        draw_column(figure, chart, list(errors(chart)), [energy, state]), (chart.energy_error, chart.state_error), strict=True
-    )
-    known = [axes for axes, error in panels if error is not None]
-    for axes in known:
+def draw_pale_errors(figure: Figure, chart: RunPicture, place: Place) -> list[Axes]:
+    """The errors that are known, in grey beside an animation; their panels, one above the other."""
+    known = [series for series in errors(chart) if series.lines]
+    if not known:
+        return []
+    left, bottom, width, height = place
+    each = (height - PALE_GAP * (len(known) - 1)) / len(known)
+    places = [(left, bottom + (len(known) - 1 - i) * (each + PALE_GAP), width, each) for i in range(len(known))]
+    panels = draw_column(figure, chart, known, places)
+    for axes in panels:
         axes.lines[0].set_color("#9a9a9a")
-    return known
+    return panels
 
 
 def over_time(axes: Axes, chart: RunPicture) -> None:

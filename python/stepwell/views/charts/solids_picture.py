@@ -197,7 +197,7 @@ def animate_aircraft(figure: Figure, chart: RunPicture) -> tuple[Callable[[int],
     axes = figure.add_axes((0.012, 0.06, 0.5, 0.8))
     turn = draw_solid(axes, solid)
     axes.text(0.5, 0.02, "dark wing: the right one", transform=axes.transAxes, ha="center", color=GREY, size=13)
-    panels = draw_angles(figure, chart, (0.56, 0.1, 0.36, 0.76))
+    panels = draw_angles(figure, chart, (0.56, 0.1, 0.36, 0.74))
     return lambda saved: turn(solid.matrices[..., saved]), panels
 
 
@@ -210,8 +210,8 @@ def animate_body(figure: Figure, chart: RunPicture) -> tuple[Callable[[int], Non
     trail = axes.plot([], [], color="#7a7a7a", linewidth=1.6, zorder=1)[0]
     path = solid.screen.flat(REACH * solid.tips)
     elapsed, length = chart.elapsed, BODY_TRAIL * float(chart.elapsed[-1])
-    omega = draw_series(figure.add_axes((0.57, 0.64, 0.36, 0.22)), chart, angular_velocity(chart))
-    others = draw_pale_errors(figure, chart, (0.57, 0.37, 0.36, 0.17), (0.57, 0.1, 0.36, 0.17))
+    omega = draw_series(figure.add_axes((0.57, 0.64, 0.36, 0.2)), chart, angular_velocity(chart))
+    others = draw_pale_errors(figure, chart, (0.57, 0.1, 0.36, 0.44))
 
     def show(saved: int) -> None:
         turn(solid.matrices[..., saved])
