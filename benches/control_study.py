@@ -54,7 +54,7 @@ The data of the sweeps are in `benches/control`, `sw.charts.control` makes them 
 `Projection`. All methods ask for rates equally often. State errors are relative to the largest true state; energy
 errors are the largest of the run.
 
-## What follows
+## Conclusions
 
 1. **With RK4: project.** `Projection("scaling")` made the state better on all six orbits, from 1.8 times (circle) to
    7.7 times (e = 0.9) in some 10 periods, 68 times on the figure-eight in 100. Without it energy drifts and the period

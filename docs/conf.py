@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import stepwell
 
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS))
+import site_parts  # noqa: E402
+
 # Notebooks choose the way that shows figures below their cells, unless this names another.
 os.environ.pop("MPLBACKEND", None)
 
@@ -77,6 +80,8 @@ sphinx_gallery_conf = {
     "remove_config_comments": True,
     "thumbnail_size": (480, 320),
     "min_reported_time": 1e9,
+    # What a last line returns, such as a title, is no result.
+    "capture_repr": (),
 }
 
 # ---- reference
@@ -97,12 +102,29 @@ toc_object_entries_show_parents = "hide"
 html_theme = "furo"
 pygments_style = "default"
 pygments_dark_style = "github-dark"
-html_title = "stepwell"
+html_title = f"stepwell {release}"
+html_favicon = "_static/favicon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+#: Of the card that a link to a page becomes elsewhere, and of a search engine's entry.
+ABOUT = "Fast, reproducible integration of motion, for games, simulators and courses"
+#: Addresses of the project, from its package's record: one place to enter them.
+ADDRESSES = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))[
+    "project"
+].get("urls", {})
+html_baseurl = ADDRESSES.get("Documentation", "")
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {
+    **(
+        {
+            "source_repository": f"{ADDRESSES['Repository']}/",
+            "source_branch": "main",
+            "source_directory": "docs/",
+        }
+        if "Repository" in ADDRESSES
+        else {}
+    ),
     "light_css_variables": {
         "color-brand-primary": "#175ca6",
         "color-brand-content": "#175ca6",
@@ -137,10 +159,20 @@ def _file_included(app: Any, path: Path, name: str, source: list[str]) -> None:
     source[0] = _to_pages(source[0], (DOCS / path).parent)
 
 
+def _with_card(
+    app: Any, page: str, template: str, context: dict[str, Any], doctree: Any
+) -> None:
+    """A page's card: its title, what the project is for, and a picture."""
+    picture = f"{html_baseurl}/_static/card.png" if html_baseurl else ""
+    context["metatags"] = context.get("metatags", "") + site_parts.card(
+        context.get("title", project), ABOUT, picture
+    )
+
+
 def setup(app: Any) -> None:
     """Called by Sphinx."""
-    import site_parts
-
+    app.connect("html-page-context", _with_card)
+    app.connect("doctree-read", site_parts.captions)
     app.add_directive("public", site_parts.Public)
     app.connect(
         "autodoc-process-docstring", site_parts.as_text, priority=400

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import importlib
 import inspect
 import re
@@ -118,3 +119,31 @@ def without_constructor(
         if what == "class" and "Attributes:" in told and "Args:" not in told
         else None
     )
+
+
+def card(title: str, about: str, picture: str) -> str:
+    """The lines of a page's head that say what it is, to search engines and where its link is shown."""
+    title = html.escape(re.sub(r"<[^>]*>", "", title))
+    lines = [
+        f'<meta name="description" content="{html.escape(about)}">',
+        f'<meta property="og:title" content="{title}">',
+        f'<meta property="og:description" content="{html.escape(about)}">',
+        '<meta property="og:type" content="website">',
+    ]
+    if picture:
+        lines.append(f'<meta property="og:image" content="{html.escape(picture)}">')
+    return "\n".join(lines) + "\n"
+
+
+def captions(app: Any, doctree: nodes.document) -> None:
+    """A picture that stands alone has its alternative text as a caption, too."""
+    for number, paragraph in enumerate(list(doctree.findall(nodes.paragraph))):
+        if len(paragraph) != 1 or not isinstance(image := paragraph[0], nodes.image):
+            continue
+        if not image.get("alt") or isinstance(paragraph.parent, nodes.figure):
+            continue
+        text = image["alt"]
+        figure = nodes.figure(
+            "", image, nodes.caption("", text), ids=[f"picture-{number}"]
+        )
+        paragraph.replace_self(figure)

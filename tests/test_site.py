@@ -271,3 +271,33 @@ def test_a_tutorial_animates_and_the_search_finds(site: Path, browser: Any) -> N
     page.goto((site / "search.html").as_uri() + "?q=leapfrog")
     page.locator("#search-results li").first.wait_for()
     page.close()
+
+
+def test_every_page_has_a_card_and_an_icon(site: Path) -> None:
+    """What a search engine shows, and what a link becomes elsewhere."""
+    for path in (site / "index.html", site / "howto" / "runs.html", site / "gallery" / "motion" / "heavy_top.html"):
+        text = path.read_text(encoding="utf-8")
+        for needed in ('name="description" content="Fast, reproducible', 'property="og:title"', "favicon.svg"):
+            assert needed in text, (path.name, needed)
+
+
+def test_pictures_have_captions_and_texts(site: Path) -> None:
+    """Outside of the gallery, whose thumbnails have their names beside them, and of notebooks."""
+    for path in [site / "index.html", *site.glob("howto/*.html"), *site.glob("theory/*.html"), *site.glob("benchmarks/*.html")]:
+        text = path.read_text(encoding="utf-8")
+        images = re.findall(r"<img [^>]*src=\"[^\"]*_images/[^>]*>", text)
+        assert all(re.search(r'alt="[^"]{8,}"', image) for image in images), path.name
+        figures = re.findall(r"<figure.*?</figure>", text, re.DOTALL)
+        assert all("<figcaption>" in figure for figure in figures), path.name
+    assert "<figcaption>" in (site / "theory" / "stability.html").read_text(encoding="utf-8")
+
+
+def test_no_page_shows_what_a_title_returns(site: Path) -> None:
+    pages = list(site.rglob("*.html"))
+    assert [path.name for path in pages if re.search(r"Text\(0?\.\d", path.read_text(encoding="utf-8"))] == []
+
+
+def test_the_first_page_begins_with_an_equation(site: Path) -> None:
+    text = re.sub(r"<[^>]*>", "", (site / "index.html").read_text(encoding="utf-8"))
+    assert "def duffing(" in text
+    assert "pip install" in text

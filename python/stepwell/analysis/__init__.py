@@ -1,1 +1,1 @@
-"""What follows from a step: stability, derivatives, dynamics."""
+"""What is known of a step: stability, derivatives, dynamics."""
