@@ -26,7 +26,7 @@ FRAMES, MILLISECONDS, TRAIL, REACH = 100, 80, 40, 5.0
 EDGE = "#888888"
 #: Shades of each colour from the page to itself, for smooth edges.
 SHADES = 24
-#: The run: the document's start by Standard Euler, so many steps of the scene's dt.
+#: The run: Hoffmann's start by Standard Euler, so many steps of the scene's dt.
 STEPS = 4000
 METHODS = ("false_euler", "leapfrog", "standard_heun", "rk4", "dop853")
 

@@ -71,7 +71,7 @@ def methods() -> str:
 
 
 def names() -> str:
-    """The document's names beside the standard ones."""
+    """Hoffmann's names beside the standard ones."""
     head = "document", "section", "name", "also called", "not to be taken for"
     rows = (
         (
@@ -168,7 +168,7 @@ def operations() -> str:
 
 
 def paper() -> str:
-    """The document's statements, by section."""
+    """Hoffmann's statements, by section."""
     parts = []
     for section in dict.fromkeys(entry.section for entry in sw.paper.entries()):
         entries = sw.paper.entries(section)
@@ -188,7 +188,7 @@ def paper() -> str:
             + table(
                 (
                     "kind",
-                    "statement of the document",
+                    "statement",
                     "correction",
                     "in stepwell",
                     "numbers",

@@ -31,7 +31,7 @@ ContactWay = Literal["safe", "restitution", "flip", "spring"]
 #: The direction in which a quantity passes a level.
 Direction = Literal["rising", "falling", "both"]
 
-#: Whether the push of a control is limited, or as the document prints it.
+#: Whether the push of a control is limited, or as Hoffmann prints it.
 ControlForm = Literal["limited", "printed"]
 
 #: What advice ranks by.

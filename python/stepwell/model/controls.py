@@ -41,7 +41,7 @@ class EnergyControl(OfEnergy):
     It pushes in every stage of a method; with PEFRL, in whose stages v and y belong to different times, after every step. A run
     with a tolerance needs ``gain``, since ``relative`` refers to steps of fixed length.
 
-    In the document's form (Appendix D) a step multiplies velocities by 1 − h·C·ΔE. This overflows where h·C·K passes 1; K is the
+    In Hoffmann's form (Appendix D) a step multiplies velocities by 1 − h·C·ΔE. This overflows where h·C·K passes 1; K is the
     kinetic energy, which is not bounded at close encounters. The limited form integrates the decay of ΔE by backward Euler
     instead, and scales velocities by a factor between ½ and 2: it agrees to first order and stays finite.
 

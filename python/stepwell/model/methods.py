@@ -42,7 +42,7 @@ class Method(Immutable):
 
     #: The name by which it is chosen.
     name: str
-    #: The document's name.
+    #: Hoffmann's name.
     title: str
     #: Standard names of the same method.
     other_names: tuple[str, ...]
@@ -73,7 +73,7 @@ class Method(Immutable):
     starts: tuple[str, ...]
     #: Order of h in which it estimates the error of a step, or None; with one it takes ``tolerance=``.
     error_order: int | None
-    #: Section of the document.
+    #: Section of Hoffmann (2002).
     section: str
     #: Publication.
     reference: str
@@ -136,7 +136,7 @@ class Method(Immutable):
             lines.append(f"Not to be taken for: {', '.join(self.false_friends)}.")
         lines += [
             f"Undamped oscillator stable: {limit}.",
-            f"Source: {'the document’s ' if self.section.startswith('§') else ''}{self.section}; {self.reference}.",
+            f"Source: {'Hoffmann’s ' if self.section.startswith('§') else ''}{self.section}; {self.reference}.",
         ]
         return "\n".join(lines)
 
@@ -173,7 +173,7 @@ def stable_for(limit: float, angle: str = "Φ", digits: int = 6) -> str:
 
 
 def _section(method: Method) -> int:
-    """The number of the document's section; 99 for a method that is not in the document."""
+    """The number of Hoffmann's section; 99 for a method that is not in Hoffmann (2002)."""
     number = re.search(r"\d+", method.section)
     return int(number[0]) if number else 99
 
@@ -185,7 +185,7 @@ def _catalogue() -> dict[str, Method]:
 
 
 def methods() -> tuple[Method, ...]:
-    """Every method, in the order of the document.
+    """Every method, in the order of Hoffmann (2002).
 
     Example:
         >>> [method.name for method in sw.methods() if "Fehlberg" in method.title]

@@ -47,7 +47,7 @@ class Scene(ValueEquality):
         v: velocity block at t = 0, of the system's ``v_shape``, or one number for all of it; a first-order system has none.
         y: coordinate block at t = 0, likewise of its ``y_shape``.
         horizon: time over which errors are measured, in units of time, above zero; that of ``until`` if None.
-        dt: the usual step, in units of time; the document's where it gives one, a thousandth of the horizon if None.
+        dt: the usual step, in units of time; Hoffmann's where it gives one, a thousandth of the horizon if None.
         exact: the solution as a function of times of shape (n,), which returns blocks v and y of shape (n, *block): a formula, or
             an orbit computed in multi-precision. If None, there is no state error, and charts and advice use a run to a tight
             tolerance as the reference solution.
@@ -59,7 +59,7 @@ class Scene(ValueEquality):
         positive: components that must not become negative in adaptive steps, as ``integrate`` takes them, or None.
         name: the name by which it is chosen.
         title: its title in a picture; the name if empty.
-        section: section of the document, or a note that the scene is stepwell's own.
+        section: section of Hoffmann (2002), or a note that the scene is stepwell's own.
         description: what moves, and what it shows.
         error: what an error of 1 means here.
 

@@ -11,7 +11,7 @@ pub enum Law {
     Logarithmic,
     /// 1/r².
     Newton,
-    /// 1/r, with the potential of the other, as the document prints it.
+    /// 1/r, with the potential of the other, as Hoffmann prints it.
     Printed,
 }
 

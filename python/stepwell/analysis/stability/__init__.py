@@ -1,8 +1,8 @@
 """Stability in the z-plane (§4): the eigenvalues of the transition matrix of a step.
 
-``maps`` computes the matrices, ``eigen`` their eigenvalues and modes, ``analysis`` puts them into the document's words, ``limit``
+``maps`` computes the matrices, ``eigen`` their eigenvalues and modes, ``analysis`` puts them into Hoffmann's words, ``limit``
 finds the step at which a mode begins to grow, ``along`` does so at every saved state of a run, ``expansion`` computes series in
-Φ, ``counted`` counts operations, ``criterion`` answers the document's four criteria for every method.
+Φ, ``counted`` counts operations, ``criterion`` answers Hoffmann's four criteria for every method.
 """
 
 from .along import StabilityAlong, stability_along

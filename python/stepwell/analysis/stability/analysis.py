@@ -1,4 +1,4 @@
-"""``analyse``: the stability of a step of any system by any method, in the words of the document's §4."""
+"""``analyse``: the stability of a step of any system by any method, in the words of Hoffmann's §4."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-#: How a sequence of samples behaves (§4), by the dominant eigenvalue. A single negative eigenvalue, which the document does not
+#: How a sequence of samples behaves (§4), by the dominant eigenvalue. A single negative eigenvalue, which Hoffmann does not
 #: list, changes the sign at every step: an oscillation with two samples per period. If so many eigenvalues nearly coincide that
 #: rounding hides whether they are outside the unit circle, the kind is "not decided", which does not count as stable.
 KINDS = (
@@ -68,7 +68,7 @@ class Analysis(ValueEquality):
         omega: Ω₀ = Ψ/dt, the frequency of the numerical solution, in radians per unit of time.
         frequency_ratio: Ψ/Φ; NaN where the exact solution does not oscillate.
         samples_per_period: 2π/Ψ; infinite where nothing oscillates.
-        kind: one of ``KINDS``, the document's words for the behaviour of the samples.
+        kind: one of ``KINDS``, Hoffmann's words for the behaviour of the samples.
         stable: whether the samples stay bounded.
     """
 

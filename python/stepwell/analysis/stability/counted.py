@@ -1,4 +1,4 @@
-"""Operations per step (the document's third criterion), counted on the tape of the step."""
+"""Operations per step (Hoffmann's third criterion), counted on the tape of the step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``criteria``: the document's four questions (§1), answered for every method on its own test, the undamped oscillator.
+"""``criteria``: Hoffmann's four questions (§1), answered for every method on its own test, the undamped oscillator.
 
 Is a programmed oscillator stable? How wrong is its frequency? How many calculations does a step take? How large may a step be?
 """
@@ -41,7 +41,7 @@ class At(NamedTuple):
         r1_squared_series: r₁² from the first two terms of its series.
         deviation: Ψ/Φ − 1, the relative error of the frequency.
         deviation_series: Ψ/Φ − 1 from the first two terms of its series.
-        kind: what the samples do, in the document's words.
+        kind: what the samples do, in Hoffmann's words.
     """
 
     phi: float
@@ -152,7 +152,7 @@ def signed(value: float, *, percent: bool = False, digits: int = 3) -> str:
 
 
 def criteria(methods: Iterable[Method | str] | None = None, *, phi: Any = PHI) -> Criteria:
-    """Answer the document's four criteria (§1) for methods on the undamped oscillator.
+    """Answer Hoffmann's four criteria (§1) for methods on the undamped oscillator.
 
     Args:
         methods: names, or what ``stepwell.method`` returns; all if None.

@@ -21,7 +21,7 @@ class Mode(NamedTuple):
         eigenvalue: z of P at the limit, on the unit circle.
         angle: Ψ in 0 … π, its angle per step.
         rate: λ of the mode in the exact solution, in 1 per unit of time; its imaginary part is its frequency.
-        kind: what it does past the limit, in the document's words.
+        kind: what it does past the limit, in Hoffmann's words.
         v: its shape in the velocities, complex, shape (*block); the largest number of both blocks is 1.
         y: its shape in the coordinates.
     """

@@ -28,7 +28,7 @@ class Aircraft(OwnSystem):
 
     v is the angular velocity about the principal axes of the aircraft, in radians per unit of time. The signs are those of axes
     that point forward, to the left and up: a roll angle above zero lowers the right wing, and the aircraft then turns to the
-    right, ψ̇ < 0; a pitch angle above zero lowers the nose. (The document displays φ, −θ and −ψ.) The torques are
+    right, ψ̇ < 0; a pitch angle above zero lowers the nose. (Hoffmann displays φ, −θ and −ψ.) The torques are
 
     - T_x = −d_x·ω_x − g_x·(φ − ``roll``) + ``roll_torque``,
     - T_y = −d_y·ω_y − g_y·(θ − ``pitch``) + ``pitch_torque``,
@@ -37,8 +37,8 @@ class Aircraft(OwnSystem):
     with the dampers d and the gains g, in Euler's equations J·ω̇ = T − ω × J·ω. In T_x and T_y the angles are without whole turns,
     from −180° to 180°.
 
-    In the form ``"euler"`` y is the roll, pitch and yaw angle φ, θ, ψ in degrees, as in the document. False Euler with a step of
-    0.1 is the document's program. The rates of φ and ψ are divided by cos θ, of which at least 10⁻⁵ is taken. So near θ = ±90°
+    In the form ``"euler"`` y is the roll, pitch and yaw angle φ, θ, ψ in degrees. False Euler with a step of 0.1 is then
+    Hoffmann's program. The rates of φ and ψ are divided by cos θ, of which at least 10⁻⁵ is taken. So near θ = ±90°
     they are large, at most 10⁵·|ω|, and a step then sets φ and ψ to angles that mean nothing. Angles are not reduced to one turn;
     ``angles`` does that. From 2⁵⁰ rad on they have no sine, and a run diverges.
 
@@ -56,7 +56,7 @@ class Aircraft(OwnSystem):
         roll_torque: a torque about the first axis, likewise. None leaves the term out.
         pitch_torque: about the second axis.
         yaw_torque: about the third axis.
-        controllers: whether the controllers of roll and pitch are on, the document's switch CO. Without them there are no
+        controllers: whether the controllers of roll and pitch are on, Hoffmann's switch CO. Without them there are no
             commanded angles. The dampers and the yaw rate by the roll angle remain; ``damping=np.zeros(3)`` and
             ``gains=np.zeros(3)`` leave the aircraft to itself.
 
@@ -166,7 +166,7 @@ class Aircraft(OwnSystem):
         return np.stack([np.broadcast_to(signal.at(each), command.batch) for each in times])
 
     def repr_arguments(self) -> list[str]:
-        """Its arguments, for its repr, without those that have the document's values."""
+        """Its arguments, for its repr, without those that have Hoffmann's values."""
         usual = {"inertia": INERTIA, "damping": DAMPING, "gains": GAINS, "roll": np.zeros(()), "pitch": np.zeros(())}
         arguments = [f"form={self.form!r}"]
         for name, value in self.parameters_given.items():
@@ -264,7 +264,7 @@ class Aircraft(OwnSystem):
     def rotation(self, y: Any, axis: int = 0) -> Array:
         """The rotation matrix from the aircraft to space, R = R_z(ψ)·R_y(θ)·R_x(φ), of the coordinates themselves.
 
-        The document computes it from the sines before the step, so its picture is a step late.
+        Hoffmann computes it from the sines before the step, so its picture is a step late.
 
         Args:
             y: coordinates, such as ``run.y``.

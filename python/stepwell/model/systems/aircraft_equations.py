@@ -11,10 +11,10 @@ import numpy as np
 
 from ..equations import system
 
-#: The document's moments of inertia, its dampers, and its gains of roll and pitch, per degree, and of the yaw rate.
+#: Hoffmann's moments of inertia, its dampers, and its gains of roll and pitch, per degree, and of the yaw rate.
 INERTIA, DAMPING, GAINS = np.array([0.6, 1.0, 1.5]), np.array([2.0, 3.0, 1.0]), np.array([0.06, 0.10, 1.0])
 
-#: The document's trap: this replaces a smaller cosine of the pitch angle.
+#: Hoffmann's trap: this replaces a smaller cosine of the pitch angle.
 SMALLEST_COSINE = 1e-5
 
 
@@ -24,7 +24,7 @@ def is_given(parameter: Any) -> bool:
 
 
 def wrapped(angle: Any) -> Any:
-    """An angle in degrees without whole turns, from −180 to 180, as by the document's loops, which hang on huge angles."""
+    """An angle in degrees without whole turns, from −180 to 180, as by Hoffmann's loops, which hang on huge angles."""
     turns = np.floor((180.0 - np.abs(angle)) / 360.0)  # zero or less
     return angle - np.copysign(360.0 * turns, angle)
 
@@ -78,7 +78,7 @@ def euler(
     pitch_torque: Any = 0.0,
     yaw_torque: Any = 0.0,
 ) -> Any:
-    """The document's program: v in rad per unit of time, y the roll, pitch and yaw angle in degrees."""
+    """Hoffmann's program: v in rad per unit of time, y the roll, pitch and yaw angle in degrees."""
     sin_roll, cos_roll = np.sin(np.radians(y[0])), np.cos(np.radians(y[0]))
     sin_pitch, cos_pitch = np.sin(np.radians(y[1])), np.cos(np.radians(y[1]))
     angles, added = (wrapped(y[0]), wrapped(y[1])), (roll_torque, pitch_torque, yaw_torque)

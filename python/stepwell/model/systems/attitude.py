@@ -49,7 +49,7 @@ def rotation_of_quaternion(q: Array) -> Array:
 
 
 def rotation_of_angles(angles: Any) -> Array:
-    """The rotation matrix, shape (3, 3, …), of roll, pitch and yaw in degrees, shape (3, …); the document's o11 … o33."""
+    """The rotation matrix, shape (3, 3, …), of roll, pitch and yaw in degrees, shape (3, …); Hoffmann's o11 … o33."""
     radians = [functions.deg2rad(angle) for angle in angles]
     (sx, sy, sz), (cx, cy, cz) = ([function(angle) for angle in radians] for function in (functions.sin, functions.cos))
     rows = [

@@ -22,7 +22,7 @@ COPIES_OF_A = 5
 
 
 class LinearSystem(System):
-    """ṡ = A·s + B·x(t), with auxiliary outputs z = C·s + D·x(t): the state space equations of the document's §3.
+    """ṡ = A·s + B·x(t), with auxiliary outputs z = C·s + D·x(t): the state space equations of Hoffmann's §3.
 
     The state s has n numbers in the order that you choose. Some of them form the block v, which methods such as False Euler
     advance first, the others form the block y: see ``velocities``. The blocks have shapes (velocities,) and (n − velocities,);

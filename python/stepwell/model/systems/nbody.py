@@ -26,9 +26,9 @@ class NBody(System):
 
     | force | of a pair | potential of a pair |
     |---|---|---|
-    | ``"logarithmic"`` | G·m·m/r, as the document prints it | G·m·m·ln r |
+    | ``"logarithmic"`` | G·m·m/r, as Hoffmann prints it | G·m·m·ln r |
     | ``"newton"`` | G·m·m/r² | −G·m·m/r |
-    | ``"printed"`` | G·m·m/r | −G·m·m/r, the document's potential, which belongs to Newton's force instead |
+    | ``"printed"`` | G·m·m/r | −G·m·m/r, Hoffmann's potential, which belongs to Newton's force instead |
 
     Their energy is ½·Σ m·v² and the potential of every pair.
 

@@ -21,9 +21,9 @@ FORMS: tuple[OscillatorForm, ...] = ("canonical", "physical")
 
 
 class Oscillator(System):
-    """ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x(t) + a(t), the document's test case (§3), and less friction·sgn ẏ where that is given (§8).
+    """ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x(t) + a(t), Hoffmann's test case (§3), and less friction·sgn ẏ where that is given (§8).
 
-    **v is ẏ/ω₀ unless ``form="physical"``**: that is the document's canonical form, whose phase diagram is a circle. There a
+    **v is ẏ/ω₀ unless ``form="physical"``**: that is Hoffmann's canonical form, whose phase diagram is a circle. There a
     start with the velocity u is ``v=u / omega``.
 
     Its energy is that of spring and motion per unit of mass, ½ẏ² + ½ω₀²y²; in canonical form divided by ω₀², ½(v² + y²). What

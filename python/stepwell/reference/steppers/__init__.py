@@ -1,1 +1,1 @@
-"""The methods, one file each, as short as in the document."""
+"""The methods, one file each, as short as in Hoffmann (2002)."""

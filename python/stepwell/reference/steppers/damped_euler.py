@@ -10,7 +10,7 @@ def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
 
 
 def damped_form(phi: float, v: Array, y: Array) -> Blocks:
-    """The document's own form on the oscillator: Standard Euler with the artificial damping D = Φ/2.
+    """Hoffmann's own form on the oscillator: Standard Euler with the artificial damping D = Φ/2.
 
     v − Φ(y + 2Dv) = v − Φ(y + Φv) is the force at the new y, so both forms are the same method; they differ by rounding.
     """

@@ -16,14 +16,14 @@ PERIOD, TURNS = 10.0, 2
 
 
 def aircraft(form: AttitudeForm = "euler", roll: Any = 40.0, pitch: Any = -10.0) -> Scene:
-    """The document's aircraft in turns to both sides, by its own step of 0.1.
+    """Hoffmann's aircraft in turns to both sides, by its own step of 0.1.
 
-    The document prints neither the start nor the commands nor the duration; they are chosen here. The aircraft is level and at
+    Hoffmann prints neither the start nor the commands nor the duration; they are chosen here. The aircraft is level and at
     rest at t = 0. The commanded roll is ``roll``·sin(2πt/10), the commanded pitch is constant. The motion lasts 20 units of
     time.
 
     Args:
-        form: ``"euler"``, the document's program, or ``"quaternion"``; see ``stepwell.Aircraft``.
+        form: ``"euler"``, Hoffmann's program, or ``"quaternion"``; see ``stepwell.Aircraft``.
         roll: the largest commanded roll angle, in degrees.
         pitch: the commanded pitch angle, in degrees; below zero the nose is up.
 

@@ -26,7 +26,7 @@ def arenstorf() -> Scene:
     return Scene(
         name="arenstorf",
         title="Arenstorf's orbit",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="A spacecraft goes round earth and moon and comes back: fast and near at the moon, slow elsewhere.",
         error="as far from the true place or velocity as the largest true one",
         system=RestrictedThreeBody(MU),

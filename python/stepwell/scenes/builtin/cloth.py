@@ -56,7 +56,7 @@ def cloth(n: Any = 32, shear: Any = 0.5, damping: Any = 0.0) -> Scene:
     return Scene(
         name="cloth",
         title=f"Cloth of {n} × {n} particles",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="A cloth falls from a level position and swings from two corners: a large net, whose safe step is known.",
         error="as far from the true places or velocities as the largest true ones",
         system=system,

@@ -15,10 +15,10 @@ ANGLES = np.radians([210.0, -30.0, 90.0])
 
 
 def clover() -> Scene:
-    """Three bodies chase each other round the unit circle; the document's first 100 steps of 0.3.
+    """Three bodies chase each other round the unit circle; Hoffmann's first 100 steps of 0.3.
 
     Three unit masses under the 1/r law (Appendix C). The exact orbit is the unit circle, clockwise with angular speed
-    1; the document's False Euler draws a clover leaf around it.
+    1; Hoffmann's False Euler draws a clover leaf around it.
     """
 
     def exact(t: Array) -> tuple[Array, Array]:

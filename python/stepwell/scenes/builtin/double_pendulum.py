@@ -44,7 +44,7 @@ def hanging_rods(name: str, title: str, description: str, angles: Any, count: in
     return Scene(
         name=name,
         title=title,
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description=description,
         error="as far from the true places or velocities as the largest true ones",
         system=Rods(np.ones(count), [((0.0, 0.0), 0), *((i, i + 1) for i in range(count - 1))], 1.0),

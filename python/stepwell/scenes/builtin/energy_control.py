@@ -16,12 +16,12 @@ from ..base import Scene
 #: Force and potential for each pair of them, as ``NBody`` names it.
 PAIRS: dict[str, BodyForce] = {"matching": "logarithmic", "printed": "printed"}
 
-#: The document's control factor, found by experiment.
+#: Hoffmann's control factor, found by experiment.
 GAIN = 0.3
 
 
 def energy_control(pair: str = "matching", eps: Any = 0.01, form: ControlForm = "limited") -> Scene:
-    """Three unit masses thrown out from the centre, one of them a little aside; the document's 100 000 steps of 0.01.
+    """Three unit masses thrown out from the centre, one of them a little aside; Hoffmann's 100 000 steps of 0.01.
 
     The places are those of ``clover``, the velocities radial with speed 1, and the third body's gets ε in x (Appendix D). The
     document steps it by Standard Euler under energy control with C = 0.3. Without the control (``run(…, control=None)``) the
@@ -32,9 +32,9 @@ def energy_control(pair: str = "matching", eps: Any = 0.01, form: ControlForm = 
 
     Args:
         pair: ``"matching"``, the 1/r force with the potential ln r that belongs to it; or ``"printed"``, the same force with
-            the document's −1/r, which is no invariant of the motion.
+            Hoffmann's −1/r, which is no invariant of the motion.
         eps: ε in units of length per unit of time.
-        form: of the control; the document's is ``"printed"``, see ``stepwell.EnergyControl``.
+        form: of the control; Hoffmann's is ``"printed"``, see ``stepwell.EnergyControl``.
 
     Raises:
         ArgumentError: if an argument is wrong.

@@ -26,7 +26,7 @@ def figure_eight() -> Scene:
     return Scene(
         name="figure_eight",
         title="Figure of eight",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="Three bodies follow each other on one curve under Newton's law, a stable orbit without a formula.",
         error="bodies as far from their true places as those are from the centre",
         system=NBody(masses, force="newton"),

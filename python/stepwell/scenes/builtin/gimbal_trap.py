@@ -20,7 +20,7 @@ def gimbal_trap(form: AttitudeForm = "euler", roll: Any = 2.0, torque: Any = -1.
     form ``"quaternion"`` the same motion has no such moment.
 
     Args:
-        form: ``"euler"``, the document's program, or ``"quaternion"``; see ``stepwell.Aircraft``.
+        form: ``"euler"``, Hoffmann's program, or ``"quaternion"``; see ``stepwell.Aircraft``.
         roll: the roll angle at the start, in degrees. With 0 the nose passes through the vertical, where Euler angles jump.
         torque: about the pitch axis; below zero it lifts the nose.
 

@@ -17,7 +17,7 @@ def hires() -> Scene:
     return Scene(
         name="hires",
         title="High irradiance response",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="Eight reactants of a plant in the light, moderately stiff: the largest of the stiff scenes.",
         error="as far from the true amount of a reactant as the largest true one of it",
         system=stiff_equations.hires(),

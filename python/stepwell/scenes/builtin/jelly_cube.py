@@ -45,7 +45,7 @@ def jelly_cube(n: Any = 4, twist: Any = 4.0) -> Scene:
     return Scene(
         name="jelly_cube",
         title=f"Jelly cube of {n} × {n} × {n} particles",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="A free cube of jelly twists to and fro: a net in space, whose momentum stays what it is.",
         error="as far from the true places or velocities as the largest true ones",
         system=system,

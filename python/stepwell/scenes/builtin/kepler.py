@@ -52,7 +52,7 @@ def kepler(e: Any = 0.9, share: Any = 0.5) -> Scene:
     return Scene(
         name="kepler",
         title=f"Kepler's ellipse, e = {e:g}",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="Two bodies on a long ellipse under Newton's law: slow far apart, twenty times as fast where they meet.",
         error="as far from the true places or velocities as the largest true ones",
         system=NBody(masses, force="newton"),

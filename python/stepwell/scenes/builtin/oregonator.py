@@ -24,7 +24,7 @@ def oregonator(horizon: Any = 360.0) -> Scene:
     return Scene(
         name="oregonator",
         title="Oregonator",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="A reaction that swings: amounts jump by five powers of ten within a unit of time, and rest for a hundred.",
         error="as far from the true amount of a reactant as the largest true one of it",
         system=stiff_equations.oregonator(),

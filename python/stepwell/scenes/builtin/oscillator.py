@@ -1,4 +1,4 @@
-"""The undamped oscillator (§3), the document's test of every method."""
+"""The undamped oscillator (§3), Hoffmann's test of every method."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..ranges import frequency
 def oscillator(omega: Any = 1.0) -> Scene:
     """The undamped oscillator from v = 0, y = 1, over ten periods.
 
-    In canonical form (§3): v is the velocity divided by ω₀, and the exact orbit is the unit circle. The document gives
+    In canonical form (§3): v is the velocity divided by ω₀, and the exact orbit is the unit circle. Hoffmann gives
     no step for it; Φ = ω₀·dt = 0.3 is the angle per step of its Appendix C.
 
     Args:

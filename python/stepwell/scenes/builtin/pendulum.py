@@ -45,7 +45,7 @@ def pendulum(amplitude: Any = 90.0, omega: Any = 1.0) -> Scene:
     return Scene(
         name="pendulum",
         title=f"Pendulum, {amplitude:g}°",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="A pendulum swings so far that its period is no longer that of small swings; its motion is known still.",
         error="as far from the true angle or velocity as the largest true one",
         system=Pendulum(omega),

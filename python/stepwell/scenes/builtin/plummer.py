@@ -48,7 +48,7 @@ def plummer(n: Any = 64, seed: Any = 1, softening: Any = 0.05) -> Scene:
     return Scene(
         name="plummer",
         title=f"Plummer's sphere of {n} stars",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="A star cluster in space, softened, in equilibrium as a whole and chaotic star by star.",
         error="not measured: the motion is chaotic",
         system=system,

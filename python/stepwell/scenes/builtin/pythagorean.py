@@ -25,7 +25,7 @@ def pythagorean() -> Scene:
     return Scene(
         name="pythagorean",
         title="Pythagorean problem",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="Masses 3, 4 and 5 fall from rest into near collisions, which no step of fixed length is small enough for.",
         error="bodies as far from their true places as the largest true distance from the centre, or likewise velocities",
         system=NBody(masses, force="newton"),

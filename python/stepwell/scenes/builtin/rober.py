@@ -26,7 +26,7 @@ def rober(horizon: Any = 40.0) -> Scene:
     return Scene(
         name="rober",
         title="Robertson's reaction",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="Three reactants, one of which is used up a billion times as fast as it is made: stiff from the start on.",
         error="as far from the true amount of a reactant as the largest true one of it",
         system=stiff_equations.rober(),

@@ -44,7 +44,7 @@ def rope_bridge(planks: Any = 15, load: Any = 5.0) -> Scene:
     return Scene(
         name="rope_bridge",
         title=f"Rope bridge of {planks} planks",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="A rope bridge falls and bounces under a load on one side: stiff springs, and a slow motion that one sees.",
         error="as far from the true places or velocities as the largest true ones",
         system=system,

@@ -28,7 +28,7 @@ def van_der_pol(mu: Any = 100.0) -> Scene:
     return Scene(
         name="van_der_pol",
         title=f"Van der Pol's oscillator, μ = {mu:g}",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="It creeps and jumps: the larger μ, the stiffer; with a small one it is an oscillator like others.",
         error="as far from the true coordinate or velocity as the largest true one",
         system=stiff_equations.van_der_pol(mu=mu),

@@ -172,7 +172,7 @@ def rope() -> Scene:
     return Scene(
         name="rope",
         title="Rope of springs",
-        section="beyond the document",
+        section="not in Hoffmann (2002)",
         description="A rope of five stiff springs falls from level, with a load at its end: the springs limit the step.",
         system=system,
         v=np.zeros_like(y),

@@ -1,7 +1,7 @@
-"""The statements of the document (Hoffmann 2002), each with its place in stepwell and a check that runs it.
+"""The statements of Hoffmann (2002), each with its place in stepwell and a check that runs it.
 
-A module here is a part of the document, and a function is the check of one statement: an algorithm, a formula, a program, a
-figure, a piece of advice. It compares the numbers computed here with those of the document. ``docs/theory/paper.md`` and the
+A module here is a part of Hoffmann (2002), and a function is the check of one statement: an algorithm, a formula, a program, a
+figure, a piece of advice. It compares the numbers computed here with those of Hoffmann (2002). ``docs/theory/paper.md`` and the
 command ``stepwell paper`` are generated from these entries, and the tests run them all.
 """
 
@@ -16,7 +16,7 @@ from typing import NamedTuple
 from ...base import checks, paths
 from ...errors import ArgumentError
 
-#: The modules, in the order of the document.
+#: The modules, in the order of Hoffmann (2002).
 MODULES = ("introduction", "transform", "methods", "constraints", "series", "programs", "bodies", "aircraft")
 
 #: The kinds of statement.
@@ -27,7 +27,7 @@ class Finding(NamedTuple):
     """The result of the check of a statement.
 
     Attributes:
-        holds: whether stepwell confirms the statement, or its correction where the document is wrong.
+        holds: whether stepwell confirms the statement, or its correction where Hoffmann is wrong.
         numbers: the numbers that show it, as a short text.
     """
 
@@ -36,14 +36,14 @@ class Finding(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A statement of the document.
+    """A statement of Hoffmann (2002).
 
     Attributes:
-        section: as the document numbers it: ``§7``, ``App. C``.
+        section: as Hoffmann numbers it: ``§7``, ``App. C``.
         kind: one of ``KINDS``.
         says: the statement, in our words.
         here: the functions and commands of stepwell that it concerns.
-        corrected: the correction, where the document is wrong or claims too much; empty where the statement holds.
+        corrected: the correction, where Hoffmann is wrong or claims too much; empty where the statement holds.
         check: the function that checks it.
         picture: the file name of its picture; empty without one.
         draw: draws the picture into a file; None without one.
@@ -72,7 +72,7 @@ class Section:
     """A decorator of checks: each becomes an entry of one section.
 
     Args:
-        section: as the document numbers it: ``§7``, ``App. C``.
+        section: as Hoffmann numbers it: ``§7``, ``App. C``.
     """
 
     def __init__(self, section: str) -> None:
@@ -97,7 +97,7 @@ _ENTRIES: list[Entry] = []
 
 
 def entries(section: str | None = None) -> tuple[Entry, ...]:
-    """The document's statements, in its order.
+    """Hoffmann's statements, in its order.
 
     Args:
         section: ``"§7"`` or ``"App. C"`` for those of one section; all if None.
@@ -129,14 +129,14 @@ def _order(section: str) -> tuple[int, str]:
 
 
 def draw(folder: str | Path, section: str | None = None) -> list[Path]:
-    """Draw every figure of the document, or those of a section, into a folder.
+    """Draw every figure of Hoffmann (2002), or those of a section, into a folder.
 
     Args:
         folder: the folder; it is created if it does not exist.
         section: as in ``entries``.
 
     Returns:
-        The paths, in the order of the document.
+        The paths, in the order of Hoffmann (2002).
 
     Raises:
         ArgumentError: if nothing can be written there, or there is no such section, or it has no figure.

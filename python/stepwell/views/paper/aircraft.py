@@ -88,7 +88,7 @@ def aircraft_trap() -> Finding:
     "formula",
     "Without torques a rigid body keeps its energy.",
     "`run.energy`",
-    "The document does not state it. False Euler does not keep the energy; so it is a test of any method.",
+    "Hoffmann does not state it. False Euler does not keep the energy; so it is a test of any method.",
 )
 def aircraft_energy() -> Finding:
     """The energy over 100 s without torques."""

@@ -114,7 +114,7 @@ def damped_euler_equation() -> Finding:
     "At Φ = 1.414 the angle is 1.5706 (not quite the printed 1.570); at √2 it is π/2.",
 )
 def damped_euler_frequency() -> Finding:
-    """The four numbers of the document's table."""
+    """The four numbers of Hoffmann's table."""
     psi = [float(at("damped_euler", phi).angle) for phi in (1.0, 1.414)]
     series = [phi * (1 + phi**2 / 24) for phi in (1.0, 1.414)]
     close = [abs(computed - printed) < 1e-3 for computed, printed in zip(psi + series, (1.047, 1.570, 1.042, 1.532), strict=True)]

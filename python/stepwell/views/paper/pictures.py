@@ -1,4 +1,4 @@
-"""The document's pictures for which there is no chart."""
+"""Hoffmann's pictures for which there is no chart."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from . import Finding, Section
 
 section = Section("§4")
 
-#: The angles of the document's harmonic cases, in degrees.
+#: The angles of Hoffmann's harmonic cases, in degrees.
 HARMONIC = (30.0, 90.0, 150.0)
 
 

@@ -8,7 +8,7 @@ use super::program::{Block, Length, Program, Rates, Time};
 pub struct Record {
     /// The name users type.
     pub name: &'static str,
-    /// The document's name, as a title.
+    /// Hoffmann's name, as a title.
     pub title: &'static str,
     /// Standard names of the same method.
     pub other_names: &'static [&'static str],
@@ -26,7 +26,7 @@ pub struct Record {
     pub carry: Option<Carry>,
     /// Its estimate of the error of a step, if it has one: adaptive steps need it.
     pub estimate: Option<Estimate>,
-    /// Section of the document.
+    /// Section of Hoffmann (2002).
     pub section: &'static str,
     /// Publication.
     pub reference: &'static str,

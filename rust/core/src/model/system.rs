@@ -16,7 +16,7 @@ pub(crate) type Block<N> = DVector<N>;
 
 /// A system scaled to the step: its rates times `h`.
 ///
-/// The document writes every method in increments, `dv = h·v̇` and `dy = h·ẏ`, because `h` and a system's own constants can be
+/// Hoffmann writes every method in increments, `dv = h·v̇` and `dy = h·ẏ`, because `h` and a system's own constants can be
 /// multiplied once for a whole run (Φ = ω₀T for the oscillator: "ω₀ is the same as a scale factor for the time", §3). A
 /// method then needs nothing but increments and sums.
 pub trait System<N: Number> {

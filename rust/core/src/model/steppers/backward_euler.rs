@@ -15,7 +15,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Rates,
     carry: None,
     estimate: None,
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, second edition (1996), section IV.3",
     about: "The increment is that of the rates at the end of the step, found by three passes of Newton’s method with the \
             Jacobian of its start: exact for linear systems. L-stable: of any step it damps what decays fast, and an \

@@ -131,7 +131,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Rates,
     carry: None,
     estimate: Some(Estimate { order: 8, error, coarse: Some(coarse) }),
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), §II.10",
     about: "Twelve evaluations and eighth order, for tight tolerances (tolerance=): from an error of about 1e-6 on it is the \
             cheapest on orbits. Its estimate of the error is one of fifth order corrected by one of third. It damps an \

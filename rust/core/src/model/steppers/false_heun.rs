@@ -17,7 +17,7 @@ pub const RECORD: Record = Record {
     section: "§10",
     reference: "G. Hoffmann, Simple Integration Algorithms, 2002, §10",
     about: "Heun with the new v used at once in both equations for y. It damps an undamped oscillator, r₁² = 1 − Φ²/2, \
-            and is of first order only. The document does not recommend it, and neither do we; it is here for comparison.",
+            and is of first order only. Hoffmann does not recommend it, and neither do we; it is here for comparison.",
     step,
 };
 

@@ -15,7 +15,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Rates,
     carry: None,
     estimate: None,
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, second edition (2006), section VI.4",
     about: "The increment is that of the rates halfway between both ends of the step, found by three passes of Newton’s \
             method with the Jacobian of its start: exact for linear systems. A-stable, and an undamped oscillator keeps its \

@@ -14,7 +14,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Rates,
     carry: None,
     estimate: None,
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "D. Baraff, A. Witkin, Large steps in cloth simulation, SIGGRAPH 98 (1998) 43",
     about: "One solution of linear equations with the matrix I − hJ, and no iteration: what is left of Backward Euler after \
             one pass of Newton’s method. L-stable: of any step it damps what decays fast, and an undamped oscillator, too, \

@@ -18,7 +18,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Acceleration,
     carry: None,
     estimate: None,
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "I. P. Omelyan, I. M. Mryglod, R. Folk, Comput. Phys. Commun. 146 (2002) 188",
     about: "Five drifts with four kicks between them, symplectic and of fourth order: it keeps the energy of an orbit as \
             leapfrog does and is far more accurate for four times the work. Forces that depend on v are refused.",

@@ -40,7 +40,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Rates,
     carry: None,
     estimate: Some(Estimate { order: 4, error, coarse: None }),
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, second edition (1996), section IV.7",
     about: "For stiff systems: six solutions of linear equations with one matrix, I − hJ/4, and no iteration. L-stable and stiffly \
             accurate: of any step it damps what decays fast, and its estimate of the error does, too. Every step has a Jacobian of \

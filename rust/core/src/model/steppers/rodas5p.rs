@@ -114,7 +114,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Rates,
     carry: None,
     estimate: Some(Estimate { order: 5, error, coarse: None }),
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the Julia \
                 Differential Equations package, BIT Numerical Mathematics 63 (2023) 27",
     about: "For stiff systems and tight tolerances: eight solutions of linear equations with one matrix, and no iteration. L-stable \

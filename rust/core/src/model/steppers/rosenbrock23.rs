@@ -29,7 +29,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Rates,
     carry: None,
     estimate: Some(Estimate { order: 3, error, coarse: None }),
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "L. F. Shampine, M. W. Reichelt, The MATLAB ODE suite, SIAM Journal on Scientific Computing 18 (1997) 1",
     about: "For stiff systems: three solutions of linear equations with one matrix, I − γhJ, and no iteration. L-stable: of any step \
             it damps what decays fast, and an undamped oscillator, too. Its estimate of the error is of third order. Every step has a \

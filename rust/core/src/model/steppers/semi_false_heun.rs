@@ -10,7 +10,7 @@ pub const RECORD: Record = Record {
     false_friends: &["Standard Heun", "False Heun"],
     order: 2,
     family: "two-block Heun",
-    // √(2√5 − 2); the document's "always stable" is an erratum.
+    // √(2√5 − 2); Hoffmann's "always stable" is an erratum.
     limit: 1.572_302_755_514_846_6,
     needs: Needs::Rates,
     carry: None,

@@ -17,7 +17,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Rates,
     carry: None,
     estimate: Some(Estimate { order: ORDER, error, coarse: None }),
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "À. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, \
                 Experimental Mathematics 14 (2005) 99",
     about: "The sum of the solution's Taylor series around the start of the step; its coefficients follow from the operations of the \

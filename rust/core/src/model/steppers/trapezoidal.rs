@@ -15,7 +15,7 @@ pub const RECORD: Record = Record {
     needs: Needs::Rates,
     carry: None,
     estimate: None,
-    section: "not in the document",
+    section: "not in Hoffmann (2002)",
     reference: "J. Crank, P. Nicolson, A practical method for numerical evaluation of solutions of partial differential equations, Proc. Camb. Phil. Soc. 43 (1947) 50",
     about: "The increment is the mean of the increments by the rates at both ends of the step, found by three passes of \
             Newton’s method with the Jacobian of its start: exact for linear systems. A-stable, and an undamped oscillator \

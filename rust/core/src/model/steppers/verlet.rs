@@ -18,7 +18,7 @@ pub const RECORD: Record = Record {
     reference: "L. Verlet, Computer experiments on classical fluids, Phys. Rev. 159 (1967) 98",
     about: "y is advanced from its last two values: y + (y − y_prev) + h²·a. There is no v between steps. With the start \
             \"second_order\", y₋₁ = y₀ − h·v₀ + ½h²·a₀, v is the velocity at the same instant as y, \
-            (y − y_prev)/h + ½h·a, and both are of second order. With \"first_order\", y₋₁ = y₀ − h·v₀ (the document's \
+            (y − y_prev)/h + ½h·a, and both are of second order. With \"first_order\", y₋₁ = y₀ − h·v₀ (Hoffmann's \
             y₋₁ = y₀ for v₀ = 0), v is the secant (y − y_prev)/h, half a step old; y and v are then those of False Euler, \
             of first order. Forces that depend on v are refused: the v of the present instant is known only after \
             the step, and any older one makes the method lose its order and its stability.",
