@@ -254,7 +254,7 @@ def _of_kinds(
 def _of_pairs(
     alone: dict[tuple[str, str], str | None], reasons: Reasons
 ) -> Iterator[str]:
-    """The table of pairs of options, with the kinds of systems that go with each of both."""
+    """The table of pairs of options, with the kinds of systems that work with each of both."""
     names = list(OPTIONS)
     yield _row("", *(f"`{name}`" for name in names[:-1]))
     yield _row(*["---"] * len(names))

@@ -236,7 +236,7 @@ def test_what_stopped_goes_on_with_more_steps() -> None:
         ({"v": np.zeros(2)}, "resume: expected a run of batch"),
         ({"resume": 3}, "resume: expected a Run or a World that goes on, got 3"),
         ({"t0": 1.0}, "t0: the run that goes on has its own, got 1.0"),
-        ({"at": None, "dt": 0.1, "steps": 3}, "steps: goes with fixed steps only, and the run that goes on has adaptive steps"),
+        ({"at": None, "dt": 0.1, "steps": 3}, "steps: works with fixed steps only, and the run that goes on has adaptive steps"),
     ],
 )
 def test_what_does_not_go_on(more: dict[str, Any], message: str) -> None:
@@ -429,8 +429,8 @@ def test_each_member_its_tolerance() -> None:
         ({"at": [-1.0, 1.0]}, ArgumentError, "ascend from t0 = 0"),
         ({"at": 3.0}, ArgumentError, "at: expected times along the first axis"),
         ({"at": []}, ArgumentError, "at: expected times along the first axis"),
-        ({"steps": 3}, ArgumentError, "steps: goes with fixed steps only"),
-        ({"start": "first_order", "form": "matrix"}, ArgumentError, "start, form: goes with fixed steps only"),
+        ({"steps": 3}, ArgumentError, "steps: works with fixed steps only"),
+        ({"start": "first_order", "form": "matrix"}, ArgumentError, "start, form: works with fixed steps only"),
         ({"max_steps": 0}, ArgumentError, "max_steps: expected 1 or more"),
         ({"dt": -1.0}, ArgumentError, "dt: expected a step above zero"),
         ({"tolerance": np.ones(3), "y": np.ones(2)}, ArgumentError, "do not broadcast"),

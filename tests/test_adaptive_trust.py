@@ -421,7 +421,7 @@ def test_scenes_sweeps_and_solve_ivp() -> None:
     pytest.importorskip("xarray")
     swept = sw.sweep(gated, {"begin": ("run", [7.3]), "end": ("run", [7.33])}, "merson", y=0.1, tolerance=1e-8, at=at, **options)
     assert swept.y_last.values[0] == run.y[-1]
-    with pytest.raises(ArgumentError, match="max_step: goes with tolerance= and at= only"):
+    with pytest.raises(ArgumentError, match="max_step: works with tolerance= and at= only"):
         sw.integrate(system, "merson", y=0.1, dt=0.1, steps=2, max_step=0.1)
 
 

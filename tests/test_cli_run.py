@@ -38,7 +38,7 @@ def test_a_tolerance_makes_the_run_of_integrate(capsys: Any) -> None:
     for option in ("--steps", "--every"):
         code, _, err = run_command(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6", option, "5")
         assert code == 2
-        assert err.startswith(f"stepwell: {option}: goes with fixed steps only")
+        assert err.startswith(f"stepwell: {option}: works with fixed steps only")
 
 
 def test_form_and_start_are_those_of_integrate(capsys: Any) -> None:

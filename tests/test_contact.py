@@ -289,11 +289,11 @@ def test_what_does_not_go_together_is_refused() -> None:
         sw.Floor(restitution=1.5)
     with pytest.raises(ArgumentError, match="omega: expected the frequency of the spring, got None"):
         sw.Floor(way="spring")
-    with pytest.raises(ArgumentError, match='omega: goes with way="spring" only'):
+    with pytest.raises(ArgumentError, match='omega: works with way="spring" only'):
         sw.Floor(omega=1.0)
-    with pytest.raises(ArgumentError, match="friction: goes with ways other than"):
+    with pytest.raises(ArgumentError, match="friction: works with ways other than"):
         sw.Floor(friction=0.1, way="spring", omega=1.0)
-    with pytest.raises(ArgumentError, match="restitution: goes with"):
+    with pytest.raises(ArgumentError, match="restitution: works with"):
         sw.Floor(restitution=0.5, way="flip")
     with pytest.raises(ArgumentError, match="normal: expected a vector with a direction"):
         sw.Floor(normal=(0.0, 0.0))

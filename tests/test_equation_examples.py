@@ -14,7 +14,7 @@ PICTURES = ROOT / "docs" / "images" / "equations"
 #: Equal bits make the last line the same everywhere.
 LAST_LINES = {
     "camera": "a spring of 20 rad/s is stable from 24.14 frames a second on",
-    "cart_pole": "6106 of 10100 poles are caught, all those that the two laws tell and no other",
+    "cart_pole": "6106 of 10100 poles are caught, all those that the two formulas predict and no other",
     "double_pendulum": "energy after 120 s: -0.759 J alone, +0.00000 J with a projection",
     "epidemic": "at R0 = 2 79.68 % fall ill; the formula says 79.68 %",
     "luneburg_lens": "13 rays pass the focus within 2e-08 radii",

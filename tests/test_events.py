@@ -406,7 +406,7 @@ def test_wrong_events(wrong: tuple[Any, str]) -> None:
 
 def test_what_does_not_go_with_events() -> None:
     start: dict[str, Any] = {"v": 0.0, "y": 1.0, "events": crossing}
-    with pytest.raises(sw.errors.UnsupportedError, match="events: goes with form='direct' only"):
+    with pytest.raises(sw.errors.UnsupportedError, match="events: works with form='direct' only"):
         sw.integrate(sw.Oscillator(), "rk4", **start, dt=0.1, steps=5, form="power")
     many, system = sw.Event(crossing, most=10**6), sw.Oscillator(np.ones(10**6))
     with pytest.raises(sw.errors.TooLargeError, match="the events of 1000000 members need"):

@@ -148,7 +148,7 @@ def assert_counted(explained: sw.Explanation) -> None:
 
 
 def refused_in_float32(system: sw.System, method: sw.Method) -> bool:
-    """Whether float32 does not go with them, in words that say so."""
+    """Whether float32 does not work with them, in words that say so."""
     try:
         sw.explain(system, method, dtype="float32")
     except (ArgumentError, UnsupportedError) as error:

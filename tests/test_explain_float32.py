@@ -1,4 +1,4 @@
-"""What only a step in float32 is said to be: shorter numbers, wider kernels, and what it does not go with."""
+"""What only a step in float32 is said to be: shorter numbers, wider kernels, and what it does not work with."""
 
 from __future__ import annotations
 
@@ -54,13 +54,13 @@ def test_what_cannot_be_explained_says_so() -> None:
     bodies = sw.NBody([1.0, 1.0])
     for system, method, options, message in (
         (sw.Oscillator(), "merson", {"attempt": True}, "attempt: in float32 an attempt is two lists"),
-        (sw.Oscillator(), "taylor", {}, "dtype: float32 does not go with taylor"),
+        (sw.Oscillator(), "taylor", {}, "dtype: float32 does not work with taylor"),
         (bodies, "rk4", {"record": "energy"}, "record: float32 runs compute it of the saved states, in float64"),
         (sw.Oscillator(a=sw.Sampled([1.0, 2.0], 1.0)), "rk4", {}, "dtype: a listing has numbers of one width"),
     ):
         with pytest.raises(UnsupportedError, match=message):
             sw.explain(system, method, dtype="float32", **options)  # type: ignore[arg-type]
-    with pytest.raises(ArgumentError, match="is too long; float32 goes with steps of up to 4000"):
+    with pytest.raises(ArgumentError, match="is too long; float32 works with steps of up to 4000"):
         sw.explain(sw.NBody(np.ones(200)), "rk4", dtype="float32")
     assert _core.isa()
 

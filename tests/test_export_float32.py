@@ -63,7 +63,7 @@ def test_what_does_not_go_is_refused() -> None:
     sampled = sw.Oscillator(a=sw.Sampled([1.0, 2.0], 1.0))
     for system, method, options, error, message in (
         (sampled, "rk4", {}, UnsupportedError, "dtype: an exported step has numbers of one width"),
-        (sw.Oscillator(), "taylor", {}, UnsupportedError, "dtype: float32 does not go with taylor"),
+        (sw.Oscillator(), "taylor", {}, UnsupportedError, "dtype: float32 does not work with taylor"),
         (sw.Oscillator(), "rk4", {"y": 1e39}, ArgumentError, "y: expected numbers up to 3.4e38"),
         (
             sw.Oscillator(),

@@ -77,7 +77,7 @@ def test_a_world_takes_arrays_of_its_dtype_only() -> None:
     for dtype, other in (("float32", np.float64), ("float64", np.float32)):
         with pytest.raises(DTypeError, match=rf"^v: expected dtype {dtype} to step in place, got {np.dtype(other)}"):
             sw.World(sw.Oscillator(), "rk4", v=np.zeros(3, other), y=np.zeros(3, dtype), dt=0.1, dtype=dtype)
-    with pytest.raises(UnsupportedError, match=r"does not go with taylor"):
+    with pytest.raises(UnsupportedError, match=r"does not work with taylor"):
         sw.World(sw.Oscillator(), "taylor", v=np.zeros(1, F), y=np.zeros(1, F), dt=0.1, dtype="float32")
 
 
@@ -345,14 +345,14 @@ REFUSED: list[tuple[Any, dict[str, Any], str]] = [
     (sw.Oscillator(), PACED | {"tolerance": 1e-7}, "tolerance: in float32 a step rounds the state by up to 2⁻²³"),
     (sw.Oscillator(), PACED | {"tolerance": (1e-9, 1e-8)}, "got 1.1e-08 of the size at the start"),
     (sw.Oscillator(), PACED | {"y": 1e39}, "y: expected numbers up to 3.4e38"),
-    (sw.Oscillator(), PACED | {"method": "taylor"}, "does not go with taylor, whose series"),
+    (sw.Oscillator(), PACED | {"method": "taylor"}, "does not work with taylor, whose series"),
     (sw.Oscillator(x=sw.Sampled([0.0, 1e39], 1.0)), {}, "samples of x: expected numbers up to 3.4e38"),
     (sw.Oscillator(x=sw.Sinusoid(1.0, 1e9)), {}, "a sinusoid's angle may grow to"),
     (sw.Oscillator(), {"dt": 1e-50}, "dt: expected a number of size 1.4e-45 to 3.4e38 units of time in float32"),
     (sw.Oscillator(), {"y": 1e39}, "y: expected numbers up to 3.4e38"),
     (sw.Oscillator(1e39), {"dt": 1e-30}, "omega: expected numbers up to 3.4e38"),
     (sw.NBody(np.ones(60)), {"v": np.zeros((60, 2)), "y": np.random.default_rng(0).normal(size=(60, 2))}, "is too long"),
-    (sw.Oscillator(), {"method": "taylor"}, "does not go with taylor, whose series"),
+    (sw.Oscillator(), {"method": "taylor"}, "does not work with taylor, whose series"),
 ]
 
 

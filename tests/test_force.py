@@ -382,7 +382,7 @@ def test_what_has_no_velocity_takes_no_force() -> None:
 
 @pytest.mark.parametrize("form", ["matrix", "power"])
 def test_it_goes_with_the_direct_form(form: str) -> None:
-    with pytest.raises(UnsupportedError, match="force: goes with form='direct' only"):
+    with pytest.raises(UnsupportedError, match="force: works with form='direct' only"):
         sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, force=1.0, form=form)
 
 

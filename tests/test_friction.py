@@ -299,7 +299,7 @@ REFUSALS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "an attempt": (
         lambda: sw.explain(sw.Oscillator(friction=0.1), "merson", attempt=True),
         UnsupportedError,
-        "attempt: adaptive steps do not go with friction that sticks",
+        "attempt: adaptive steps do not work with friction that sticks",
     ),
     "a matrix": (
         lambda: sw.integrate(sw.Oscillator(friction=0.1), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, form="matrix"),

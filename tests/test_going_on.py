@@ -50,7 +50,7 @@ def test_what_one_method_carries_is_not_for_another(method: str, other: str) -> 
     with pytest.raises(ArgumentError, match="resume: expected a run with adaptive steps, since tolerance= or at= was given"):
         sw.integrate(chain(), "merson", at=[2.0], resume=half)
     chosen = sw.integrate(chain(), "merson", v=0.0, y=0.0, tolerance=1e-3, at=[1.0])
-    with pytest.raises(ArgumentError, match="steps: goes with fixed steps only, and the run that goes on has adaptive steps"):
+    with pytest.raises(ArgumentError, match="steps: works with fixed steps only, and the run that goes on has adaptive steps"):
         sw.integrate(chain(), "merson", steps=3, resume=chosen)
     with pytest.raises(ArgumentError, match="resume: expected a run with fixed steps, or a world, got one with adaptive steps"):
         sw.World(chain(), "merson", resume=chosen)

@@ -18,7 +18,7 @@ from support.cases import ADAPTIVE, SYSTEMS, drawn, fits
 from support.graphs import MANY, assert_one_graph, methods, model
 from support.tracing import ABLE, CONTROLS, METHODS, made
 
-#: Whether numbers are of float32, which does not go with series.
+#: Whether numbers are of float32, which does not work with series.
 SINGLE = pytest.mark.parametrize("single", [False, True], ids=["float64", "float32"])
 
 

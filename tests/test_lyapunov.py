@@ -292,8 +292,8 @@ def test_with_a_tolerance_a_member_that_stops_has_none() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"steps": 10}, "steps: goes with fixed steps only"),
-        ({"every": 10}, "every: goes with fixed steps only"),
+        ({"steps": 10}, "steps: works with fixed steps only"),
+        ({"every": 10}, "every: works with fixed steps only"),
         ({"at": None}, "at: expected too"),
         ({"tolerance": None}, "tolerance: expected too"),
         ({"at": [1.0, 1.0]}, "at: expected times after t0 = 0, ascending"),

@@ -108,7 +108,7 @@ def test_masks_are_not_lost() -> None:
 
 @pytest.mark.parametrize("most", ["junk", 5, 1_000_000])
 def test_the_most_steps_of_a_run_of_fixed_ones(most: Any) -> None:
-    with pytest.raises(ArgumentError, match="max_steps: goes with tolerance= and at= only"):
+    with pytest.raises(ArgumentError, match="max_steps: works with tolerance= and at= only"):
         sw.integrate(sw.Oscillator(), "rk4", **FIXED, max_steps=most)
 
 

@@ -21,7 +21,7 @@ from stepwell.studies.sweeps import outcomes
 from support.sweeping import AXES, OUTCOMES, duffing, small, unlike
 
 Oscillator = sw.Oscillator
-#: Outcomes that go with float32.
+#: Outcomes that work with float32.
 WITH_FLOAT32 = tuple(each for each in OUTCOMES if each != "lyapunov")
 
 each_type = pytest.mark.parametrize("dtype", ["float64", "float32"])
@@ -301,7 +301,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "a number as an outcome": ({"outcomes": [3]}, "outcomes: expected words, outcomes or functions of a run, got 3"),
     "two of one name": ({"outcomes": ["crossing", sw.sweeps.Crossing("y", 0.5)]}, "outcomes: there are two results 'y_crossing'"),
     "a history without an interval": ({"outcomes": "history"}, "every: expected how many steps are between the states"),
-    "an interval of nothing": ({"outcomes": "last", "every": 3}, "every: goes with the outcome 'history' or a function"),
+    "an interval of nothing": ({"outcomes": "last", "every": 3}, "every: works with the outcome 'history' or a function"),
     "an unknown quantity": ({"outcomes": sw.sweeps.Mean("momentum")}, "of: there is no 'momentum'"),
     "a component of a number": ({"outcomes": sw.sweeps.Mean(("y", 0))}, "of: a component of y of shape () is (\"y\"), got"),
     "a store without an ending": ({"store": "somewhere"}, "store: expected a path that ends in .zarr or .nc, got 'somewhere'"),
@@ -337,7 +337,7 @@ def test_what_is_refused(what: str) -> None:
             "dt: expected a number of size 1.4e-45 to 3.4e38 units of time in float32",
         ),
         ({"y": 1e39}, ArgumentError, "y: expected numbers up to 3.4e38"),
-        ({"method": "taylor"}, UnsupportedError, "dtype: float32 does not go with taylor"),
+        ({"method": "taylor"}, UnsupportedError, "dtype: float32 does not work with taylor"),
         ({"dtype": "float16"}, DTypeError, "dtype: expected 'float64' or 'float32', got 'float16'"),
     ],
 )

@@ -35,7 +35,7 @@ OUTCOMES = (
 
 
 def adaptive(**options: Any) -> Any:
-    """A sweep of 45 members with every outcome that goes with a tolerance."""
+    """A sweep of 45 members with every outcome that works with a tolerance."""
     arguments: dict[str, Any] = {"v": 0.0, "tolerance": 1e-8, "at": AT, "outcomes": OUTCOMES} | options
     axes, method = arguments.pop("axes", AXES), arguments.pop("method", "dop853")
     return sw.sweep(partial(duffing, delta=0.2), axes, method, **arguments)
@@ -323,11 +323,11 @@ GOOD: dict[str, Any] = {
     "at": [1.0, 2.0],
 }
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
-    "steps": ({"steps": 10}, "steps: goes with fixed steps only, and tolerance= or at= was given"),
-    "a transient": ({"transient": 0}, "transient: goes with fixed steps only"),
-    "an interval": ({"every": 2, "outcomes": "history"}, "every: goes with fixed steps only"),
-    "an interval of reductions": ({"observe": 2}, "observe: goes with fixed steps only"),
-    "a start": ({"start": "first_order"}, "start: goes with fixed steps only"),
+    "steps": ({"steps": 10}, "steps: works with fixed steps only, and tolerance= or at= was given"),
+    "a transient": ({"transient": 0}, "transient: works with fixed steps only"),
+    "an interval": ({"every": 2, "outcomes": "history"}, "every: works with fixed steps only"),
+    "an interval of reductions": ({"observe": 2}, "observe: works with fixed steps only"),
+    "a start": ({"start": "first_order"}, "start: works with fixed steps only"),
     "steps as an axis": ({"axes": {"dt": [0.1, 0.2]}}, "axes: dt: with a tolerance, dt is the step to try first"),
     "no times": ({"at": None}, "at: expected too with tolerance=: the times at which states are saved, such as at="),
     "times alone": (
@@ -364,7 +364,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         {"tolerance": None, "at": None, "dt": 0.1, "steps": 10, "outcomes": "evaluations"},
         "outcomes: Evaluations: with fixed steps every member has the same number",
     ),
-    "a budget of fixed steps": ({"tolerance": None, "at": None, "dt": 0.1, "steps": 9, "max_steps": 9}, "max_steps: goes with"),
+    "a budget of fixed steps": ({"tolerance": None, "at": None, "dt": 0.1, "steps": 9, "max_steps": 9}, "max_steps: works with"),
     "nothing of either": ({"tolerance": None, "at": None, "dt": 0.1}, "steps: expected with fixed steps; or give tolerance="),
 }
 

@@ -1,5 +1,5 @@
-"""A double pendulum loses energy by the method, not by friction
-=============================================================
+"""Runge-Kutta 4 drains a double pendulum; a projection prevents it
+================================================================
 
 Mechanics: a double pendulum, and its energy.
 

@@ -1,5 +1,5 @@
-"""Each ball rests when the series of its bounces says
-===================================================
+"""Each ball comes to rest when its series of bounces predicts
+===========================================================
 
 Six balls with six restitutions e fall from 1 m in one call. A bounce leaves the speed
 e·u, so the times between bounces are a geometric series, and the ball rests at (1 +

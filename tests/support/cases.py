@@ -249,7 +249,7 @@ SYSTEMS: dict[str, Make] = {
 
 
 def _adaptive(system: sw.System) -> bool:
-    """Whether it goes with adaptive steps: friction depends on the step, and a step that meets a surface is no estimate."""
+    """Whether it works with adaptive steps: friction depends on the step, and a step that meets a surface is no estimate."""
     return system.stick_friction is None and all(surface.way == "spring" for surface in system.contacts)
 
 
@@ -283,7 +283,7 @@ class Case:
         return system, {"method": self.method, "v": v, "y": y, "dt": 0.1, "form": self.form, "start": self.start}
 
     def refused_in_float32(self) -> str:
-        """Why float32 does not go with it, or nothing."""
+        """Why float32 does not work with it, or nothing."""
         try:
             self.run(1, steps=1, every=None, dtype="float32")
         except (UnsupportedError, ArgumentError, TraceError) as error:

@@ -106,7 +106,7 @@ METHODS = (
     *("fehlberg", "merson", "rk4", "fehlberg_5", "pefrl", "dop853"),
 )
 ABLE = [m for m in METHODS if sw.method(m).error_order is not None]
-#: Those that a control or a projection goes with.
+#: Those that a control or a projection works with.
 HELD = [m for m in METHODS if not sw.method(m).needs_acceleration]
 QUANTITIES = ("energy", "momentum", "angular_momentum", "closest")
 FORCES = ("logarithmic", "newton", "printed")

@@ -35,7 +35,7 @@ class Part(Immutable, ValueEquality, ABC):
     is_scaled: ClassVar[bool] = False
 
     def check(self, system: Any) -> None:
-        """Raise if it does not go with a system."""
+        """Raise if it does not work with a system."""
         return
 
     @property

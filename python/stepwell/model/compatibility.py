@@ -37,14 +37,14 @@ def fits_together(system: System, method: Method) -> None:
 
 
 def not_of_a_step(control: Any) -> None:
-    """Raise if a control does not go with adaptive steps."""
+    """Raise if a control does not work with adaptive steps."""
     if getattr(control, "relative", None) is not None and control.gain is None:
         raise UnsupportedError(
             f"tolerance: {control!r} relates its gain to steps of fixed length; give gain in place of relative"
         )
     if getattr(control, "of_a_step", False):
         raise UnsupportedError(
-            f"tolerance: {control!r} is relative to steps of fixed length; use a projection, which goes with any steps"
+            f"tolerance: {control!r} is relative to steps of fixed length; use a projection, which works with any steps"
         )
 
 
@@ -69,7 +69,7 @@ def fits_own_times(system: System, single: bool) -> None:
     """Raise if members of a system cannot have times of their own."""
     if single and system.has_time:
         raise UnsupportedError(
-            "t0: one for each member goes with float64, for in float32 t0 + k·dt of each would be rounded twice; make a run for "
+            "t0: one for each member works with float64, for in float32 t0 + k·dt of each would be rounded twice; make a run for "
             "each t0"
         )
 

@@ -45,12 +45,12 @@ class Surface(Immutable, ValueEquality, ABC):
             raise ArgumentError(
                 "omega: expected the frequency of the spring, got None"
                 if springs
-                else f'omega: goes with way="spring" only, got way={way!r}'
+                else f'omega: works with way="spring" only, got way={way!r}'
             )
         if way in ("flip", "spring") and (self.restitution != 1.0).any():
-            raise ArgumentError(f'restitution: goes with way="safe" or "restitution", got way={way!r}')
+            raise ArgumentError(f'restitution: works with way="safe" or "restitution", got way={way!r}')
         if springs and friction is not None:
-            raise ArgumentError('friction: goes with ways other than "spring", which has no impulse')
+            raise ArgumentError('friction: works with ways other than "spring", which has no impulse')
 
     @property
     def batch(self) -> Shape:

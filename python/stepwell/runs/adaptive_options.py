@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def check_adaptive(options: Options, before: Continuation | None) -> None:
-    """Raise if an option goes with fixed steps only, or if ``tolerance`` or ``at`` is missing."""
+    """Raise if an option works with fixed steps only, or if ``tolerance`` or ``at`` is missing."""
     if before is not None and not before.adaptive:
         raise ArgumentError(
             "resume: expected a run with adaptive steps, since tolerance= or at= was given, got one with fixed steps; start anew "
@@ -35,7 +35,7 @@ def check_adaptive(options: Options, before: Continuation | None) -> None:
         fixed["form"] = options.form
     if wrong := [name for name, value in fixed.items() if value is not None]:
         why = "and the run that goes on has adaptive steps" if before is not None else "and tolerance= or at= was given"
-        raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, {why}")
+        raise ArgumentError(f"{', '.join(wrong)}: works with fixed steps only, {why}")
     check_times(options.tolerance is not None or before is not None, options.at)
 
 

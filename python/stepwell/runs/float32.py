@@ -18,26 +18,26 @@ if TYPE_CHECKING:
 
 
 def check(system: System, method: Method, form: str = "direct") -> None:
-    """Raise if this system, method or form does not go with float32."""
+    """Raise if this system, method or form does not work with float32."""
     if form == "power":
         raise UnsupportedError(
-            "dtype: float32 does not go with form='power': each squaring of a matrix doubles the error of the power, which is "
+            "dtype: float32 does not work with form='power': each squaring of a matrix doubles the error of the power, which is "
             "2⁻²⁴ times the steps in the end; use form='matrix', or round the states of float64"
         )
     if method.has_series:
         raise UnsupportedError(
-            f"dtype: float32 does not go with {method.name}, whose series are computed in float64 only; use float64, or a "
+            f"dtype: float32 does not work with {method.name}, whose series are computed in float64 only; use float64, or a "
             f"Runge-Kutta method such as rk4"
         )
     if system.contacts and _is_of_rods(system):
         raise UnsupportedError(
-            f"dtype: float32 does not go with rods that meet surfaces, whose joints are decided by more digits than it has, got "
-            f"{system!r}; use float64"
+            f"dtype: float32 does not work with rods that meet surfaces, whose joints are decided by more digits than it has, "
+            f"got {system!r}; use float64"
         )
 
 
 def step(system: System, method: Method, form: str, dt: float) -> float:
-    """The step rounded to float32; raise if it is out of range, or if this system, method or form does not go with float32."""
+    """The step rounded to float32; raise if it is out of range, or if this system, method or form does not work with float32."""
     check(system, method, form)
     return rounded_step(dt)
 

@@ -1,4 +1,4 @@
-"""The options of a run, and checks of those that go with fixed and with adaptive steps."""
+"""The options of a run, and checks of those that work with fixed and with adaptive steps."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def event_list(events: Any, form: str) -> list[Event]:
 
     if form != "direct":
         raise UnsupportedError(
-            f"events: goes with form='direct' only, got form={form!r}; a located event ends a shorter step, and a "
+            f"events: works with form='direct' only, got form={form!r}; a located event ends a shorter step, and a "
             f"matrix is of steps of one length"
         )
     return several(events)
@@ -134,7 +134,7 @@ def check_matrix_form(system: System, method: Method, form: str, force: Any) -> 
     """Raise if there is no transition matrix."""
     if force is not None:
         raise UnsupportedError(
-            f"force: goes with form='direct' only, got form={form!r}; the matrices of a step have no term for it: "
+            f"force: works with form='direct' only, got form={form!r}; the matrices of a step have no term for it: "
             f"give the linear system an input"
         )
     if not system.linear:

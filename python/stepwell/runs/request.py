@@ -135,11 +135,11 @@ class Request(NamedTuple):
         if before is not None:
             continuation.changes_on(before, events)
         if max_steps is not None:
-            raise ArgumentError("max_steps: goes with tolerance= and at= only; steps= is the number of steps of fixed length")
+            raise ArgumentError("max_steps: works with tolerance= and at= only; steps= is the number of steps of fixed length")
         if max_step is not None or jumps is not None or positive_components is not None:
             adaptive_only = (("max_step", max_step), ("jumps", jumps), ("positive", positive_components))
             name = next(name for name, option in adaptive_only if option is not None)
-            raise ArgumentError(f"{name}: goes with tolerance= and at= only; all steps of fixed length are dt long")
+            raise ArgumentError(f"{name}: works with tolerance= and at= only; all steps of fixed length are dt long")
         if dt is None or steps is None:
             missing = " and ".join(name for name, value in (("dt", dt), ("steps", steps)) if value is None)
             raise ArgumentError(f"{missing}: needed for fixed steps, got None; for adaptive steps give tolerance= and at=")

@@ -138,7 +138,7 @@ def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
         that without a control.
 
     Raises:
-        ArgumentError: if the scene has no exact solution, and its system does not go with adaptive steps.
+        ArgumentError: if the scene has no exact solution, and its system does not work with adaptive steps.
     """
     if scene.exact is not None:
         return scene
@@ -146,7 +146,7 @@ def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
         what = "surfaces" if scene.system.contacts else "friction that sticks"
         raise ArgumentError(
             f"exact: needed by {scene.name}, whose system has {what}, got None: the reference solution of other scenes is a run "
-            f"with adaptive steps, which do not go with {what}; give the solution as a function of times"
+            f"with adaptive steps, which do not work with {what}; give the solution as a function of times"
         )
     times = np.linspace(0.0, scene.horizon, SAMPLES + 1)
     method = method_for(scene)

@@ -50,7 +50,7 @@ pub enum Error {
         method: &'static str,
     },
     /// A step that is too long for one tape, which fused multiply-adds need.
-    #[error("fused: a step of about {operations} operations is too long; fused multiply-adds go with steps of up to {most}")]
+    #[error("fused: a step of about {operations} operations is too long; fused multiply-adds work with steps of up to {most}")]
     TooLongToFuse {
         /// What a step has.
         operations: usize,
@@ -84,7 +84,7 @@ pub enum Error {
     },
     /// A step that is too long for one tape, on which alone members have times of their own.
     #[error(
-        "t0: a step of about {operations} operations is too long for times of its members' own, which go with steps of up to {most}; make \
+        "t0: a step of about {operations} operations is too long for times of its members' own, which work with steps of up to {most}; make \
          a run for each t0"
     )]
     TooLongForTimes {
@@ -94,7 +94,7 @@ pub enum Error {
         most: usize,
     },
     /// A step that is too long for one tape, which numbers of 32 bits need.
-    #[error("dtype: a step of about {operations} operations is too long; float32 goes with steps of up to {most}")]
+    #[error("dtype: a step of about {operations} operations is too long; float32 works with steps of up to {most}")]
     TooLongForSingle {
         /// What a step has.
         operations: usize,
@@ -102,14 +102,14 @@ pub enum Error {
         most: usize,
     },
     /// What is not computed with numbers of 32 bits.
-    #[error("dtype: float32 does not go with {of}; use float64")]
+    #[error("dtype: float32 does not work with {of}; use float64")]
     NotSingle {
         /// What was asked for.
         of: &'static str,
     },
     /// Adaptive steps under a control whose push depends on the step, of a system too long for one tape.
     #[error(
-        "control: with a tolerance a step that is too long for one list of operations goes with a projection or the printed form only"
+        "control: with a tolerance a step that is too long for one list of operations works with a projection or the printed form only"
     )]
     ControlTooLong,
     /// Arrays that do not fit together.

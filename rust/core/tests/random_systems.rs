@@ -100,7 +100,7 @@ fn case(seed: u64) -> Case {
     let is_second_order = random.below(2) == 0;
     let y = if is_second_order { v } else { 1 + random.below(4) };
     let parameters = random.below(4);
-    // Methods that need an acceleration go with rates that do not read v.
+    // Methods that need an acceleration work with rates that do not read v.
     let reads_v = random.below(2) == 0;
     let mut ops: Vec<Op> = (0..parameters).map(|i| Op::Param(i as u32)).collect();
     ops.extend((if reads_v { 0 } else { v }..v + y).map(|i| Op::State(i as u32)));

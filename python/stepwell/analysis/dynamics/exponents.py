@@ -173,7 +173,7 @@ def lyapunov(
     settings["threads"] = None if threads is None else checks.count("threads", threads, 1, 4096)
     if tolerance is not None or at is not None:
         if wrong := [name for name, value in (("steps", steps), ("every", every)) if value is not None]:
-            raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
+            raise ArgumentError(f"{', '.join(wrong)}: works with fixed steps only, and tolerance= or at= was given")
         result = adaptive_averages(system, method, v, y, tolerance, at, dt=dt, **settings)
     else:
         if missing := [name for name, value in (("dt", dt), ("steps", steps)) if value is None]:

@@ -204,7 +204,7 @@ class System(Immutable, ValueEquality, ABC):
 
         Raises:
             ArgumentError: if the batch of the part does not broadcast with that of the system.
-            UnsupportedError: if the part does not go with the system.
+            UnsupportedError: if the part does not work with the system.
         """
         if not isinstance(part, Part):
             raise DTypeError(f"part: expected something around a system, got {checks.short(part)} ({type(part).__name__})")

@@ -124,7 +124,7 @@ def _attempted(system: System, method: Method, control: AnyControl | None, dtype
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"attempt: {method.name} does not estimate its error, so it cannot choose its steps; use {able}")
     if system.stick_friction is not None:
-        raise UnsupportedError(f"attempt: adaptive steps do not go with friction that sticks, which {system!r} has")
+        raise UnsupportedError(f"attempt: adaptive steps do not work with friction that sticks, which {system!r} has")
     if form != "direct":
         raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
     not_of_a_step(system.keeper if control is None else control)

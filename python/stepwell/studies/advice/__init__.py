@@ -95,7 +95,7 @@ def advise(
         fixed: leave out adaptive steps, which a ``World`` cannot take.
         dtype: ``"float64"``, ``"float32"``, or ``"both"``, which also tries each method with fixed steps in float32. There a
             step takes about half the time, and rounding bounds what is accurate enough. Of equal costs, as evaluations are,
-            float64 comes first. With ``"float32"`` there are no adaptive steps, which it does not go with.
+            float64 comes first. With ``"float32"`` there are no adaptive steps, which it does not work with.
 
     Returns:
         An ``Advice``; print it.
@@ -200,7 +200,7 @@ def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
     if candidate.by == "tolerance" and scene.control is not None:
         return "adaptive steps are tried for scenes without a control only"
     if candidate.by == "tolerance" and scene.system.contacts:
-        return "adaptive steps do not go with surfaces"
+        return "adaptive steps do not work with surfaces"
     dt = TIMED_STEP * scene.dt
     try:
         if candidate.dtype == "float32":

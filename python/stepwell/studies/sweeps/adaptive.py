@@ -92,7 +92,7 @@ def arguments(
         UnsupportedError: if an argument is not supported with a tolerance.
     """
     if wrong := [name for name, value in fixed.items() if value is not None]:
-        raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
+        raise ArgumentError(f"{', '.join(wrong)}: works with fixed steps only, and tolerance= or at= was given")
     varied = {axis.argument: axis for axis in grid.axes}
     if "dt" in varied:
         raise ArgumentError(
@@ -150,9 +150,9 @@ def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
 def refuse_fixed(outcomes: Iterable[Outcome], options: Mapping[str, Any]) -> None:
     """Raise if there is an argument that needs a tolerance."""
     if options["max_steps"] is not None:
-        raise ArgumentError("max_steps: goes with tolerance= and at= only; steps= is the number of steps of fixed length")
+        raise ArgumentError("max_steps: works with tolerance= and at= only; steps= is the number of steps of fixed length")
     if wrong := [name for name, value in options.items() if value is not None]:
-        raise ArgumentError(f"{', '.join(wrong)}: goes with tolerance= and at= only; steps of fixed length are dt long")
+        raise ArgumentError(f"{', '.join(wrong)}: works with tolerance= and at= only; steps of fixed length are dt long")
     if any(isinstance(each, Evaluations) for each in outcomes):
         raise UnsupportedError(
             "outcomes: Evaluations: with fixed steps every member has the same number, method(…).evaluations a step; it goes "

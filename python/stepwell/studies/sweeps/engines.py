@@ -39,7 +39,7 @@ class Engine:
             self.workers = available() if threads is None else checks.count("threads", threads, 1, 4096)
             return
         if threads is not None:
-            raise ArgumentError("threads: goes with threads of this process only, and engine= was given")
+            raise ArgumentError("threads: works with threads of this process only, and engine= was given")
         if isinstance(engine, Executor):
             self._executor = engine
             self.workers = int(getattr(engine, "_max_workers", 0) or available())

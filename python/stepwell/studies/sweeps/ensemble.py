@@ -291,7 +291,7 @@ def _outcomes(outcomes: Any, every: int | None) -> tuple[Outcome, ...]:
     if not chosen:
         raise ArgumentError(f"outcomes: expected at least one of {', '.join(WORDS)}, or a function of a run, got none")
     if every is not None and not any(isinstance(each, (History, Function)) for each in chosen):
-        raise ArgumentError("every: goes with the outcome 'history' or a function of a run; reductions see states by observe=")
+        raise ArgumentError("every: works with the outcome 'history' or a function of a run; reductions see states by observe=")
     return tuple(chosen)
 
 

@@ -278,7 +278,7 @@ def called(name: Any, of: Of | None) -> str | None:
     if name is None:
         return None
     if of is None:
-        raise ArgumentError(f"name: goes with of=, since there are results of v and of y, got {checks.short(name)}")
+        raise ArgumentError(f"name: works with of=, since there are results of v and of y, got {checks.short(name)}")
     if not isinstance(name, str) or not name.isidentifier():
         raise ArgumentError(f"name: expected the name of a variable, got {checks.short(name)}")
     return name

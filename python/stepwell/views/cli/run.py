@@ -131,7 +131,7 @@ def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: d
     """Run with adaptive steps over the horizon; the states are saved at equidistant times."""
     for option in ("steps", "every"):
         if getattr(args, option) is not None:
-            raise ArgumentError(f"--{option}: goes with fixed steps only; with --tolerance the steps follow the error")
+            raise ArgumentError(f"--{option}: works with fixed steps only; with --tolerance the steps follow the error")
     at = np.linspace(0.0, chosen.horizon, 1 + (SAVED_ADAPTIVE_TO_DRAW if to_draw else SAVED_ADAPTIVE))
     return _noticing(chosen, args, dt=args.dt, tolerance=args.tolerance, at=at, **options)
 

@@ -219,7 +219,7 @@ impl Equations {
     }
 
     /// Whether each operation comes after what it reads, no leaf is beyond so many parameters, tables and numbers of the state,
-    /// an invariant has a derivative by each number of the blocks, and a mass matrix goes with y alone.
+    /// an invariant has a derivative by each number of the blocks, and a mass matrix works with y alone.
     pub(crate) fn is_sound(&self, parameters: usize, tables: usize, states: usize) -> bool {
         let is_read = |(id, op): (usize, &Op)| {
             let (operands, n) = op.operands();

@@ -359,7 +359,7 @@ fn a_product_of_one_use_is_fused_into_its_sum() {
         ("(+ (* x x) (* y y))", "(muladd y y (* x x))"),
         ("(- (* x x) (* y y))", "(submul y y (* x x))"),
         ("(+ (+ (* x x) (* y y)) (* z z))", "(muladd z z (muladd y y (* x x)))"),
-        // A change of sign goes with it, as it does without.
+        // A change of sign works with it, as it does without.
         ("(+ x (neg (* y z)))", "(submul y z x)"),
         // A fused sum is no product, and a product of it is one like others.
         ("(+ z (* x (+ x (* y z))))", "(muladd x (muladd y z x) z)"),

@@ -47,7 +47,7 @@ pub fn fit(kind: &Kind, signature: &Signature, method: &Record) -> Result<Shape,
     }
 }
 
-/// An error if something is given that goes with steps of fixed length only.
+/// An error if something is given that works with steps of fixed length only.
 pub(crate) fn only_fixed(signature: &Signature) -> Result<(), Error> {
     match parts::<f64>().iter().find(|part| (part.is_given)(signature) && (part.is_only_fixed)(signature)) {
         None => Ok(()),

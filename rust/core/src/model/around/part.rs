@@ -12,11 +12,11 @@ use crate::{
 
 /// A kind of part. A system has it if parameters of its names are given.
 pub(crate) struct Part<N: Number> {
-    /// The name that is reported where it does not go with something.
+    /// The name that is reported where it does not work with something.
     pub name: &'static str,
     /// Whether a system has it.
     pub is_given: fn(&Signature) -> bool,
-    /// An error if its parameters are wrong, or if it does not go with the system or with another part.
+    /// An error if its parameters are wrong, or if it does not work with the system or with another part.
     pub check: fn(&Kind, &Signature, Shape) -> Result<(), Error>,
     /// The term of it that depends on the velocity, if there is one: methods that need an acceleration refuse it.
     pub velocity_term: fn(&Signature, &Record) -> Option<&'static str>,
@@ -24,7 +24,7 @@ pub(crate) struct Part<N: Number> {
     pub attempts: Attempts,
     /// Whether a method's start and finish see it.
     pub is_for_carry: bool,
-    /// Whether it goes with steps of fixed length only, as its parameters are.
+    /// Whether it works with steps of fixed length only, as its parameters are.
     pub is_only_fixed: fn(&Signature) -> bool,
     /// Whether `large/` has it over rows. Otherwise the whole step of a system with it is one tape.
     pub has_rows: bool,
