@@ -78,11 +78,11 @@ def main(folder: Path) -> None:
         xlim=(10, 60),
         ylim=(0.5, 50),
     )
-    axes.set_title("Two laws tell which poles a cart catches: 10 100 runs in one call")
+    axes.set_title("Two formulas predict which of 10 100 poles a cart catches")
     figure.savefig(folder / "cart_pole.png")
     print(
         f"{caught.sum()} of {caught.size} poles are caught, all those that the two "
-        "laws tell and no other"
+        "formulas predict and no other"
     )
 
 
