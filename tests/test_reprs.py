@@ -56,6 +56,11 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "equilibria": lambda: sw.equilibria(sw.Pendulum(), near=(0.0, 0.1)),
     "world": lambda: sw.World(sw.Oscillator(np.ones(1000)), "rk4", v=np.zeros(1000), y=np.ones(1000), dt=0.1),
     "own system": lambda: own(),
+    "stability function": lambda: sw.stability.function("backward_euler"),
+    "lyapunov exponents": lambda: sw.lyapunov(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=20),
+    "stability along": lambda: sw.stability_along(run_of(every=10)),
+    "statement": lambda: sw.paper.entries("§5")[0],
+    "checked statement": lambda: sw.paper.entries("§5")[0].run(),
 }
 
 
@@ -69,7 +74,16 @@ def own() -> sw.System:
 
 #: Of these a notebook shows a table.
 TABLES = ("run", "run with a tolerance", "run of a batch that diverged", "method", "analysis", "analysis of many", "criteria")
-TABLES = (*TABLES, "advice", "explanation", "own system", "scene")
+TABLES = (*TABLES, "advice", "explanation", "own system", "scene", "stability limit", "jacobian", "equilibria", "world")
+TABLES = (
+    *TABLES,
+    "work precision",
+    "stability function",
+    "lyapunov exponents",
+    "stability along",
+    "statement",
+    "checked statement",
+)
 
 
 @pytest.mark.parametrize("name", OBJECTS)

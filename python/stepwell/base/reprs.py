@@ -76,6 +76,15 @@ def facts(title: str, pairs: Iterable[tuple[str, Any]], note: str = "") -> str:
     return table(title, (), rows, [note] if note else [])
 
 
+def cell(value: Any) -> str:
+    """A value of a table, with the digits that a reader takes in; a program reads all of them elsewhere."""
+    if isinstance(value, (bool, np.bool_)):
+        return "yes" if value else "no"
+    if isinstance(value, (float, complex, np.floating, np.complexfloating)):
+        return f"{value:.4g}"
+    return "" if value is None else brief(value)
+
+
 def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], notes: Iterable[str] = ()) -> str:
     """A table for a notebook; columns whose name ends in ``>`` are flush right."""
     from html import escape  # needed in notebooks only

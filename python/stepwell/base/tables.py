@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from . import reprs
 from .files import replaced, write_text
 from .paths import file
 
@@ -37,6 +38,12 @@ class Table(ABC):
         """The rows of the table, each by the names of its columns."""
         columns = self._columns()
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def _repr_html_(self) -> str:
+        """The first rows as a table, for notebooks."""
+        columns = self._columns()
+        rows = [[reprs.cell(value) for value in row] for row in zip(*columns.values(), strict=True)]
+        return reprs.table(type(self).__name__, list(columns), rows)
 
     def as_dict(self) -> Any:
         """All of it for programs: the head, the summary and the rows."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .. import _core
 from ..base import registry
 from ..base.arrays import Array
-from ..base.reprs import MAX_LINE, counted, shortened
+from ..base.reprs import MAX_LINE, counted, facts, shortened
 from ..errors import FixedError
 from ..model.controls import AnyControl
 from ..model.methods import Method
@@ -164,6 +164,16 @@ class World:
         many = f", {counted(prod(members), 'member')}" if members else ""
         where = f"dt = {self.dt:g}, step {self.step_number}, t = {self.t:g}{many}"
         return shortened(f"<world of {self._system!r} by {self.method.name}: {where}>", MAX_LINE)
+
+    def _repr_html_(self) -> str:
+        """What is stepped and how far it is, as a table for notebooks."""
+        pairs = [
+            ("system", repr(self._system)),
+            ("method", self.method.title),
+            ("dt", f"{self.dt:g}"),
+            ("step", self.step_number),
+        ]
+        return facts("World", [*pairs, ("t", f"{self.t:g}"), ("shape of y", self._y.shape)])
 
     def __copy__(self) -> World:
         return _again(self._standing(), self._events)

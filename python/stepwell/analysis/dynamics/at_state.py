@@ -10,7 +10,7 @@ import numpy as np
 from ...base import checks
 from ...base.arrays import Array, Shape
 from ...base.immutable import ValueEquality
-from ...base.reprs import counted
+from ...base.reprs import cell, counted, facts, table
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ..derivatives import traced
@@ -72,6 +72,19 @@ class Jacobian(ValueEquality):
     def eigenvalues(self) -> Complex:
         """The rates λ at which small disturbances grow and rotate, shape (n, *members), the largest real part first."""
         return by_growth(self.matrix)
+
+    def _repr_html_(self) -> str:
+        """The matrix of one member and its eigenvalues, as a table for notebooks."""
+        if self.matrix.ndim > 2:
+            return facts(
+                "Jacobian",
+                [("system", repr(self.system)), ("members", prod(self.matrix.shape[2:])), ("numbers", len(self.names))],
+            )
+        rows = [[f"rate of {name}", *map(cell, row)] for name, row in zip(self.names, self.matrix.tolist(), strict=True)]
+        grown = ", ".join(cell(each) for each in self.eigenvalues[:8])
+        return table(
+            f"Jacobian of {self.system!r}", ["", *(f"by {name}>" for name in self.names)], rows, [f"eigenvalues: {grown}"]
+        )
 
     def __repr__(self) -> str:
         members = self.matrix.shape[2:]

@@ -18,7 +18,7 @@ from ...base import checks
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.interrupts import POLL, available
-from ...base.reprs import counted, share
+from ...base.reprs import cell, counted, facts, share
 from ...errors import ArgumentError, DivergenceWarning, ShapeError, UnsupportedError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
@@ -101,6 +101,15 @@ class Lyapunov(ValueEquality):
             dimension = dimension + np.where(whole, 1.0, share)
             so_far, counting = so_far + each, whole
         return dimension
+
+    def _repr_html_(self) -> str:
+        """The exponents as a table, for notebooks."""
+        pairs = [("system", repr(self.system)), ("method", self.method.title), ("averaged up to t", cell(float(self.t[-1])))]
+        if self.exponents.ndim > 1:
+            pairs += [("members", str(prod(self.exponents.shape[1:]))), ("largest", cell(float(np.nanmax(self.exponents))))]
+        else:
+            pairs += [(f"λ{i + 1}", cell(float(each))) for i, each in enumerate(self.exponents)]
+        return facts("Lyapunov exponents", pairs)
 
     def __repr__(self) -> str:
         members = self.exponents.shape[1:]

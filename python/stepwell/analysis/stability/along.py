@@ -15,6 +15,7 @@ import numpy as np
 from ...base import checks
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
+from ...base.reprs import cell, facts
 from ...errors import ArgumentError, DTypeError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
@@ -81,6 +82,24 @@ class StabilityAlong(ValueEquality):
         if self.run_dt is None:
             raise ArgumentError("exceeded: expected a run with a fixed step, got one with a tolerance")
         return self.run_dt > self.limits
+
+    def _repr_html_(self) -> str:
+        """The smallest limit and where it is set, as a table for notebooks."""
+        pairs: list[tuple[str, Any]] = [("method", self.method.title), ("step of the run", cell(self.run_dt))]
+        if self.limits.ndim > 1:
+            return facts(
+                "Stability limits along runs",
+                [*pairs, ("runs", self.limits[0].size), ("smallest limit", cell(float(np.nanmin(self.dt))))],
+            )
+        above = None if self.run_dt is None else f"{np.count_nonzero(self.exceeded)} of {len(self.limits)} states"
+        grows = None if self.mode is None else self.mode.kind
+        pairs += [
+            ("smallest limit", cell(float(self.dt))),
+            ("set at t", cell(float(self.when))),
+            ("then", grows),
+            ("the step is above it at", above),
+        ]
+        return facts("Stability limit along a run", pairs)
 
     def __repr__(self) -> str:
         if self.limits.ndim > 1:

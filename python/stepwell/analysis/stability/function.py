@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...base.reprs import table
 from ...errors import UnsupportedError
 from ...model.methods import Method
 from ...model.methods import method as find_method
@@ -54,6 +55,15 @@ class StabilityFunction(NamedTuple):
     def l_stable(self) -> bool:
         """Whether it is A-stable, and the faster a mode decays, the nearer to zero a step brings it: R(z) → 0 for z → −∞."""
         return self.a_stable and len(self.above.coefficients) < len(self.below.coefficients)
+
+    def _repr_html_(self) -> str:
+        """The polynomials' coefficients as a table, for notebooks."""
+        rows = [
+            [name, *(str(c) for c in p.coefficients), *[""] * (max(len(q.coefficients) for q in self) - len(p.coefficients))]
+            for name, p in zip(("above the line", "below"), self, strict=True)
+        ]
+        powers = [f"z{str(k).translate(SUPERSCRIPTS)}>" for k in range(len(rows[0]) - 1)]
+        return table(repr(self).strip("<>"), ["", *powers], rows)
 
     def __repr__(self) -> str:
         above, below = (" + ".join(_term(c, k) for k, c in enumerate(p.coefficients) if c) for p in self)

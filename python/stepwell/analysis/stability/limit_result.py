@@ -10,6 +10,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.immutable import by_value
+from ...base.reprs import facts
 from .eigen import Complex
 
 
@@ -71,6 +72,19 @@ class StabilityLimit(float):
         return f"{self.stable!r}" if self.decided else f"<between {self.stable!r} and {self.grows!r}, not decided>"
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """The limit and the mode that grows beyond it, as a table for notebooks."""
+        mode = self.mode
+        return facts(
+            "Stability limit",
+            [
+                ("largest stable step", repr(self)),
+                ("then", None if mode is None else mode.kind),
+                ("frequency of the mode", None if mode is None else f"{abs(mode.rate.imag):.6g}"),
+                ("angle Ψ of a step", None if mode is None else f"{mode.angle:.6g} rad"),
+            ],
+        )
 
     @property
     def dt(self) -> float:

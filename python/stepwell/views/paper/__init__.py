@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...base import checks, paths
+from ...base.reprs import MAX_LINE, facts, shortened
 from ...errors import ArgumentError
 
 #: The modules, in the order of Hoffmann (2002).
@@ -33,6 +34,10 @@ class Finding(NamedTuple):
 
     holds: bool
     numbers: str
+
+    def _repr_html_(self) -> str:
+        """The result as a table, for notebooks."""
+        return facts("Checked", [("holds", "yes" if self.holds else "no"), ("numbers", self.numbers)])
 
 
 class Entry(NamedTuple):
@@ -57,6 +62,14 @@ class Entry(NamedTuple):
     check: Callable[[], Finding]
     picture: str
     draw: Callable[[Path], object] | None
+
+    def __repr__(self) -> str:
+        return shortened(f"<Hoffmann (2002), {self.section}, {self.kind}: {self.says}>", MAX_LINE)
+
+    def _repr_html_(self) -> str:
+        """The statement as a table, for notebooks."""
+        pairs = [("kind", self.kind), ("statement", self.says), ("correction", self.corrected), ("in stepwell", self.here)]
+        return facts(f"Hoffmann (2002), {self.section}", [*pairs, ("picture", self.picture)])
 
     @property
     def name(self) -> str:
