@@ -47,12 +47,7 @@ Line = Sequence[object]
 
 HEAD = """# Energy control and projection: what they do to energy and to state
 
-Written by `python -m benches.control_study`; do not edit. Nothing here is timed, so it is the same on every machine.
-The data of the sweeps are in `benches/control`, `sw.charts.control` makes them and draws them.
-
-*limited* and *printed* are the forms of `EnergyControl`, with h·C·K at the start; *scaling* and *nacozy* the ways of
-`Projection`. All methods ask for rates equally often. State errors are relative to the largest true state; energy
-errors are the largest of the run.
+Does a control of the energy, or a projection after each step, make a run better? For seven motions and five methods:
 
 ## Conclusions
 
@@ -82,10 +77,17 @@ errors are the largest of the run.
    has the energy that the control puts in: it went 420 away, while the bodies stayed within 5 of it. With v −= Σmv/Σm
    at the start it stays where it is.
 8. **In chaos no orbit is right.** Bounded is not true either: by small steps of RK4 bodies come out to 5.5 from the
-   centre of mass (median), under strong control of Standard Euler only to 2 or 3."""
+   centre of mass (median), under strong control of Standard Euler only to 2 or 3.
+
+## How to read the tables
+
+*limited* and *printed* are the forms of `EnergyControl`, with h·C·K at the start; *scaling* and *nacozy* the ways of
+`Projection`. All methods ask for rates equally often. State errors are relative to the largest true state; energy
+errors are the largest of the run. Nothing is timed, so the numbers are the same on every machine. They are written by
+`python -m benches.control_study`, with the data in `benches/control`; `sw.charts.control` makes and draws them."""
 
 RUNS = f"""h = 0.01, 100 000 steps, C = {", ".join(f"{gain:g}" for gain in GAINS)}. ● stays finite, · overflows. The motion is
-chaotic, so which run overflows hangs on the last bit of the start; beside the document's start stand {STARTS} that are
+chaotic, so which run overflows hangs on the last bit of the start; beside Hoffmann's start stand {STARTS} that are
 {APART:g} apart."""
 
 MANY = f"""{STARTS} starts that are {APART:g} apart, over 1000 units of time; medians of the largest |E − E₀| and of the largest
@@ -171,7 +173,7 @@ def ends(scene: sw.scenes.Scene, horizon: float, evaluations: int) -> Iterator[t
 
 
 def thirty_six() -> str:
-    """How many of Appendix D's runs stay finite: the document's start, and many next to it."""
+    """How many of Appendix D's runs stay finite: Hoffmann's start, and many next to it."""
     scene = sw.scenes.energy_control()
     members = len(GAINS) * STARTS
     shape = (*scene.v.shape, members)
