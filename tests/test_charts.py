@@ -275,7 +275,9 @@ def test_everything_but_the_time_is_repeatable(small):
 def test_progress_is_told():
     shares = []
     sw.charts.work_precision("oscillator", ["rk4", "verlet"], [100], progress=shares.append)
-    assert shares == [0.5, 1.0]
+    assert shares == sorted(shares)
+    assert len(shares) > 4
+    assert shares[-1] == 1.0
 
 
 # ---- errors of the end, of the phase

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.views import cli
+from stepwell.views.cli import show
 from support.commands import run_command
 
 
@@ -28,7 +29,7 @@ def test_every_command_explains_itself(capsys, command):
     assert "--json" in out
 
 
-@pytest.mark.parametrize("words", [["--verison"], ["run", "clover"], ["run", "clover", "--method", "rk4", "--dt", "x"]])
+@pytest.mark.parametrize("words", [["--verison"], ["run"], ["run", "clover", "--method", "rk4", "--dt", "x"]])
 def test_words_that_make_no_command_end_with_2(capsys, words):
     with pytest.raises(SystemExit) as end:
         cli.main(words)
@@ -224,9 +225,10 @@ def test_chart_prints_a_summary(capsys, tmp_path):
     code, out, _ = run_command(capsys, "chart", "forced_oscillator", "-o", str(tmp_path), "--methods", "rk4,verlet")
     cost = sw.charts.work_precision("forced_oscillator", ["rk4"]).curves[0].cheapest(1e-4)
     assert code == 0
-    row = next(line for line in out.splitlines() if "Runge-Kutta 4" in line)
-    assert f" {cost:.3g} " in row
-    assert "Verlet is refused: verlet needs forces that do not depend on the velocity" in out.replace("\n", " ")
+    row = next(line for line in out.splitlines() if line.startswith("Runge-Kutta 4"))
+    assert f" {show.number(cost)} " in row
+    assert "not applicable: Verlet (needs forces that do not depend on the velocity" in out.replace("\n", " ")
+    assert out.splitlines()[0].endswith(" digits.")  # the answer comes first
     assert "forced_oscillator.png" in out
 
 
@@ -238,6 +240,23 @@ def test_chart_puts_several_scenes_into_one_picture(capsys, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["panel.csv", "panel.json", "panel.png"]
     assert [chart["scene"] for chart in charts] == ["oscillator", "clover"]
     assert all(chart["front"] for chart in charts)
+
+
+@pytest.mark.parametrize(
+    "words", [("chart", "oscillator", "--methods", "rk4"), ("figures", "rk4"), ("control", "clover", "--gains", "0.1")]
+)
+def test_nothing_is_written_that_was_not_asked_for(capsys, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run_command(capsys, *words)
+    assert (code, err) == (0, "")
+    assert out.endswith("-o DIR writes pictures and tables.\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_chart_that_would_take_many_minutes_says_so_at_once(capsys):
+    code, out, err = run_command(capsys, "chart", "oscillator", "cloth")
+    assert (code, out) == (2, "")
+    assert err.startswith("stepwell: --methods: expected some for cloth, such as leapfrog,rk4: its state is 6144 numbers")
 
 
 # ---- criteria
@@ -253,20 +272,22 @@ def test_criteria_says_what_criteria_says(capsys):
 
 
 def test_criteria_prints_tables_that_fit(capsys, monkeypatch):
-    """In three, and in no cell a text that was cut."""
-    monkeypatch.setenv("COLUMNS", "130")
-    code, out, err = run_command(capsys, "criteria")
-    assert (code, err) == (0, "")
-    assert max(map(len, out.splitlines())) <= 130
-    assert "…" not in out
-    for title in ("Stability of the undamped oscillator", "Errors of the undamped oscillator", "Operations of a step"):
-        assert title in out
-    for method in sw.methods():
-        assert sum(line.startswith(method.title) for line in out.splitlines()) >= 3
-    semi = next(line for line in out.splitlines() if "Semi-False Heun" in line and "Φ" in line)
-    assert semi.split() == ["Semi-False", "Heun", "1.572303", "3.996", "−Φ⁴/4", "−Φ²/12", "+", "7Φ⁴/160"]
-    costs = [line.split() for line in out.splitlines() if "Runge-Kutta 4" in line][-1]
-    assert costs == ["Runge-Kutta", "4", "14", "18", "0", "0", "4"]
+    """One table at any usual width, whose note names what was left out; in no cell a text that was cut."""
+    for width in (80, 130):
+        monkeypatch.setenv("COLUMNS", str(width))
+        code, out, err = run_command(capsys, "criteria")
+        assert (code, err) == (0, "")
+        assert max(map(len, out.splitlines())) <= width
+        assert "…" not in out
+        for method in sw.methods():
+            assert sum(line.startswith(method.title) for line in out.splitlines()) == 1
+        assert "Left out, as the terminal is narrow: " in out
+    monkeypatch.setenv("COLUMNS", "1000")
+    out = run_command(capsys, "criteria")[1]
+    assert "Left out" not in out
+    semi = next(line for line in out.splitlines() if "Semi-False Heun" in line)
+    assert semi.split()[:8] == ["Semi-False", "Heun", "1.572303", "3.996", "−Φ⁴/4", "−Φ²/12", "+", "7Φ⁴/160"]
+    assert next(line.split() for line in out.splitlines() if "Runge-Kutta 4" in line)[-5:] == ["14", "18", "0", "0", "4"]
 
 
 def test_criteria_writes_a_file(capsys, tmp_path):

@@ -121,7 +121,7 @@ def test_a_reader_who_leaves_early_is_no_error():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("run", "clover"), "stepwell run: missing: --method\n"),
+        (("run",), "stepwell run: missing: SCENE\n"),
         (("run", "clover", "--method", "rk4", "--dt", "abc"), "stepwell run: --dt: expected a number, got 'abc'\n"),
         (("run", "clover", "--method", "rk4", "--steps", "1.5"), "stepwell run: --steps: expected a whole number, got '1.5'\n"),
         (("run", "clover", "--method", "rk4", "--steps", "many"), "stepwell run: --steps: expected a whole number, got 'many'\n"),

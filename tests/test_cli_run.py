@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell.errors import ArgumentError
 from stepwell.views import charts, cli
 from stepwell.views.cli.settings import scene_with
 from stepwell.views.cli.verdict import growth_of, tenfold, verdict
@@ -39,6 +40,37 @@ def test_a_tolerance_makes_the_run_of_integrate(capsys: Any) -> None:
         code, _, err = run_command(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6", option, "5")
         assert code == 2
         assert err.startswith(f"stepwell: {option}: works with fixed steps only")
+
+
+def test_without_a_method_the_advised_one_is_taken(capsys: Any) -> None:
+    scene = sw.scenes.clover()
+    printed = report(capsys, "clover")
+    best = sw.advise(scene, scene.dt, methods=[printed["method"]], cost="evaluations", budget=1e9).best
+    assert best is not None
+    assert (printed["method"], printed["dt"]) == ("leapfrog", best.dt)
+    assert printed["largest_state_error"] == pytest.approx(best.error, rel=0.05)
+    assert printed["advised"].startswith("the cheapest of leapfrog, ")
+    assert report(capsys, "clover") == printed, "again the same"
+    given = report(capsys, "clover", "--dt", "0.1")
+    assert given["dt"] == 0.1
+    stiff = report(capsys, "rober")
+    assert sw.method(stiff["method"]).is_implicit
+    assert "dt" not in stiff, "adaptive steps"
+    to = report(capsys, "oscillator", "--tolerance", "1e-4")
+    assert "rejected_steps" in to
+    assert sw.method(to["method"]).error_order is not None
+
+
+def test_where_no_method_can_be_advised_the_usual_one_runs(capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*arguments: Any, **options: Any) -> Any:
+        raise ArgumentError("scene: its true motion is not known; more")
+
+    monkeypatch.setattr("stepwell.views.cli.advised.advise", refused)
+    printed = report(capsys, "oscillator")
+    assert printed["method"] == "rk4"
+    assert printed["advised"] == "no: scene: its true motion is not known; rk4 is usual"
+    printed = report(capsys, "oscillator", "--tolerance", "1e-4")
+    assert printed["advised"] == "no: dop853 is usual with a tolerance; --method NAME takes another"
 
 
 def test_form_and_start_are_those_of_integrate(capsys: Any) -> None:

@@ -18,6 +18,9 @@ MIN_SECONDS_BETWEEN = 0.1
 #: The length of a bar of text, in characters.
 BAR_LENGTH = 30
 
+#: The least time, and the least share, after which the rest of the time is told.
+SURE_SECONDS, SURE_SHARE = 1.0, 0.02
+
 
 @contextmanager
 def bar(title: str) -> Iterator[Callable[[float], object]]:
@@ -27,16 +30,32 @@ def bar(title: str) -> Iterator[Callable[[float], object]]:
         return
     try:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
     except ImportError:
         yield from _in_a_line(title)
         return
-    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
+    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[left]}")
+    left = _time_left()
     # On stderr and removed at the end, so that the output of a program is not changed.
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(title, total=1.0)
-        yield lambda share: progress.update(task, completed=share)
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(title, total=1.0, left="")
+        yield lambda share: progress.update(task, completed=share, left=left(share))
         progress.update(task, completed=1.0)
+
+
+def _time_left() -> Callable[[float], str]:
+    """A function of the share that is done: how long the rest will take at the pace so far; empty where that is a guess."""
+    begun = time.monotonic()
+
+    def left(share: float) -> str:
+        elapsed = time.monotonic() - begun
+        if elapsed < SURE_SECONDS or not SURE_SHARE <= share < 1.0:
+            return ""
+        seconds = elapsed * (1.0 - share) / share
+        return f"{seconds:.0f} s left" if seconds < 100.0 else f"{seconds / 60.0:.0f} min left"
+
+    return left
 
 
 def in_notebook() -> bool:
@@ -63,9 +82,12 @@ def _in_a_line(title: str) -> Iterator[Callable[[float], object]]:
         yield lambda share: None
         return
 
+    left = _time_left()
+
     def line(share: float) -> None:
         full = round(BAR_LENGTH * share)
-        print(f"\r{title} {'━' * full}{'·' * (BAR_LENGTH - full)} {100 * share:3.0f} %", end="", file=sys.stderr, flush=True)
+        bar = "━" * full + "·" * (BAR_LENGTH - full)
+        print(f"\r\033[K{title} {bar} {left(share)} {100 * share:3.0f} %", end="", file=sys.stderr, flush=True)
 
     line(0.0)
     try:

@@ -250,7 +250,7 @@ class Explanation(ValueEquality):
 
     def _hoisted(self) -> str:
         counts = [f"{n} {self._when(Section(when, ()))}" for when, n in self.hoisted.items() if n]
-        return f"Operations that are made before: {'; '.join(counts) if counts else 'none'}."
+        return f"Operations computed beforehand: {'; '.join(counts) if counts else 'none'}."
 
     def _gamma(self) -> str:
         """The factor of h·J in the equations of an implicit step."""

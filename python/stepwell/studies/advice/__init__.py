@@ -7,7 +7,7 @@ measures steps, ``predict`` uses eigenvalues, ``outcome`` makes rows of the resu
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, TypeVar
 
@@ -60,6 +60,9 @@ MAX_NUMBERS = 100_000
 #: Errors for which a search may find steps that are good enough by luck: this, a tenth of it and so on.
 LARGEST_HINTED = 0.1
 
+#: The shares of the progress at which the true motion and the times are known, and the steps for larger errors.
+MOTION_SHARE, HINTS_SHARE = 0.15, 0.5
+
 #: A scene by its name, created once, since some take long to compute their true motion.
 _named = cache(find_scene)
 
@@ -74,6 +77,7 @@ def advise(
     cost: Cost = "time",
     fixed: bool = False,
     dtype: Dtypes = "float64",
+    progress: Callable[[float], object] | None = None,
 ) -> Advice:
     """Find the cheapest method and step that are accurate enough for a scene.
 
@@ -96,6 +100,7 @@ def advise(
         dtype: ``"float64"``, ``"float32"``, or ``"both"``, which also tries each method with fixed steps in float32. There a
             step takes about half the time, and rounding bounds what is accurate enough. Of equal costs, as evaluations are,
             float64 comes first. With ``"float32"`` there are no adaptive steps, which it does not work with.
+        progress: a function that is called with the share of the search that is done, from 0 to 1.
 
     Returns:
         An ``Advice``; print it.
@@ -113,6 +118,7 @@ def advise(
     cost = checks.known("cost", cost, COSTS)
     fixed = checks.flag("fixed", fixed)
     dtype = checks.known("dtype", dtype, DTYPES)
+    report = _forward(checks.callback("progress", progress))
     frame = None if frame is None else checks.number("frame", frame, positive=True, unit="units of time")
     budget = frame if budget is None else checks.number("budget", budget, positive=True, unit="seconds")
     if budget is not None and budget > MOST_SECONDS:
@@ -155,11 +161,20 @@ def advise(
             else:
                 rejected.append(Rejected(method.name, "refused", why, candidate.by, candidate.dtype))
 
+    report(MOTION_SHARE / 2.0)
     times, noise = _times(scene, candidates)
+    report(MOTION_SHARE)
     noise = noise if cost == "time" else 0.0
     prices = times if cost == "time" else {each.name: float(each.evaluations) for each in candidates}
-    hints = _hints(known, trials, [each for each in candidates if each.dtype == "float64"], prices, tolerance, most)
-    search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + SINGLE_WORK * narrow.work + adaptive.work)
+    hints = _hints(known, trials, [each for each in candidates if each.dtype == "float64"], prices, tolerance, most, report)
+    search = Search(
+        tolerance,
+        known.grid.spans,
+        prices,
+        most,
+        lambda: trials.work + SINGLE_WORK * narrow.work + adaptive.work,
+        progress=_part(report, HINTS_SHARE if tolerance < LARGEST_HINTED else MOTION_SHARE, 1.0),
+    )
     fewest, missed = search.run(candidates, hints=hints)
 
     spent = Spending(known.grid, adaptive, times)
@@ -191,6 +206,7 @@ def advise(
     runs = trials.runs + narrow.runs + adaptive.runs
     outcome = (trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, runs, known.cut, noise)
     explicit = dict.fromkeys(each.method for each in candidates)
+    report(1.0)
     stiff = stiff_of(ranked[0].method, ranked[0].dt, rates, explicit) if ranked else None
     return Advice(*outcome, dtype=dtype, stiff=stiff)
 
@@ -230,8 +246,32 @@ def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
     return None
 
 
+def _forward(progress: Callable[[float], object] | None) -> Callable[[float], object]:
+    """The progress, which never goes back, as where some candidates are searched again; nothing for None."""
+    furthest = 0.0
+
+    def report(share: float) -> None:
+        nonlocal furthest
+        furthest = max(furthest, share)
+        if progress is not None:
+            progress(furthest)
+
+    return report
+
+
+def _part(progress: Callable[[float], object], begin: float, end: float) -> Callable[[float], object]:
+    """The progress of a part that begins and ends at these shares of the whole."""
+    return lambda share: progress(begin + (end - begin) * share)
+
+
 def _hints(
-    known: Motion, trials: Trials, candidates: Sequence[Candidate], prices: Mapping[str, float], tolerance: float, most: float
+    known: Motion,
+    trials: Trials,
+    candidates: Sequence[Candidate],
+    prices: Mapping[str, float],
+    tolerance: float,
+    most: float,
+    progress: Callable[[float], object],
 ) -> dict[str, set[int]]:
     """The results of searches for larger errors, in short runs only, by the candidate's name.
 
@@ -239,14 +279,18 @@ def _hints(
     error tries. Advice for a larger error would then name a step that is good enough for the small one, too.
     """
     hints: dict[str, set[int]] = {}
-    allowed = LARGEST_HINTED
-    while allowed > tolerance:
+    levels = [LARGEST_HINTED]
+    while 0.1 * levels[-1] > tolerance:
+        levels.append(0.1 * levels[-1])
+    step = (HINTS_SHARE - MOTION_SHARE) / len(levels)
+    for number, allowed in enumerate(levels if tolerance < LARGEST_HINTED else []):
+        begin = MOTION_SHARE + number * step
         adaptive = AdaptiveTrials(known, ERROR_SHARE * allowed, trials.long)
         again = [Adaptive(each.method, adaptive) if isinstance(each, Adaptive) else each for each in candidates]
-        search = Search(allowed, known.grid.spans, prices, most, short=trials.long)
+        part = _part(progress, begin, begin + step)
+        search = Search(allowed, known.grid.spans, prices, most, short=trials.long, progress=part)
         for name, each in search.run(again)[0].items():
             hints.setdefault(name, set()).add(each.k)
-        allowed *= 0.1
     return hints
 
 

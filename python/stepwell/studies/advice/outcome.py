@@ -106,7 +106,7 @@ def rejection(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
         trial = candidate.measured(missed.k)
     detail = f"dt = {trial.dt:.3g}" if candidate.by == "step" else f"{trial.steps} steps"
     tried = f"with {candidate.described(missed.k)} ({detail})"
-    too_expensive = f"costs over {MAX_COST_RATIO:g} times the least"
+    too_expensive = f"costs over {MAX_COST_RATIO:g} times as much as the best"
     needs = f"; by its order it needs about {candidate.described(missed.expected)}" if missed.expected else ""
     unstable = "still unstable" if candidate.by == "step" else "stops early"
     if trial.error <= search.allowed(candidate):
@@ -118,7 +118,7 @@ def rejection(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
             else f"{unstable} {tried}, the most tried"
         )
     elif missed.expensive:
-        reason = f"error {trial.error:.2g} {tried}, and what is enough {too_expensive}{needs}"
+        reason = f"error {trial.error:.2g} {tried}, and enough steps {too_expensive.replace('costs', 'cost')}{needs}"
     else:
         reason = f"error {trial.error:.2g} {tried}, the most tried{needs}"
     if isinstance(candidate, Single) and candidate.is_rounding(missed.k):

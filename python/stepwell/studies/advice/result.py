@@ -32,6 +32,15 @@ REASONS = 2
 #: A run of a row may attempt this many times its steps, since these depend slightly on the output times.
 MORE_STEPS = 10
 
+#: Why further methods of a kind are rejected.
+LIKEWISE = {
+    "dominated": "also too expensive",
+    "inaccurate": "also not accurate enough",
+    "unstable": "also unstable",
+    "refused": "also not applicable",
+    "budget": "also beyond the budget",
+}
+
 #: The columns of the table; those whose name ends in ``>`` are flush right.
 COLUMNS = ("method", "steps>", "dt>", "error>", "predicted>", "evaluations>", "ns>", "objects>", "blows up at dt>")
 
@@ -252,7 +261,7 @@ class Advice:
             groups = ["; ".join(names) for names in reasons.values()]
             lines += [f"{names}: {reason}" for names, reason in zip(groups[:most], reasons, strict=False)]
             if most is not None and len(groups) > most:
-                lines.append(f"{kind} likewise: {'; '.join(groups[most:])}")
+                lines.append(f"{LIKEWISE.get(kind, kind)}: {'; '.join(groups[most:])}")
         return lines
 
     def plot(self, path: str | Path | None = None) -> Figure:

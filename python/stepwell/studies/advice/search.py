@@ -105,6 +105,7 @@ class Search:
         longest: the most function evaluations of a run.
         spent: returns the number of function evaluations of all runs so far.
         short: the most function evaluations of a run where only short ones are worth it.
+        progress: called with the share of the candidates that are searched.
     """
 
     def __init__(
@@ -115,9 +116,11 @@ class Search:
         longest: float,
         spent: Callable[[], float] = lambda: 0.0,
         short: float = math.inf,
+        progress: Callable[[float], object] = lambda share: None,
     ) -> None:
         self.tolerance, self.spans, self.prices, self.longest, self.spent = tolerance, spans, prices, longest, spent
         self.short = short
+        self.progress = progress
 
     @property
     def most(self) -> float:
@@ -165,7 +168,8 @@ class Search:
                 del missed[name]
                 fewest[name] = Fewest(hinted, by_name[name].confirm(hinted), hinted, None)
                 best = min(best, self.cost(by_name[name], hinted))
-        for name in sorted(octaves, key=lambda name: self.cost(by_name[name], octaves[name])):
+        for number, name in enumerate(sorted(octaves, key=lambda name: self.cost(by_name[name], octaves[name]))):
+            self.progress(0.5 + 0.5 * number / len(octaves))
             candidate, k = by_name[name], octaves[name]
             cost = self.cost(candidate, k)
             if cost > 2.0 * MAX_COST_RATIO * best:
@@ -217,6 +221,7 @@ class Search:
         waiting = [(self.prices[each.name] * each.first, i, each.first) for i, each in enumerate(candidates)]
         heapq.heapify(waiting)
         while waiting:
+            self.progress(0.5 - 0.5 * len(waiting) / len(candidates))
             _, i, k = heapq.heappop(waiting)
             candidate = candidates[i]
             trial, cost = candidate.look(k), self.cost(candidate, k)

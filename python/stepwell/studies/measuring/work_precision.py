@@ -13,6 +13,7 @@ from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError, UnsupportedError
 from ...model.methods import Method, choice
+from ...runs import engine
 from ...scenes import Scene
 from ...scenes import scene as find_scene
 from . import measure, timing
@@ -38,6 +39,10 @@ SMALL_BLOCK = 16
 
 #: But the most steps are at least this many times those of the scene: large nets are stable only near these.
 TIMES_THE_SCENE = 10.0
+
+#: Seconds that are expected, for the progress: of a method's times, of a point, of a number in each of its rate evaluations, and
+#: of a peer.
+TIMING, POINT, NUMBER, PEER = 0.15, 0.004, 1e-9, 2.0
 
 #: Steps of the ladder per factor of ten.
 RUNGS_PER_DECADE = 10
@@ -112,31 +117,47 @@ def work_precision(
     adaptive = [method for method in able if method.error_order is not None and not method.has_series and paced]
     curves: list[Curve] = []
 
-    def done() -> None:
+    sizes = {method.name: engine.evaluations(method, scene.system) * (scene.v.size + scene.y.size) for method in able}
+    of_steps = [[POINT + NUMBER * n * sizes[method.name] for n in ladder] for method in able]
+    of_tolerances = [[POINT * (wanted[0] / each) ** (1.0 / method.order) for each in wanted] for method in adaptive]
+    timed = TIMING * (len(dtypes) * len(able) + len(adaptive))
+    in_all = len(ways) * (timed + len(dtypes) * sum(map(sum, of_steps)) + sum(map(sum, of_tolerances))) + PEER * len(others)
+    spent = 0.0
+
+    def done(seconds: float) -> None:
+        nonlocal spent
+        spent += seconds
         if progress is not None:
-            in_all = len(ways) * (len(dtypes) * len(able) + len(adaptive)) + len(others)
-            progress((len(curves) + len(refused) - len(chosen) + len(able)) / in_all)
+            progress(min(1.0, spent / max(in_all, POINT)))
 
     for kind, way in itertools.product(dtypes, ways):
         batch, single = (timing.step_times(scene, able, members, way, kind) for members in (None, 0))
-        for method in able:
-            points = tuple(measure.assess(scene, method, scene.horizon / n, n, way, kind) for n in ladder)
+        done(TIMING * len(able))
+        for method, seconds in zip(able, of_steps, strict=True):
+            points = []
+            for n, expected in zip(ladder, seconds, strict=True):
+                points.append(measure.assess(scene, method, scene.horizon / n, n, way, kind))
+                done(expected)
             edge = measure.largest_stable_step(scene, method, points, way, kind)
-            curves.append(Curve(method, points, edge, batch[method.name], single[method.name], fused=way, dtype=kind))
-            done()
+            curves.append(Curve(method, tuple(points), edge, batch[method.name], single[method.name], fused=way, dtype=kind))
     for way in ways:
         batch, single = timing.tried_times(scene, adaptive, None, way), timing.tried_times(scene, adaptive, 0, way)
-        for method in adaptive:
-            points = tuple(measure.assess_tolerance(scene, method, tolerance, way) for tolerance in wanted)
+        done(TIMING * len(adaptive))
+        for method, seconds in zip(adaptive, of_tolerances, strict=True):
+            points = []
+            for tolerance, expected in zip(wanted, seconds, strict=True):
+                points.append(measure.assess_tolerance(scene, method, tolerance, way))
+                done(expected)
             times = batch[method.name], single[method.name]
-            curves.append(Curve(method, points, math.inf, *times, by="tolerance", fused=way))
-            done()
+            curves.append(Curve(method, tuple(points), math.inf, *times, by="tolerance", fused=way))
     for peer in others:
         try:
             curves.append(measure.assess_peer(scene, peer))
         except UnsupportedError as error:
             refused[peer.name] = str(error)
-        done()
+        done(PEER)
+    if progress is not None:
+        progress(1.0)
     cut = scene.horizon < whole.horizon
     return WorkPrecision(
         scene, tuple(curves), refused, timing.CHARTS.members_of(scene), timing.CHARTS.repeats, _core.isa(), floor, cut

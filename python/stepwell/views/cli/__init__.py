@@ -9,14 +9,13 @@ import argparse
 import importlib
 import os
 import sys
-import textwrap
 from collections.abc import Sequence
 
 from ... import __version__
 from ...base import checks
 from ...errors import StepwellError
+from . import show
 from .parser import Parser
-from .table import width_of_terminal
 
 #: The commands, in the order of the help.
 COMMANDS = (
@@ -25,7 +24,7 @@ COMMANDS = (
 )
 
 #: The commands that the help shows to newcomers.
-EXAMPLES = "  stepwell run clover --method false_euler -o clover.png\n  stepwell explore"
+EXAMPLES = "  stepwell explore\n  stepwell run double_pendulum -o swing.html"
 
 #: Exit codes: an error; Ctrl-C, as shells have it.
 FAILED, INTERRUPTED = 2, 130
@@ -57,23 +56,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader closed the pipe. The rest of the output is discarded, or Python would fail to flush it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (StepwellError, OSError) as error:
-        print(_wrapped(f"stepwell: {error}"), file=sys.stderr)
+        show.warn(f"stepwell: {error}")
         return FAILED
     except MemoryError as error:  # an allocation that no check foresaw
-        print(_wrapped(f"stepwell: there is not enough memory for this: {error}".rstrip(": ")), file=sys.stderr)
+        show.warn(f"stepwell: there is not enough memory for this: {error}".rstrip(": "))
         return FAILED
     except KeyboardInterrupt:
         print("stepwell: interrupted", file=sys.stderr)
         return INTERRUPTED
     return 0
-
-
-def _wrapped(message: str) -> str:
-    """The message, wrapped between words to the width of the terminal."""
-    width = width_of_terminal(sys.stderr)
-    if len(message) <= width:
-        return message
-    return "\n".join(textwrap.wrap(message, width, break_long_words=False, break_on_hyphens=False))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -85,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="stepwell",
         usage="stepwell [--version] COMMAND …",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Simple integration methods: the cost and the error of each, and where\nit becomes unstable.",
+        description="Integrate equations of motion, and see what each method costs and gets wrong.",
         epilog=f"commands:\n{listed}\n\nstepwell COMMAND --help lists the options of a command. To begin with:\n{EXAMPLES}",
     )
     parser.add_argument("--version", action="version", version=f"stepwell {__version__}")

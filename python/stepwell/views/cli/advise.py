@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import ArgumentError
 from ...scenes import scene
-from ...studies.advice import COSTS, advise
+from ...studies.advice import COSTS, Advice, advise
 from ...studies.advice.result import COLUMNS, REASONS
 from . import options, show
 
@@ -44,17 +44,47 @@ def command(args: argparse.Namespace) -> None:
     options.check_file(args, (".json",))
 
     dtype: Dtypes = "both" if args.float32 else "float64"
-    advice = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed, dtype=dtype)
+    with show.progress(chosen.title, args) as progress:
+        advice = advise(
+            chosen,
+            frame,
+            args.tolerance,
+            args.budget,
+            methods,
+            cost=args.cost,
+            fixed=args.fixed,
+            dtype=dtype,
+            progress=progress,
+        )
     written = show.Written()
     written.write(args.output, advice.to_json)
-    rejected = advice.rejections(REASONS)
     if args.json:
         show.print_json(advice.data())
     elif advice.ranked:
-        show.table(advice.title, COLUMNS, advice.table(), [*advice.summary(), "", *rejected, *written.notes()])
+        _print(advice, [*advice.rejections(REASONS), *written.notes()])
     else:
-        show.paragraphs([advice.title, *advice.summary(), "", *rejected, *written.notes()])
+        rest = [advice.title, *advice.rejections(REASONS), *written.notes()]
+        show.paragraphs([" ".join(advice.summary()), "", *rest], show.DOUBTFUL)
     written.close()
+
+
+def _print(advice: Advice, notes: list[str]) -> None:
+    """Print the advice, then the table with the best row marked, then why others are not in it."""
+    per = "a unit of time" if advice.frame is None else "a frame"
+    names = {"steps>": "steps>" if advice.frame is None else "steps a frame>", "ns>": f"ns {per}>"}
+    columns = [names.get(name, name) for name in COLUMNS]
+    explained = f"Evaluations: of functions (rates), for {per}; predicted: the error by theory"
+    if advice.budget is not None:
+        explained += f"; objects: so many fit into {advice.budget:.3g} s"
+    show.table(
+        advice.title,
+        columns,
+        advice.table(),
+        [f"{explained}.", *notes],
+        answer=advice.summary(),
+        least=("predicted", "objects", "dt"),
+        marked=0,
+    )
 
 
 def _frame(text: str) -> float | None:

@@ -72,6 +72,7 @@ def command(args: argparse.Namespace) -> None:
             f"The times are the least of {CHARTS.repeats} repeats; ± is by how much their median is above it.",
             *(f"{name} is refused: {why}" for name, why in refused.items()),
         ],
+        least=("share of all", "ns an evaluation", "steps a second"),
     )
 
 

@@ -1,6 +1,6 @@
 """Chart the errors of a controlled system over the gain.
 
-The controlled quantity is the energy of bodies or the lengths of rods. Charts its error and the state error.
+The controlled quantity is the energy of bodies or the lengths of rods. Prints the least errors; -o draws them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LEAST = ("least_state_error", "state_at_relative", "least_energy_error", "diverg
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", help="a scene of bodies or rods, or a Python file that makes one")
-    options.folder(parser, here=True)
+    options.folder(parser)
     parser.add_argument("--methods", metavar="A,B,…", help=f"methods, separated by commas (default: {','.join(METHODS)})")
     parser.add_argument("--gains", metavar="A,B,…", help="gains, separated by commas: h·C·K at the start for bodies, c for rods")
     parser.add_argument(
@@ -47,12 +47,14 @@ def command(args: argparse.Namespace) -> None:
         arguments["evaluations"] = _numbers("--evaluations", args.evaluations, int)
     name = f"{one.name}-control"
     options.check_folder(args, [name + ending for ending in (".png", ".csv")])
-    args.output.mkdir(parents=True, exist_ok=True)
+    if args.output is not None:
+        args.output.mkdir(parents=True, exist_ok=True)
     with show.progress(one.title, args) as progress:
         chart = control(one, progress=progress, **arguments)
     written = show.Written()
-    written.write(args.output / f"{name}.png", chart.plot)
-    written.write(args.output / f"{name}.csv", chart.to_csv)
+    if args.output is not None:
+        written.write(args.output / f"{name}.png", chart.plot)
+        written.write(args.output / f"{name}.csv", chart.to_csv)
     if args.json:
         refused = [{"method": key, "kind": kind, "reason": why} for (key, kind), why in chart.refused.items()]
         head = {"scene": one.name, "files": written.files, "evaluations": list(chart.evaluations)}
@@ -83,7 +85,7 @@ def _summary(chart: ControlSweep, files: list[str]) -> None:
         f"{chart.title}: the least errors over the gains",
         ("method", "control", "dt>", "state error>", "at gain>", "energy error>", "diverged from gain>"),
         rows,
-        ([chart.answer] if chart.answer else [])
-        + [f"{title_of(name)}, {kind}, is refused: {why}" for (name, kind), why in chart.refused.items()]
-        + [f"written: {', '.join(files)}"],
+        [f"{title_of(name)}, {kind}, is refused: {why}" for (name, kind), why in chart.refused.items()]
+        + [f"written: {', '.join(files)}" if files else show.ASK_FOR_PICTURES],
+        answer=[chart.answer] if chart.answer else [],
     )

@@ -45,20 +45,19 @@ def command(args: argparse.Namespace) -> None:
     elif args.markdown:
         print(answers.markdown(), end="")
     else:
-        _tables(answers, written.notes())
+        _table(answers, written.notes())
     written.close()
 
 
-def _tables(answers: Criteria, notes: list[str]) -> None:
-    """Print three tables: a single one is too wide for a screen. Each begins with the names of the methods."""
+def _table(answers: Criteria, notes: list[str]) -> None:
+    """Print one table; in a narrow terminal the series, the fewer operations and the errors at further Φ are left out."""
     head, rows = answers.table()
-    series, costs = 1 + head.index("Ψ/Φ − 1"), head.index("+>")
-    parts: tuple[tuple[str, range, list[str]], ...] = (
-        ("Stability of the undamped oscillator, Φ = ω₀·dt, and the series of its errors", range(1, series), []),
-        ("Errors of the undamped oscillator at some Φ", range(series, costs), []),
-        ("Operations of a step", range(costs, len(head)), notes),
+    names = [name.removesuffix(">") for name in head]
+    least = [*names[3:5], "÷", "√", "steps a period >", *reversed([name for name in names if " at " in name]), "×", "+"]
+    show.table(
+        "The criteria of Hoffmann (2002), with Φ = ω₀·dt",
+        head,
+        [[row[0], {"inf": "every"}.get(row[1], row[1]), {"0": "–"}.get(row[2], row[2]), *row[3:]] for row in rows],
+        ["r₁² − 1: the energy that a step adds, as a share. Ψ/Φ − 1: the error of the frequency.", *notes],
+        least=least,
     )
-    for number, (title, columns, below) in enumerate(parts):
-        if number:
-            print()
-        show.table(title, [head[i] for i in (0, *columns)], [[row[i] for i in (0, *columns)] for row in rows], below)

@@ -51,10 +51,12 @@ def command(args: argparse.Namespace) -> None:
         show.print_json({"written": written.files, "bytes": len(page.html.encode()), "scenes": scenes})
     else:
         size = f"{len(page.html.encode()) / 1000:.0f} kB"
-        print(f"a page of {size} for browsers since 2023, with {len(page.methods)} methods; scene{'s' * (len(scenes) > 1)}:")
-        for each in scenes:
-            sliders = ", ".join(each["sliders"]) or "none"
-            print(f"  {each['name']}: {each['title']}; {len(each['methods'])} methods; sliders {sliders}")
-        for note in written.notes():
-            print(note)
+        show.table(
+            f"Scenes of the page, by {len(page.methods)} methods in all",
+            ("scene", "methods>", "title", "sliders beside dt"),
+            [(each["name"], str(len(each["methods"])), each["title"], ", ".join(each["sliders"]) or "none") for each in scenes],
+            [f"A page of {size} for browsers since 2023; it needs no network."],
+            answer=written.notes(),
+            least=("methods", "title"),
+        )
     written.close()

@@ -1,6 +1,6 @@
 """Draw the figures of Hoffmann (2002).
 
-Draws the samples of each method on the undamped oscillator (§5 to §11), and the harmonic cases of §4.
+Runs each method on the undamped oscillator (§5 to §11) and says what its samples do; -o draws them, and the harmonic cases of §4.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from . import options, show
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     options.method_words(parser)
-    options.folder(parser, here=True)
+    options.folder(parser)
     parser.add_argument("--phi", type=float, default=0.5, metavar="RAD", help="Φ = ω₀·dt (default: 0.5)")
     parser.add_argument("--periods", type=float, default=4.0, metavar="N", help="number of periods (default: 4)")
     options.json(parser)
@@ -26,15 +26,17 @@ def command(args: argparse.Namespace) -> None:
 
     chart = figures(methods, phi=args.phi, periods=args.periods)
     written = show.Written()
-    files = [str(path) for path in written.write(args.output, chart.save) or ()]
-    pictures = files[1 : 1 + len(chart.samples)]
+    files = [] if args.output is None else [str(path) for path in written.write(args.output, chart.save) or ()]
     if args.json:
         show.print_json({"phi": chart.phi, "files": files, "summary": chart.summary()})
         written.close()
         return
+    count = len(chart.samples)
+    kinds = {"all in one picture": files[:1], "one by one": files[1 : 1 + count]}
+    kinds["harmonic cases and numbers"] = files[1 + count :]
     show.table(
         f"The undamped oscillator with Φ = {chart.phi:g}",
-        ("method", "r₁² − 1>", "Ψ/Φ − 1>", "what the samples do", "largest |y|>", "file"),
+        ("method", "r₁² − 1>", "Ψ/Φ − 1>", "what the samples do", "largest |y|>"),
         [
             (
                 s["title"],
@@ -42,10 +44,10 @@ def command(args: argparse.Namespace) -> None:
                 signed(s["ratio"] - 1.0, percent=True),
                 s["kind"],
                 f"{s['largest_y']:.4g}",
-                file,
             )
-            for s, file in zip(chart.summary(), pictures or ["–"] * len(chart.samples), strict=True)
+            for s in chart.summary()
         ],
-        [f"all in one: {file}" for file in files[:1]] + [f"beside: {file}" for file in files[1 + len(chart.samples) :]],
+        [f"{name}: {', '.join(each)}" for name, each in kinds.items() if each] or [show.ASK_FOR_PICTURES],
+        least=("largest |y|",),
     )
     written.close()

@@ -8,6 +8,7 @@ from typing import Any
 from ...errors import ArgumentError
 from ...model.methods import Method, method, methods, stable_for
 from . import options, show
+from .sections import HOFFMANN, section
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,25 +25,27 @@ def command(args: argparse.Namespace) -> None:
         if args.json:
             show.print_json(_record(one))
         else:
-            print(one.__doc__)
+            show.paragraphs([one.__doc__ or ""], show.STRONG)
         return
     show.listing(
         args,
         "Methods",
-        ("method", "order>", "function evaluations>", "oscillator stable for", "section", "title", "also called"),
+        ("method", "order>", "function evaluations>", "oscillator stable for", "title", "also called", HOFFMANN),
         [
             (
                 m.name,
                 str(m.order),
                 str(m.evaluations),
                 stable_for(m.limit),
-                m.section,
                 m.title,
                 "; ".join(m.other_names),
+                section(m.section),
             )
             for m in methods()
         ],
         [_record(m) for m in methods()],
+        ["stepwell methods NAME describes one."],
+        least=(HOFFMANN, "also called", "title"),
     )
 
 

@@ -78,10 +78,9 @@ def check_file(args: argparse.Namespace, endings: Iterable[str]) -> None:
         paths.file("-o", args.output, tuple(endings))
 
 
-def folder(parser: argparse.ArgumentParser, text: str = "", *, here: bool = False) -> None:
-    """Add the option of a folder for pictures and tables; its default is the current folder (``here``), or None."""
-    text = text or "a folder for pictures and tables (default: the current one)"
-    parser.add_argument("-o", "--output", type=Path, default=Path() if here else None, metavar="DIR", help=text)
+def folder(parser: argparse.ArgumentParser, text: str = "write pictures and tables into this folder") -> None:
+    """Add the option of a folder; without it nothing is written."""
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help=text)
 
 
 def check_folder(args: argparse.Namespace, names: Iterable[str] = ()) -> None:

@@ -6,6 +6,7 @@ Runs each statement and prints the numbers that confirm or correct it; -o draws 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 
 from ...errors import StepwellError
 from .. import paper
@@ -37,18 +38,23 @@ def command(args: argparse.Namespace) -> None:
         ]
         show.print_json({"statements": rows, "files": written.files})
     else:
-        show.table(
-            "The document, section by section",
-            ("section", "statement", "correction", "numbers here", ""),
-            [
-                (entry.section, entry.says, plain(entry.corrected), run.numbers, "✓" if run.holds else "✗ not reproduced")
-                for entry, run in zip(chosen, runs, strict=True)
-            ],
-            written.notes(),
-        )
+        _statements(chosen, runs)
+        show.paragraphs(written.notes())
     written.close()
     if failed := [entry.name for entry, run in zip(chosen, runs, strict=True) if not run.holds]:
         raise StepwellError(f"not reproduced: {', '.join(failed)}")
+
+
+def _statements(chosen: Sequence[paper.Entry], runs: Sequence[paper.Finding]) -> None:
+    """Print each statement with its correction and its numbers below it; how many hold comes first."""
+    holding = sum(run.holds for run in runs)
+    show.paragraphs([f"{holding} of {len(runs)} statements of Hoffmann (2002) are reproduced."], show.GOOD)
+    for entry, run in zip(chosen, runs, strict=True):
+        print()
+        mark, code = ("✓", show.GOOD) if run.holds else ("✗ not reproduced", show.BAD)
+        rows = [(entry.section, f"{mark} {entry.says}", show.STRONG if run.holds else code)]
+        rows += [("  correction", plain(entry.corrected), "")] if entry.corrected else []
+        show.facts([*rows, ("  numbers", run.numbers, "")])
 
 
 def plain(text: str) -> str:

@@ -1,12 +1,14 @@
 """Run a scene by a method.
 
-Prints the last state and the errors; -o writes the saved states, a picture or an animation.
+Without --method it takes the advised method and step. Prints how the run ended, the last state and the errors; -o writes an
+animation, a picture or the saved states.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -25,8 +27,9 @@ from ..charts import RunPicture, run_picture
 from ..charts.runs_animation import ENDINGS as ANIMATIONS
 from ..charts.runs_animation import need as need_for_animation
 from . import options, show
+from .advised import ADAPTIVE, USUAL, advised
 from .settings import scene_with
-from .verdict import verdict
+from .verdict import UNKNOWN, verdict
 
 #: The number of states that are saved without --every; more for a picture, whose curves should be smooth.
 SAVED, SAVED_TO_DRAW = 1000, 20_000
@@ -45,8 +48,8 @@ NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     options.scene(parser)
-    parser.add_argument("--method", required=True, metavar="NAME", help="a method; see stepwell methods")
-    parser.add_argument("--dt", type=float, metavar="TIME", help="the step (default: the scene's)")
+    parser.add_argument("--method", metavar="NAME", help="a method; see stepwell methods (default: the advised one)")
+    parser.add_argument("--dt", type=float, metavar="TIME", help="the step (default: the scene's, or the advised one)")
     parser.add_argument("--steps", type=int, metavar="N", help="number of steps (default: up to the scene's horizon)")
     parser.add_argument("--every", type=int, metavar="N", help=f"save every Nth state (default: about {SAVED} in all)")
     parser.add_argument(
@@ -72,7 +75,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         type=Path,
         metavar="FILE",
-        help="write the saved states (.csv, .npz), a picture (.png, .svg, .pdf) or an animation (.gif, .mp4, .html)",
+        help="write an animation (.html, .gif, .mp4), a picture (.png, .svg, .pdf) or the saved states (.csv, .npz)",
     )
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="duration of an animation (default: 10)")
     parser.add_argument("--fps", type=float, default=20.0, metavar="N", help="frames per second of an animation (default: 20)")
@@ -94,9 +97,10 @@ def command(args: argparse.Namespace) -> None:
         options["start"] = args.start
     if args.form != "direct":
         options |= {"form": args.form, "record": ()}
+    why = None if args.method is not None else _advise(args, replace(chosen, control=options["control"]))
     run = _fixed(args, chosen, to_draw, options) if args.tolerance is None else _adaptive(args, chosen, to_draw, options)
     for finding in run.findings:
-        print(f"stepwell: warning: {finding.message}", file=sys.stderr)
+        show.warn(f"stepwell: warning: {finding.message}")
 
     picture = run_picture(chosen, run)
     columns: dict[str, Any] = picture.columns()
@@ -108,15 +112,42 @@ def command(args: argparse.Namespace) -> None:
     elif ending in PICTURES:
         written.write(args.output, picture.plot)
     elif ending in ANIMATIONS:
-        written.write(args.output, lambda path: picture.animate(path, seconds=args.seconds, fps=args.fps))
+        with show.progress(f"{args.output}", args) as progress:
+            written.write(args.output, lambda path: picture.animate(path, seconds=args.seconds, fps=args.fps, progress=progress))
     report = _report(picture, columns) | ({"written": written.files[0]} if written.files else {})
+    if why is not None:
+        report = {"verdict": report["verdict"], "scene": report["scene"], "method": report["method"], "advised": why} | report
     if args.json:
         show.print_json(report)
     else:
-        for name, value in report.items():
-            if value is not None:
-                print(f"{SCREEN_NAMES.get(name, name.replace('_', ' ')):21} {_shown(name, value)}")
+        show.facts(
+            (SCREEN_NAMES.get(name, name.replace("_", " ")), _shown(name, value), _colour(value) if name == "verdict" else "")
+            for name, value in report.items()
+            if value is not None
+        )
     written.close()
+
+
+def _advise(args: argparse.Namespace, chosen: Scene) -> str:
+    """Set the advised method, and the advised step or tolerance unless there is a step; returns why, in words."""
+    given = [args.dt, args.steps, args.every, args.start]
+    fixed = any(value is not None for value in given) or args.form != "direct" or args.float32
+    with show.progress(f"{chosen.title}: looking for a method", args) as progress:
+        row, why = advised(chosen, progress, by="tolerance" if args.tolerance is not None else "step" if fixed else None)
+    args.method = row.method.name if row is not None else USUAL if args.tolerance is None else ADAPTIVE
+    if row is not None and args.tolerance is None and not fixed:
+        if row.tolerance is None:
+            args.dt = row.dt
+        else:
+            args.tolerance = row.tolerance
+    return why
+
+
+def _colour(verdict: str) -> str:
+    """The colour of a verdict."""
+    if verdict.startswith("bounded; "):
+        return show.GOOD
+    return show.DOUBTFUL if verdict.startswith("bounded") else "" if verdict == UNKNOWN else show.BAD
 
 
 def _fixed(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: dict[str, Any]) -> Run:
@@ -148,9 +179,8 @@ def _shown(name: str, value: Any) -> str:
         array = np.array(value)
         if array.size > MOST_SHOWN:
             return f"{' × '.join(map(str, array.shape))} numbers; -o FILE writes them, --json prints them"
-        return np.array2string(array, precision=DIGITS, floatmode="maxprec", separator=", ", max_line_width=1000).replace(
-            "\n", ""
-        )
+        text = np.array2string(array, precision=DIGITS, floatmode="maxprec", separator=", ", max_line_width=1000)
+        return re.sub(r"\[ +", "[", text.replace("\n", ""))
     return str(value)
 
 
@@ -187,6 +217,6 @@ def _report(picture: RunPicture, columns: dict[str, Any]) -> dict[str, Any]:
         del known["dt"]
         known["steps"] = int(paces.accepted)
         known |= {"rejected_steps": int(paces.rejected), "function_evaluations": int(paces.evaluations)}
-    known = {"scene": known.pop("scene"), "method": known.pop("method"), "verdict": verdict(picture)} | known
+    known = {"verdict": verdict(picture), "scene": known.pop("scene"), "method": known.pop("method")} | known
     largest = {name: known.pop(name) for name in list(known) if name.startswith("largest")}
     return known | {f"last_{name}": columns[name][-1].tolist() for name in ("t", "v", "y", "energy") if name in columns} | largest

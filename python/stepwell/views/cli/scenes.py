@@ -9,6 +9,7 @@ import argparse
 
 from ...scenes import scenes
 from . import options, show
+from .sections import HOFFMANN, section
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,13 +23,15 @@ def command(args: argparse.Namespace) -> None:
     show.listing(
         args,
         "Scenes",
-        ("scene", "section", "dt>", "horizon>", "exact", "what it is"),
+        ("scene", "dt>", "horizon>", "exact", HOFFMANN, "what it is"),
         [
-            (s.name, s.section, f"{s.dt:.4g}", f"{s.horizon:.4g}", "no" if s.exact is None else "yes", s.description)
+            (s.name, f"{s.dt:.4g}", f"{s.horizon:.4g}", "no" if s.exact is None else "yes", section(s.section), s.description)
             for s in listed
         ],
         [
             {field: getattr(scene, field) for field in fields} | {"system": repr(scene.system), "exact": scene.exact is not None}
             for scene in listed
         ],
+        ["exact: whether the exact solution is known."],
+        least=(HOFFMANN, "exact", "dt", "horizon"),
     )

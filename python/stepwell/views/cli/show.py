@@ -6,7 +6,6 @@ import argparse
 import math
 import os
 import sys
-import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -14,7 +13,11 @@ from typing import Any
 
 from ...base.tables import json_text, write_csv, write_json
 from . import options
-from .table import lines_of, width_of_terminal
+from .table import BAD as BAD
+from .table import DOUBTFUL as DOUBTFUL
+from .table import GOOD as GOOD
+from .table import STRONG as STRONG
+from .table import lines_of, styled, width_of_terminal, wrapped
 
 
 def print_json(value: Any) -> None:
@@ -22,22 +25,47 @@ def print_json(value: Any) -> None:
     print(json_text(value))
 
 
+#: The note of a command that draws only if asked to.
+ASK_FOR_PICTURES = "-o DIR writes pictures and tables."
+
+#: Places of a name before its value.
+NAME = 21
+
 #: The endings of files to which a list is written.
 TABLE_FILES = (".csv", ".json", ".md")
 TABLE_TEXT = f"write the table: {', '.join(TABLE_FILES)}"
 
 
-def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], notes: Sequence[str] = ()) -> None:
-    """Print a table; columns whose name ends in ``>`` are flush right."""
-    bold = sys.stdout.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
-    print("\n".join(lines_of(title, columns, rows, notes, width=width_of_terminal(), bold=bold)))
+def warn(message: str) -> None:
+    """Print a message on standard error, wrapped between words."""
+    print("\n".join(wrapped(message, width_of_terminal(sys.stderr))), file=sys.stderr)
 
 
-def paragraphs(lines: Iterable[str]) -> None:
-    """Print sentences, wrapped between words to the width of the terminal."""
-    width = width_of_terminal()
-    for line in lines:
-        print("\n".join(textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False)) if line else "")
+def has_colours() -> bool:
+    """Whether standard output is a terminal that shows colours, and the user wants them."""
+    return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], notes: Sequence[str] = (), **layout: Any) -> None:
+    """Print a table; columns whose name ends in ``>`` are flush right. The layout is that of ``table.lines_of``."""
+    print("\n".join(lines_of(title, columns, rows, notes, width=width_of_terminal(), bold=has_colours(), **layout)))
+
+
+def paragraphs(lines: Iterable[str], first: str = "") -> None:
+    """Print texts, their lines wrapped between words to the width of the terminal; the first in the colour of a code."""
+    width, bold = width_of_terminal(), has_colours()
+    for i, line in enumerate(each for text in lines for each in text.split("\n")):
+        print("\n".join(styled(part, first if i == 0 else "", bold) for part in wrapped(line, width)))
+
+
+def facts(rows: Iterable[tuple[str, str, str]]) -> None:
+    """Print names and values, wrapped between words below each other, each value in the colour of its code."""
+    width, bold = width_of_terminal(), has_colours()
+    for name, value, code in rows:
+        first, *rest = wrapped(f"{name:{NAME}} {value}", width, " " * (NAME + 1))
+        print(styled(name, STRONG, bold) + styled(first[len(name) :], code, bold))
+        for line in rest:
+            print(styled(line, code, bold))
 
 
 def listing(
@@ -47,6 +75,7 @@ def listing(
     rows: Sequence[Sequence[str]],
     data: list[dict[str, Any]],
     notes: Sequence[str] = (),
+    **layout: Any,
 ) -> None:
     """Print a list as a table, or ``data`` as JSON (``--json``), and write it to the file of ``-o``."""
     options.check_file(args, TABLE_FILES)
@@ -55,7 +84,7 @@ def listing(
     if args.json:
         print_json(data)
     else:
-        table(title, columns, rows, [*notes, *written.notes()])
+        table(title, columns, rows, [*notes, *written.notes()], **layout)
     written.close()
 
 
@@ -113,5 +142,7 @@ def progress(title: str, args: argparse.Namespace) -> AbstractContextManager[Cal
 
 
 def number(value: float) -> str:
-    """A number in three digits; a dash if it is not finite."""
-    return f"{value:.3g}" if math.isfinite(value) else "–"
+    """A number in three digits, without an exponent up to a million; a dash if it is not finite."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{float(f'{value:.3g}'):.0f}" if 100.0 <= abs(value) < 1e6 else f"{value:.3g}"

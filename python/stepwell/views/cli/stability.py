@@ -6,6 +6,7 @@ Prints the largest stable steps; -o draws the eigenvalues of a step, its growth 
 from __future__ import annotations
 
 import argparse
+import math
 from functools import partial
 from pathlib import Path
 
@@ -51,8 +52,8 @@ def command(args: argparse.Namespace) -> None:
     rows = [
         (
             row["title"],
-            f"{row['limit']:.7g}" if row["limit"] else "never",
-            f"{row['samples_per_period']:.4g}" if row["limit"] else "–",
+            limit_of(row["limit"]),
+            f"{row['samples_per_period']:.4g}" if row["samples_per_period"] and row["limit"] else "–",
             row["leaves_by"] or "–",
             row["r1_squared_minus_1"],
             row["frequency_deviation"],
@@ -63,9 +64,16 @@ def command(args: argparse.Namespace) -> None:
         "Stability of the undamped oscillator, Φ = ω₀·dt",
         ("method", "stable for Φ <>", "steps a period >>", "past that", "r₁² − 1", "Ψ/Φ − 1"),
         rows,
-        [f"no map of {method(name).title}: {reason}" for name, reason in refused.items()] + written.notes(),
+        [f"no map of {method(name).title}: {reason}" for name, reason in refused.items()]
+        + (written.notes() or [show.ASK_FOR_PICTURES]),
+        least=("Ψ/Φ − 1", "r₁² − 1", "past that"),
     )
     written.close()
+
+
+def limit_of(limit: float) -> str:
+    """A limit of stability as tables show it."""
+    return "never" if not limit else "every" if math.isinf(limit) else f"{limit:.7g}"
 
 
 def _write(chart: Stability, folder: Path, kinds: list[str], top: float | None, written: show.Written) -> dict[str, str]:

@@ -1,7 +1,8 @@
 """Text tables that keep names, numbers and paths whole at any width.
 
-A table that is too wide for the terminal has its prose wrapped between words. If that is not enough, it is split into several
-tables, each with the first column. Output to a file or a pipe is not wrapped.
+A table that is too wide for the terminal has its prose wrapped between words. If that is not enough, its least columns are left
+out, and a note says which and where they are. Only a table whose other columns are still too wide is split into several, each
+with the first column. Output to a file or a pipe is not wrapped, and has all columns.
 """
 
 from __future__ import annotations
@@ -17,8 +18,11 @@ from unicodedata import combining, east_asian_width
 #: Between two columns.
 GAP = "   "
 
-#: The least width of a column of prose whose text is longer.
-MIN_PROSE = 28
+#: The width that a column of prose should have if its text is longer, and the least.
+PROSE, MIN_PROSE = 44, 28
+
+#: Codes of a terminal for titles and answers, for the recommended row, for what is bad and doubtful, and for notes.
+STRONG, GOOD, BAD, DOUBTFUL, FAINT = "1", "1;32", "1;31", "33", "2"
 
 #: The width where there is no terminal: lines of any length.
 UNLIMITED = 1_000_000
@@ -37,6 +41,9 @@ def lines_of(
     rows: Iterable[Sequence[str]],
     notes: Sequence[str] = (),
     *,
+    answer: Sequence[str] = (),
+    least: Sequence[str] = (),
+    marked: int | None = None,
     width: int = UNLIMITED,
     bold: bool = False,
 ) -> list[str]:
@@ -47,29 +54,50 @@ def lines_of(
         columns: the names of the columns; those that end in ``>`` are flush right, and their cells are never wrapped.
         rows: the cells of each row.
         notes: sentences below the table.
+        answer: sentences above it, the first of which is the answer.
+        least: the names of columns that are left out where the table is too wide, the first one first.
+        marked: the number of the recommended row.
         width: the most characters of a line; a longer word stays whole.
-        bold: whether titles are bold and notes faint, by escape codes of terminals.
+        bold: whether to use colours and bold letters, by escape codes of terminals.
     """
     names = [name.removesuffix(">") for name in columns]
     right = [name.endswith(">") for name in columns]
     cells = [[str(cell) for cell in row] for row in rows]
     whole = [flush or i == 0 for i, flush in enumerate(right)]
     wide = [max(map(length, column)) for column in zip(names, *cells, strict=True)]
-    least = [_least(name, [row[i] for row in cells], whole[i]) for i, name in enumerate(names)]
+    prose = max(MIN_PROSE, min(PROSE, width - wide[0] - len(GAP)))
+    narrow = [_least(name, [row[i] for row in cells], None if whole[i] else prose) for i, name in enumerate(names)]
+    shown, left_out = _shown(names, narrow, width, least)
 
-    lines = [_styled(line, "1", bold) for line in _wrapped(title, width)]
-    for part in _parts(least, width):
-        widths = _widths([wide[i] for i in part], [least[i] for i in part], width)
+    lines = [styled(line, GOOD if i == 0 else "", bold) for i, text in enumerate(answer) for line in wrapped(text, width)]
+    lines += [""] * bool(answer)
+    lines += [styled(line, STRONG, bold) for line in wrapped(title, width)]
+    for part in _parts(shown, narrow, width):
+        widths = _widths([wide[i] for i in part], [narrow[i] for i in part], width)
         lines.append("")
-        lines += _row([names[i] for i in part], widths, [right[i] for i in part], bottom=True)
+        head = _row([names[i] for i in part], widths, [right[i] for i in part], bottom=True)
+        lines += [styled(line, STRONG, bold) for line in head]
         lines.append("─" * min(width, sum(widths) + len(GAP) * (len(widths) - 1)))
-        for row in cells:
-            lines += _row([row[i] for i in part], widths, [right[i] for i in part])
+        for number, row in enumerate(cells):
+            texts = _row([row[i] for i in part], widths, [right[i] for i in part])
+            lines += [styled(line, GOOD if number == marked else "", bold) for line in texts]
+    if left_out:
+        notes = [f"Left out, as the terminal is narrow: {', '.join(left_out)}; a pipe and --json have all.", *notes]
     if notes:
         lines.append("")
     for note in notes:
-        lines += [_styled(line, "2", bold) for line in _wrapped(note, width)]
+        lines += [styled(line, FAINT, bold) for line in wrapped(note, width)]
     return lines
+
+
+def _shown(names: Sequence[str], narrow: Sequence[int], width: int, least: Sequence[str]) -> tuple[list[int], list[str]]:
+    """The indices of the columns that are shown, and the names of those that are left out: as few of ``least`` as need be."""
+    shown = list(range(len(names)))
+    for name in least:
+        if sum(narrow[i] for i in shown) + len(GAP) * (len(shown) - 1) <= width:
+            break
+        shown.remove(names.index(name))
+    return shown, [name for i, name in enumerate(names) if i not in shown]
 
 
 def length(text: str) -> int:
@@ -77,23 +105,24 @@ def length(text: str) -> int:
     return sum(0 if combining(c) else 2 if east_asian_width(c) in "WF" else 1 for c in text)
 
 
-def _least(name: str, cells: Sequence[str], whole: bool) -> int:
-    """The least width of a column: its longest word, and for prose at least ``MIN_PROSE``."""
+def _least(name: str, cells: Sequence[str], prose: int | None) -> int:
+    """The least width of a column: its longest word, and for prose at least that width; None for cells that stay whole."""
     words = [length(word) for word in name.split()]
-    if whole:
+    if prose is None:
         return max([*words, *map(length, cells)], default=0)
     longest = max([length(word) for cell in cells for word in cell.split()], default=0)
-    return max([*words, longest, min(MIN_PROSE, max(map(length, cells), default=0))], default=0)
+    return max([*words, longest, min(prose, max(map(length, cells), default=0))], default=0)
 
 
-def _parts(least: Sequence[int], width: int) -> list[list[int]]:
+def _parts(shown: Sequence[int], narrow: Sequence[int], width: int) -> list[list[int]]:
     """The indices of the columns of each table: as many as fit, the first column in each."""
-    parts, room = [[0]], width - least[0]
-    for i in range(1, len(least)):
-        needed = least[i] + len(GAP)
+    first = shown[0]
+    parts, room = [[first]], width - narrow[first]
+    for i in shown[1:]:
+        needed = narrow[i] + len(GAP)
         if needed > room and len(parts[-1]) > 1:
-            parts.append([0])
-            room = width - least[0]
+            parts.append([first])
+            room = width - narrow[first]
         parts[-1].append(i)
         room -= needed
     return parts
@@ -114,7 +143,7 @@ def _widths(wide: Sequence[int], least: Sequence[int], width: int) -> list[int]:
 
 def _row(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool], bottom: bool = False) -> list[str]:
     """The lines of a row; ``bottom`` aligns the names of columns with the line below them."""
-    columns = [_wrapped(cell, width) or [""] for cell, width in zip(cells, widths, strict=True)]
+    columns = [wrapped(cell, width) or [""] for cell, width in zip(cells, widths, strict=True)]
     height = max(map(len, columns))
     padded = [[""] * (height - len(c)) + c if bottom else c + [""] * (height - len(c)) for c in columns]
     lines = []
@@ -125,12 +154,13 @@ def _row(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool], bot
     return lines
 
 
-def _wrapped(text: str, width: int) -> list[str]:
-    """The lines of a text, wrapped between words only."""
+def wrapped(text: str, width: int, indent: str = "") -> list[str]:
+    """The lines of a text, wrapped between words only; those after the first are indented."""
     if length(text) <= width:
         return [text]
-    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False)
+    return textwrap.wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
-def _styled(text: str, code: str, styled: bool) -> str:
-    return f"\033[{code}m{text}\033[0m" if styled and text else text
+def styled(text: str, code: str, bold: bool) -> str:
+    """The text in the colour or weight of a code, if that is used at all."""
+    return f"\033[{code}m{text}\033[0m" if bold and text and code else text

@@ -6,6 +6,9 @@ from ...runs.result import Status
 from ..charts import RunPicture
 from ..charts.runs_finding import MIN_GROWTH, MIN_GROWTH_UNKNOWN, growth_of, tenfold
 
+#: Where no true motion is known.
+UNKNOWN = "finite to the end; the error is unknown, because the true motion is unknown"
+
 #: Why a run with a tolerance stopped.
 STOPPED = {
     Status.DIVERGED: "the state is no longer finite",
@@ -28,7 +31,7 @@ def verdict(picture: RunPicture) -> str:
         return f"grew by {tenfold(growth)}: unstable"
     error = picture.summary()["largest_state_error"]
     if error is None:
-        return "finite to the end; the error is unknown, because the true motion is unknown"
+        return UNKNOWN
     if error > 1.0:
         return f"bounded, but wrong: the state error is up to {error:.2g}, where 1 is the size of the solution"
     return f"bounded; the state error is at most {error:.2g}"
