@@ -104,11 +104,10 @@ def test_what_was_found_is_printed_though_it_cannot_be_written(
     def full(*_: Any, **__: Any) -> Any:
         raise OSError(28, "No space left on device")
 
-    from matplotlib.animation import PillowWriter
     from matplotlib.figure import Figure
 
     monkeypatch.setattr(Figure, "savefig", full)
-    monkeypatch.setattr(PillowWriter, "saving", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     monkeypatch.setattr("numpy.savez", full)
     monkeypatch.setattr("csv.writer", full)
     monkeypatch.setattr(Path, "write_text", full)

@@ -103,9 +103,9 @@ def test_what_moves_is_all_that_differs_from_a_whole_drawing(pictures):
     """The frames that are drawn over one ground are those of a figure that is drawn anew."""
     chart = pictures["orbits"]
     figure, show = runs_animation.stage(chart)
-    film = frames.Film(figure, show, [20, 70])
-    film.frame(20)
-    over = film.frame(70)
+    drawn = frames.Frames(figure, show, [20, 70])
+    drawn.frame(20)
+    over = drawn.frame(70)
     figure, show = runs_animation.stage(chart)
     for artist in figure.findobj():
         artist.set_animated(False)

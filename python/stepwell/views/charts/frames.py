@@ -29,7 +29,7 @@ MOST_BYTES, LEAST_SHARE = 1_400_000, 0.25
 BITS = 5
 
 
-class Film:
+class Frames:
     """The frames of a figure, of which only the animated artists are drawn anew.
 
     Args:
@@ -48,7 +48,7 @@ class Film:
     ) -> None:
         self.figure, self.show, self.states, self.progress = figure, show, states, progress
         self.canvas = cast(Any, figure.canvas)
-        self.moving = [each for each in figure.findobj() if each.get_animated()]
+        self.artists = [each for each in figure.findobj() if each.get_animated()]
         self.canvas.draw()
         self.background = self.canvas.copy_from_bbox(figure.bbox)
 
@@ -56,7 +56,7 @@ class Film:
         """The pixels of a state, shape (height, width, 3)."""
         self.show(state)
         self.canvas.restore_region(self.background)
-        for artist in sorted(self.moving, key=lambda each: each.get_zorder()):
+        for artist in sorted(self.artists, key=lambda each: each.get_zorder()):
             self.figure.draw_artist(artist)
         return np.array(self.canvas.buffer_rgba())[..., :3]
 
@@ -67,12 +67,12 @@ class Film:
                 self.progress((i + 1) / len(self.states))
 
 
-def write_gif(film: Film, path: Path, rate: float) -> None:
+def write_gif(frames: Frames, path: Path, rate: float) -> None:
     """Write a .gif that repeats itself, of fewer frames where all would be more than ``MOST_BYTES``."""
-    count = len(film.states)
+    count = len(frames.states)
     some = np.linspace(0, count - 1, min(SAMPLES, count)).astype(int).tolist()
-    samples = [film.frame(film.states[i]) for i in some]
-    following = [film.frame(film.states[min(i + 1, count - 1)]) for i in some]
+    samples = [frames.frame(frames.states[i]) for i in some]
+    following = [frames.frame(frames.states[min(i + 1, count - 1)]) for i in some]
     for number in COLOURS:
         colours, place = _palette(samples, number)
         codes = [(place[_coarse(one)], place[_coarse(other)]) for one, other in zip(samples, following, strict=True)]
@@ -82,12 +82,12 @@ def write_gif(film: Film, path: Path, rate: float) -> None:
     else:
         # The fewer there are, the more changes from one to the next.
         fewer = max(2, round(max(0.75 * MOST_BYTES / size, LEAST_SHARE) * count))
-        film.states = [film.states[i] for i in np.linspace(0, count - 1, fewer).round().astype(int).tolist()]
+        frames.states = [frames.states[i] for i in np.linspace(0, count - 1, fewer).round().astype(int).tolist()]
         rate *= fewer / count
 
     def images() -> Iterator[Any]:
         before = None
-        for pixels in film:
+        for pixels in frames:
             codes = place[_coarse(pixels)]
             yield _image(codes, colours, before)
             before = codes
@@ -138,7 +138,7 @@ def _palette(samples: Sequence[Pixels], number: int) -> tuple[Pixels, Pixels]:
     return colours, distance.argmin(axis=1).astype(np.uint8)
 
 
-def write_mp4(film: Film, path: Path, rate: float) -> None:
+def write_mp4(frames: Frames, path: Path, rate: float) -> None:
     """Write an .mp4 by the program ffmpeg.
 
     Raises:
@@ -146,7 +146,7 @@ def write_mp4(film: Film, path: Path, rate: float) -> None:
     """
     from matplotlib.animation import FFMpegWriter
 
-    height, width = film.frame(film.states[0]).shape[:2]
+    height, width = frames.frame(frames.states[0]).shape[:2]
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{rate:.6g}", "-i", "-"]
     # The format has even sides only.
     target = ["-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2", "-vcodec", "h264", "-pix_fmt", "yuv420p", str(path)]
@@ -155,7 +155,7 @@ def write_mp4(film: Film, path: Path, rate: float) -> None:
         assert process.stdin is not None
         assert process.stderr is not None
         try:
-            for pixels in film:
+            for pixels in frames:
                 process.stdin.write(np.ascontiguousarray(pixels).data)
             process.stdin.close()
         except BrokenPipeError:

@@ -13,7 +13,7 @@ from ...base.arrays import Array
 from ...base.pictures import new_figure
 from ...errors import ArgumentError, UnsupportedError
 from . import page_animation
-from .frames import Film, write_gif, write_mp4
+from .frames import Frames, write_gif, write_mp4
 from .labels import title
 from .orbits_picture import BODIES, body, exact, fixed, square
 from .run_panels import Points, errors, is_hanging, side_by_side, view_of
@@ -94,8 +94,8 @@ def write(chart: RunPicture, path: Path, seconds: float, fps: float, progress: C
     count = max(2, min(len(good), round(seconds * fps)))
     states = good[np.round(np.linspace(0, len(good) - 1, count)).astype(int)]
     with rc_context(FONT):
-        film = Film(*stage(chart), states.tolist(), progress)
-        (write_gif if path.suffix.lower() == ".gif" else write_mp4)(film, path, count / seconds)
+        frames = Frames(*stage(chart), states.tolist(), progress)
+        (write_gif if path.suffix.lower() == ".gif" else write_mp4)(frames, path, count / seconds)
 
 
 def stage(chart: RunPicture) -> tuple[Figure, Show]:
