@@ -31,7 +31,7 @@ pytest.importorskip("furo", reason="the extra docs is not installed")
 
 ROOT = Path(__file__).resolve().parents[1]
 #: What a fresh clone has of the site: what was built in docs/ before is left out.
-NEEDED = ("docs", "examples", "benches", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
+NEEDED = ("docs", "examples", "benches", "pyproject.toml", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
 LEFT_OUT = shutil.ignore_patterns("gallery", "__pycache__", "control")
 #: A proxy at which nobody listens: whatever asks for a page of the web fails.
 NOWHERE = "http://127.0.0.1:9"
