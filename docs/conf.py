@@ -39,7 +39,9 @@ nitpick_ignore_regex = [(r"py:.*", r"(?!stepwell\.[a-z]+$).*")]
 
 # ---- pages
 
-myst_enable_extensions = ["colon_fence"]
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+# Browsers draw MathML by themselves, so that no script is loaded for formulas.
+html_math_renderer = "mathml"
 myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
@@ -173,6 +175,11 @@ def setup(app: Any) -> None:
     """Called by Sphinx."""
     app.connect("html-page-context", _with_card)
     app.connect("doctree-read", site_parts.captions)
+    app.add_html_math_renderer(
+        "mathml",
+        inline_renderers=(site_parts.formula, None),
+        block_renderers=(site_parts.formula, None),
+    )
     app.add_directive("public", site_parts.Public)
     app.connect(
         "autodoc-process-docstring", site_parts.as_text, priority=400

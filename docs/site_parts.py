@@ -147,3 +147,13 @@ def captions(app: Any, doctree: nodes.document) -> None:
             "", image, nodes.caption("", text), ids=[f"picture-{number}"]
         )
         paragraph.replace_self(figure)
+
+
+def formula(writer: Any, node: nodes.Element) -> None:
+    """A formula in LaTeX as MathML."""
+    from latex2mathml.converter import convert
+
+    block = isinstance(node, nodes.math_block)
+    drawn = convert(node.astext(), display="block" if block else "inline")
+    writer.body.append(f'<div class="formula">{drawn}</div>' if block else drawn)
+    raise nodes.SkipNode

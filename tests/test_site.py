@@ -301,3 +301,9 @@ def test_the_first_page_begins_with_an_equation(site: Path) -> None:
     text = re.sub(r"<[^>]*>", "", (site / "index.html").read_text(encoding="utf-8"))
     assert "def duffing(" in text
     assert "pip install" in text
+
+
+def test_formulas_are_mathematics(site: Path) -> None:
+    text = (site / "theory" / "stability.html").read_text(encoding="utf-8")
+    assert text.count("<math ") > 4
+    assert "\\begin{pmatrix}" not in text
