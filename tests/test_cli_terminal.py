@@ -70,6 +70,7 @@ WRAPPED = {
     ("run", "kepler", "--method", "rk4"): "-0.16965978",
     ("explore", "-o", "page.html", "--only", "--scene", "clover"): "sliders beside dt",
     ("paper", "7"): "oscillation",
+    ("explain", "oscillator", "rk4"): "registers",
 }
 
 

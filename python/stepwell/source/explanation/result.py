@@ -279,7 +279,7 @@ class Explanation(ValueEquality):
                 shown.append(meaning if name in MEANINGS else f"{name}: {meaning}")
         if self.method.carry:
             shown.append(f"{self.method.carry}: what is carried in place of v between steps")
-        return [f"Here {'; '.join(shown)}."] if shown else []
+        return [f"Names: {'; '.join(shown)}."] if shown else []
 
     def as_dict(self) -> dict[str, Any]:
         """The explanation as numbers and texts."""

@@ -60,7 +60,7 @@ def command(args: argparse.Namespace) -> None:
     if args.json:
         show.print_json(explained.as_dict())
     else:
-        print("\n".join([str(explained), *written.notes()]))
+        show.paragraphs([str(explained), *written.notes()], show.STRONG)
     written.close()
 
 

@@ -55,7 +55,8 @@ def paragraphs(lines: Iterable[str], first: str = "") -> None:
     """Print texts, their lines wrapped between words to the width of the terminal; the first in the colour of a code."""
     width, bold = width_of_terminal(), has_colours()
     for i, line in enumerate(each for text in lines for each in text.split("\n")):
-        print("\n".join(styled(part, first if i == 0 else "", bold) for part in wrapped(line, width)))
+        indent = "    " if line.startswith(" ") else ""  # as of a formula in a listing
+        print("\n".join(styled(part, first if i == 0 else "", bold) for part in wrapped(line, width, indent)))
 
 
 def facts(rows: Iterable[tuple[str, str, str]]) -> None:
