@@ -46,14 +46,18 @@ AXES = {
     "members": (
         "members of a batch",
         "ns per member and step",
-        "A call costs what {call} steps of a member cost in a large batch",
+        "Below {even} members the call ({call}) costs more than the steps",
     ),
     "states": (
         "states of one member",
         "ns per state and step",
-        "Behind the first few, each further state costs the same within a factor of two",
+        "After the first few, every further state costs {low} to {high} ns",
     ),
-    "bodies": ("bodies", "ns per pair and evaluation", "From some hundreds of bodies on the price of a pair is constant"),
+    "bodies": (
+        "bodies",
+        "ns per pair and evaluation",
+        "Above a few hundred bodies a pair costs {pair} ns, however many there are",
+    ),
     "steps": ("steps of one member", "ns per step", "Short runs pay for the call, long ones for the step"),
     "operations": (
         "operations of a step",
@@ -303,7 +307,7 @@ def draw(told: dict[str, Any]) -> None:
                     f" {FORMS.get(form, form)}",
                     transform=axes.get_xaxis_transform(),
                     va="top",
-                    size=11,
+                    size=11.5,
                     color=style.GREY,
                 )
             axes.set(xlabel=x_name, ylabel=y_name)
@@ -314,9 +318,11 @@ def draw(told: dict[str, Any]) -> None:
             if high < 10.0 * low:
                 axes.set_ylim(0.5 * low, 2.0 * high)
             at_ends(axes, ends, 12.0, 0.06)
-            call = powers(rows[0]["one thread"] * STEPS / rows[-1]["one thread"]) if name == "members" else ""
-            title(figure, 0.012, 0.93, said.format(call=call), 17)
-            figure.text(0.012, 0.885, told["machine"], size=11, color=style.GREY)
+            if name == "members":
+                call_and_steps(axes, rows)
+            title(figure, 0.012, 0.93, said.format(**numbers(told)), 17)
+            about = "; all threads are two, which start where that is worth it" if name == "members" else ""
+            figure.text(0.012, 0.885, f"{told['machine']}{about}", size=11.5, color=style.GREY)
             (IMAGES / f"growth-{name}.png").write_bytes(png(figure))
 
 
@@ -324,14 +330,46 @@ def draw(told: dict[str, Any]) -> None:
 ROOM = 0.1
 
 
-def powers(number: float) -> str:
-    """A number of one digit and a power of ten: 4·10⁵."""
-    digit, _, exponent = f"{number:.0e}".partition("e")
-    return f"{digit}·10{str(int(exponent)).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+def numbers(told: dict[str, Any]) -> dict[str, str]:
+    """The numbers of the titles."""
+    call, step = call_of(told["members"])
+    states = [row["chain"] for row in told["states"][len(told["states"]) // 4 :]]
+    pairs = [row["one thread"] for row in told["bodies"] if row["x"] >= MANY_BODIES]
+    return {
+        "even": f"{float(f'{call / step:.1g}'):,.0f}".replace(",", " "),
+        "call": f"{1e-3 * call * STEPS:.0f} µs",
+        "low": f"{min(states):.1f}",
+        "high": f"{max(states):.1f}",
+        "pair": f"{float(np.median(pairs)):.1f}",
+    }
+
+
+def call_of(rows: list[dict[str, Any]]) -> tuple[float, float]:
+    """What the call costs for a step, and what a member and step costs in a large batch, in ns by one thread."""
+    large = [row["one thread"] for row in rows if row["x"] >= LARGE_BATCH]
+    return rows[0]["one thread"], float(np.median(large))
+
+
+def call_and_steps(axes: Any, rows: list[dict[str, Any]]) -> None:
+    """The two parts of the time: the call, shared by the members, and the steps."""
+    from stepwell.views.charts import style
+
+    call, step = call_of(rows)
+    x = np.array([row["x"] for row in rows], dtype=np.float64)
+    low, high = axes.get_ylim()
+    axes.plot(x, call / x, color=style.GREY, linewidth=1.2, linestyle=(0, (5, 3)), zorder=1)
+    axes.axhline(step, color=style.GREY, linewidth=1.2, linestyle=(0, (5, 3)), zorder=1)
+    axes.set_ylim(0.5 * low, high)
+    axes.text(30.0, 1.6 * call / 30.0, f"cost of the call: {1e-3 * call * STEPS:.0f} µs", size=12, color=style.GREY)
+    axes.text(1.2, 1.2 * step, f"a step in a large batch: {step:.2f} ns", size=12, color=style.GREY)
+
+
+#: Batches of which a step has its own price, and bodies of which a pair has.
+LARGE_BATCH, MANY_BODIES = 100_000, 200
 
 
 #: What a form is called in a picture.
-FORMS = {"rates": "tapes of rates", "hand": "loops over rows", "matrix": "products of matrices", "one tape": "one tape"}
+FORMS = {"rates": "rates as a tape", "hand": "loops over rows", "matrix": "products of matrices", "one tape": "one tape"}
 
 
 def main() -> None:

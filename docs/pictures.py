@@ -189,7 +189,7 @@ def contact() -> Figure:
     """What four ways of contact make of the energy, for every phase of the impact."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
-    from stepwell.views.charts.style import COLOURS, FONT, GREY
+    from stepwell.views.charts.style import COLOURS, FONT, GREY, ink
 
     lines = (
         (
@@ -204,8 +204,8 @@ def contact() -> Figure:
             COLOURS[1],
             (0.55, 0.92),
         ),
-        ("v and y turned over", mirrored(), COLOURS[4], (0.12, 1.78)),
-        ("safe, and flip", impacts(sw.Floor()), "black", (0.24, 1.02)),
+        ("naive reflection of v and y", mirrored(), COLOURS[4], (0.12, 1.78)),
+        ("the ways “safe” and “flip”", impacts(sw.Floor()), "black", (0.24, 1.02)),
     )
     with rc_context(FONT):
         figure = Figure(figsize=(12.0, 6.4), dpi=100)
@@ -213,7 +213,7 @@ def contact() -> Figure:
         phase = np.linspace(0.0, 1.0, PHASES, endpoint=False)
         for name, ratio, colour, place in lines:
             axes.plot(phase, ratio, color=colour, linewidth=2.2)
-            axes.text(*place, name, color=colour, weight="bold")
+            axes.text(*place, name, color=ink(colour), weight="bold")
         axes.set_xlim(0.0, 1.0)
         axes.set_ylim(0.78, 1.92)
         axes.set_xlabel(
@@ -242,7 +242,7 @@ def tumbling() -> Figure:
     """A dumb-bell that is thrown, tumbles and rests, and what is left of its energy after an elastic impact at every angle."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
-    from stepwell.views.charts.style import COLOURS, FONT, GREY
+    from stepwell.views.charts.style import COLOURS, FONT, GREY, ink
 
     thrown = sw.Rods(
         [1.0, 2.0],
@@ -273,7 +273,7 @@ def tumbling() -> Figure:
     )  # the point alone returns, then velocities along the rod are removed
     apart = sw.integrate(bare, "rk4", v=v, y=y, dt=1e-6, steps=1, control=control)
     with rc_context(FONT):
-        figure = Figure(figsize=(12.0, 5.2), dpi=100)
+        figure = Figure(figsize=(12.0, 5.4), dpi=100)
         axes = figure.add_axes((0.02, 0.12, 0.55, 0.68))
         for i, place in enumerate(run.y):
             late = 0.25 + 0.75 * i / len(run.y)
@@ -289,18 +289,30 @@ def tumbling() -> Figure:
         axes.axhline(0.0, color="black", linewidth=1.5, zorder=0)
         axes.set_aspect("equal")
         axes.set_axis_off()
-        right = figure.add_axes((0.66, 0.17, 0.31, 0.63))
+        right = figure.add_axes((0.665, 0.16, 0.32, 0.62))
         for name, ended, colour, at in (
-            ("found together", together, "black", (20.0, 1.04)),
-            ("the point alone,\nthen the rod", apart, COLOURS[2], (46.0, 0.28)),
+            (
+                "impulse and rod solved\ntogether (stepwell)",
+                together,
+                "black",
+                (4.0, 1.04),
+            ),
+            (
+                "point first, rod after:\nloses up to all",
+                apart,
+                COLOURS[2],
+                (38.0, 0.1),
+            ),
         ):
             right.plot(np.degrees(angle), ended.energy[-1], color=colour, linewidth=2.2)
-            right.text(*at, name, color=colour, weight="bold")
+            right.text(*at, name, color=ink(colour), weight="bold", size=12.0)
         right.set(
-            xlim=(0.0, 89.0),
-            ylim=(0.0, 1.15),
-            xlabel="angle between rod and vertical, degrees",
+            xlim=(0.0, 90.0),
+            ylim=(0.0, 1.3),
+            xlabel="angle of rod and vertical, degrees",
         )
+        right.set_xticks((0, 30, 60, 90))
+        right.set_yticks((0.0, 0.5, 1.0))
         right.set_ylabel("energy after / before")
         right.spines[["top", "right"]].set_visible(False)
         figure.text(

@@ -1,12 +1,12 @@
-"""Speeds beside peers, from the report of ``make bench``: the table of docs/benchmarks/speed.md, and its picture.
+"""Speeds beside peers, from the report of ``make bench``: the table of docs/benchmarks/speed.md, and its pictures.
 
-Run ``.venv/bin/python docs/speed.py`` to draw the picture; ``docs/generate.py`` writes the table.
+Run ``.venv/bin/python docs/speed.py`` to draw the pictures; ``docs/generate.py`` writes the table.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benches" / "RESULTS.md"
@@ -113,70 +113,141 @@ def rows() -> list[list[str]]:
     ]
 
 
+#: The groups of the pictures: their titles, and what the names of their works contain.
+GROUPS = {
+    "own equations": ("own equation",),
+    "in float32": ("float32",),
+    "oscillators and pendulums": ("oscillator", "pendulum"),
+    "bodies": ("figure-eight", "bodies", "stars"),
+    "springs": ("springs",),
+}
+#: Within this of each other two programs are level.
+LEVEL = 0.1
+#: The file and the title of each picture, the ratio that it shows, and what is compared.
+PICTURES = {
+    "speed.png": (
+        "exact",
+        "Same arithmetic: as fast as {peers}, or faster, in {ahead} of {all}",
+        "The same sums and products, each rounded",
+    ),
+    "speed-best.png": (
+        "best",
+        "Each as fast as it can: level or faster in {ahead} of {all}",
+        "Fused, reordered and approximated where that is faster",
+    ),
+}
+
+
+def grouped(found: list[Ratios], what: str) -> list[tuple[str, list[Ratios]]]:
+    """The works in their groups, the fastest first."""
+    groups: dict[str, list[Ratios]] = {name: [] for name in GROUPS}
+    for each in found:
+        groups[
+            next(
+                name
+                for name, parts in GROUPS.items()
+                if any(part in each.name for part in parts)
+            )
+        ].append(each)
+    return [
+        (name, sorted(works, key=lambda r: -float(getattr(r, what))))
+        for name, works in groups.items()
+        if works
+    ]
+
+
 def draw() -> None:
-    """The picture: a row for each work."""
-    import matplotlib.pyplot as plt
+    """The pictures: a row for each work."""
+    from matplotlib import rc_context
     from stepwell.base.pictures import png
+    from stepwell.views.charts import style
+    from stepwell.views.charts.labels import title
 
     found = ratios()
-    figure, axes = plt.subplots(
-        figsize=(8.6, 0.31 * len(found) + 1.3), layout="constrained"
-    )
-    exact, best = "#175ca6", "#c75a22"
-    for place, r in enumerate(found):
-        y = len(found) - 1 - place
-        axes.plot([r.exact, r.best], [y, y], color="#bbbbbb", linewidth=1.2, zorder=1)
-        axes.plot(r.exact, y, "o", color=exact, markersize=7, zorder=3)
-        axes.plot(
-            r.best,
-            y,
-            "D",
-            color="white",
-            markeredgecolor=best,
-            markeredgewidth=1.6,
-            markersize=6,
-            zorder=2,
+    for file, (what, head, about) in PICTURES.items():
+        groups = grouped(found, what)
+        rows = len(found) + len(groups)
+        height = 0.27 * rows + 2.1
+        ahead = sum(
+            getattr(r, what) >= (0.995 if what == "exact" else 1.0 - LEVEL)
+            for r in found
         )
-    axes.axvline(1.0, color="#222222", linewidth=1.0, zorder=0)
-    axes.set_xscale("log")
-    every = [each for r in found for each in (r.exact, r.best)]
-    low, high = min(0.45, *every) / 1.08, max(2.0, *every) * 1.08  # no point is cut off
-    ticks = [
-        tick
-        for tick in (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
-        if low <= tick <= high
-    ]
-    axes.set_xticks(ticks, [f"{tick:g}×" for tick in ticks])
-    axes.minorticks_off()
-    axes.set_xlim(low, high)
-    axes.set_ylim(-0.7, len(found) + 1.2)
-    axes.set_yticks(
-        range(len(found)), [f"{r.name}  ({r.peer})" for r in reversed(found)]
-    )
-    axes.tick_params(axis="y", length=0)
-    axes.grid(axis="x", color="#e4e4e4", linewidth=0.8)
-    axes.set_axisbelow(True)
-    for side in ("top", "right", "left"):
-        axes.spines[side].set_visible(False)
-    top = len(found) + 0.35
-    axes.text(0.985, top, "← the peer is faster", ha="right", color="#555555")
-    axes.text(1.015, top, "stepwell is faster →", ha="left", color="#555555")
-    axes.set_xlabel("times as fast as the peer in brackets, one thread, equal errors")
-    ahead = sum(r.exact >= 0.995 for r in found)
-    told = "By the same arithmetic stepwell is level with the fastest C or numba\n"
-    told += f"that we could write, or ahead, in {ahead} of {len(found)} workloads"
-    figure.suptitle(told, x=0.01, ha="left", fontsize=11.5, weight="bold")
-    figure.legend(
-        handles=[
-            plt.Line2D([], [], marker="o", linestyle="", color=exact, label="the same sums and products, each rounded"),
-            plt.Line2D(
-                [], [], marker="D", linestyle="", color="white", markeredgecolor=best, markeredgewidth=1.6,
-                label="each as fast as it can: fused, reordered, approximate roots",
-            ),
-        ],
-        loc="outside lower right", ncols=2, frameon=False, fontsize=8.5,
-    )  # fmt: skip
-    (ROOT / "docs" / "images" / "speed.png").write_bytes(png(figure, 130))
+        with rc_context(style.FONT):
+            figure: Any = style.new_figure(12.0, height)
+            axes = figure.add_axes(
+                (0.375, 0.85 / height, 0.6, 0.27 * rows / height),
+                xscale="log",
+                ylim=(rows - 0.4, -0.4),
+            )
+            axes.axvspan(1.0 - LEVEL, 1.0 / (1.0 - LEVEL), color="#eeeeee", zorder=0)
+            axes.axvline(1.0, color="#222222", linewidth=1.0, zorder=1)
+            place, marks = 0, []
+            for name, works in groups:
+                marks.append((place, name, True))
+                for r in works:
+                    place += 1
+                    value = float(getattr(r, what))
+                    colour = style.FAMILIES[
+                        "Runge-Kutta" if value >= 1.0 - LEVEL else "Heun"
+                    ]
+                    axes.plot(
+                        [1.0, value],
+                        [place, place],
+                        color=colour,
+                        linewidth=2.0,
+                        zorder=2,
+                    )
+                    axes.plot(
+                        [value], [place], "o", color=colour, markersize=8, zorder=3
+                    )
+                    marks.append(
+                        (
+                            place,
+                            f"{r.name.removeprefix('own equation: ').replace(' in float32', '')}  ({r.peer})",
+                            False,
+                        )
+                    )
+                place += 1
+            axes.set_yticks([at for at, *_ in marks], [text for _, text, _ in marks])
+            for label, (*_, is_head) in zip(axes.get_yticklabels(), marks, strict=True):
+                label.set(
+                    weight="bold" if is_head else "normal",
+                    size=12.0 if is_head else 11.5,
+                )
+            every = [float(getattr(r, what)) for r in found]
+            low, high = (
+                min(0.45, *every) / 1.08,
+                max(2.0, *every) * 1.08,
+            )  # no point is cut off
+            ticks = [
+                tick
+                for tick in (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
+                if low <= tick <= high
+            ]
+            axes.set_xticks(ticks, [f"{tick:g}×" for tick in ticks])
+            axes.minorticks_off()
+            axes.set_xlim(low, high)
+            axes.tick_params(axis="y", length=0)
+            axes.grid(axis="x", color="#e4e4e4", linewidth=0.8)
+            axes.set_axisbelow(True)
+            axes.spines[["top", "right", "left"]].set_visible(False)
+            axes.set_xlabel(
+                "times as fast as the peer in brackets, one thread, equal errors; band: level within 10 %",
+                size=12.0,
+            )
+            title(
+                figure,
+                0.012,
+                1.0 - 0.45 / height,
+                head.format(
+                    peers="hand-written C or numba", ahead=ahead, all=len(found)
+                ),
+                18,
+            )
+            figure.text(
+                0.012, 1.0 - 0.77 / height, f"{about}.", size=12.5, color=style.GREY
+            )
+            (ROOT / "docs" / "images" / file).write_bytes(png(figure))
 
 
 if __name__ == "__main__":

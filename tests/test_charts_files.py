@@ -128,7 +128,8 @@ def test_a_refused_method_is_named_with_the_reason(small, tmp_path):
     assert [(row["method"], row["refused"], row["cost"]) for row in rows if row["refused"]] == [
         ("verlet", small.refused["verlet"], "")
     ]
-    assert "Verlet is refused" in " ".join(text.get_text() for text in small.plot().texts).replace("\n", " ")
+    said = " ".join(text.get_text() for text in small.plot().texts).replace("\n", " ")
+    assert "Not applicable: Verlet (needs forces that do not depend on the velocity; here: damping)." in said
 
 
 def test_a_scene_that_only_refuses_can_still_be_drawn_and_written(tmp_path):

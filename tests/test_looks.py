@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.base.pictures import new_figure
-from stepwell.views.charts import labels, style
+from stepwell.views.charts import cheapest_picture, labels, style
 from stepwell.views.charts.figures_picture import finding as figures_finding
 from stepwell.views.charts.figures_picture import groups
+from stepwell.views.charts.panel import Panel
 from stepwell.views.charts.panel_picture import leader
 from stepwell.views.charts.picture import finding
+from stepwell.views.charts.runs_finding import finding as finding_of_run
 from support import stiff
+from support.looks import faults
 
 #: Linear RGB as it is seen without green cones (Machado, Oliveira and Fernandes, 2009, severity 1).
 DEUTERANOPE = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
@@ -266,3 +269,145 @@ def test_names_at_the_ends_of_curves_do_not_cover_each_other():
     assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes.values(), 2))
     frame = axes.get_window_extent()
     assert all(frame.x1 <= box.x0 and frame.y0 <= box.y0 and box.y1 <= frame.y1 for box in boxes.values())
+
+
+# ---- the rules of every automatic picture
+
+
+def seen(scene, method, **options):
+    found = sw.scenes.scene(scene)
+    return sw.charts.run_picture(found, found.run(method, **({"every": 1} | options))).plot()
+
+
+def few_charts():
+    options = {"methods": ["leapfrog", "rk4", "dop853"], "steps": [40, 200, 1000, 5000], "tolerances": [1e-6, 1e-10]}
+    charts = [sw.charts.work_precision(name, **options) for name in ("oscillator", "clover", "forced_oscillator")]
+    return Panel((*charts, *charts))
+
+
+#: A picture of each kind, by a name.
+PICTURES = {
+    "run of bodies": lambda: seen("kepler", "rk4"),
+    "run of one that turns": lambda: seen("clover", "false_euler"),
+    "run in space": lambda: seen("plummer", "leapfrog", steps=30),
+    "run of rods": lambda: seen("double_pendulum", "rk4", steps=300),
+    "run that hangs": lambda: seen("conical_pendulum", "rk4"),
+    "run of a net": lambda: seen("rope_bridge", "leapfrog", every=20),
+    "run of a top": lambda: seen("heavy_top", "rk4"),
+    "run of an aircraft": lambda: seen("aircraft", "false_euler"),
+    "run of an oscillator": lambda: seen("oscillator", "false_euler"),
+    "run of a chain": lambda: seen("chain", "rk4", steps=200),
+    "run under control": lambda: seen("clover", "standard_euler", control=sw.EnergyControl(1.0)),
+    "chart": lambda: few_charts().charts[2].plot(),
+    "panel": lambda: few_charts().plot(),
+    "control": lambda: sw.charts.control("kepler", evaluations=600, relative=[1e-3, 1e-2, 0.1, 1.0, 10.0]).plot(),
+    "figures": lambda: sw.charts.figures().plot(),
+    "figure of one that looks exact": lambda: sw.charts.figures(["rk4"]).plot(method="rk4"),
+    "loci": lambda: sw.charts.stability(COUNTED, phi=np.linspace(0.05, 3.0, 60)).plot(),
+    "curves": lambda: sw.charts.stability(COUNTED, phi=np.linspace(0.05, 7.0, 200)).plot(kind="curves"),
+    "curves of two": lambda: sw.charts.stability(["rk4", "verlet"], phi=np.linspace(0.05, 3.0, 60)).plot(kind="curves"),
+}
+
+
+@pytest.mark.parametrize("picture", PICTURES)
+def test_a_picture_is_read_where_pages_show_it(picture):
+    """Its letters have 9 pixels at the width of a page and contrast, none is on another, no panel is empty, nothing is Python."""
+    assert faults(PICTURES[picture]()) == []
+
+
+def broken(break_it):
+    """A picture that is right but for one thing."""
+    figure = new_figure(8.0, 4.5)
+    axes = figure.add_axes((0.1, 0.1, 0.85, 0.75))
+    axes.plot(np.linspace(0.0, 1.0, 50), np.linspace(0.0, 1.0, 50) ** 2, label="curve")
+    axes.grid()
+    assert faults(figure) == []
+    break_it(figure, axes)
+    return faults(figure)
+
+
+@pytest.mark.mutant
+@pytest.mark.parametrize(
+    ("break_it", "said"),
+    [
+        (lambda figure, axes: axes.text(0.1, 0.8, "small", size=6), "'small' has 7.7 pixels"),
+        (lambda figure, axes: axes.text(0.1, 0.8, "pale", color="#efb02e"), "'pale' is too pale"),
+        (lambda figure, axes: axes.text(0.9, 0.8, "a text that is too long"), "leaves the picture"),
+        (lambda figure, axes: (axes.text(0.1, 0.8, "one"), axes.text(0.1, 0.81, "two")), "'two' is on 'one'"),
+        (lambda figure, axes: figure.text(0.1, 0.9, "Rods([1.0, 1.0], gravity=1.0)"), "is Python"),
+        (lambda figure, axes: figure.text(0.1, 0.9, "gravity=array(3,)"), "is Python"),
+        (lambda figure, axes: figure.add_axes((0.4, 0.2, 0.2, 0.2)), "is empty"),
+        (
+            lambda figure, axes: (axes.grid(False), axes.set_position((0.1, 0.1, 0.2, 0.2)), axes.locator_params(nbins=2)),
+            "are blank",
+        ),
+        (
+            lambda figure, axes: ([axes.plot([0, 1], [0, i], label=i) for i in range(9)], axes.legend(ncols=9, labelspacing=0.1)),
+            "10 names",
+        ),
+    ],
+)
+def test_a_picture_that_breaks_a_rule_is_noticed(break_it, said):
+    assert any(said in fault for fault in broken(break_it)), broken(break_it)
+
+
+def test_text_of_a_pale_colour_is_darkened_and_others_stay():
+    for name, colour in style.FAMILIES.items():
+        rgb = tuple(int(style.ink(colour)[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+        assert style.contrast(rgb) >= style.CONTRAST, name
+    assert style.ink(style.FAMILIES["Runge-Kutta"]) == style.FAMILIES["Runge-Kutta"]
+    assert style.ink(style.FAMILIES["Euler"]) != style.FAMILIES["Euler"]
+    assert style.contrast((0.0, 0.0, 0.0)) == pytest.approx(21.0)  # of black and white, by definition
+
+
+def test_the_table_of_the_cheapest_is_the_front():
+    panel = few_charts()
+    figure = panel.plot()
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    for chart in panel.charts[:3]:
+        for cell in cheapest_picture.cells(chart, "state_error"):
+            best = chart.best(10.0**-cell.digits)
+            assert (cell.name, cell.cost) == (best["method"], best["cost"])
+            assert cheapest_picture.number(cell.cost) in texts
+    assert [cheapest_picture.number(cost) for cost in (2.104, 36.9, 1229.6, 12_345.0, 2.5e6)] == [
+        "2.1",
+        "37",
+        "1230",
+        "12k",
+        "2.5M",
+    ]
+
+
+def late(picture):
+    """The share of a period by which the title says that a run is late; below zero of one that is early."""
+    said = finding_of_run(picture)
+    assert said.startswith("on the exact orbit, but ")
+    share, word = said.removeprefix("on the exact orbit, but ").split(" % of a period ")
+    return float(share) / 100.0 * {"late": 1.0, "early": -1.0}[word]
+
+
+def test_a_run_that_stays_on_the_orbit_says_by_how_much_it_is_early():
+    """Kepler's ellipse: the phase of the last state by its own position, from the mean anomaly E − e·sin E."""
+    scene = sw.scenes.kepler()
+    run = scene.run("rk4", every=1)
+    e, r, far = 0.9, run.y[-1, 1] - run.y[-1, 0], scene.y[1] - scene.y[0]
+    cosine, sine = r @ far / (far @ far), (far[0] * r[1] - far[1] * r[0]) / (far @ far)
+    anomaly = np.arctan2(sine * (1 - e) / np.sqrt(1 - e * e), cosine * (1 - e) + e)
+    turns = (anomaly - e * np.sin(anomaly)) / (2 * np.pi)  # since the perihelion, in the direction of the motion
+    assert far[0] * (scene.v[1] - scene.v[0])[1] > 0.0
+    ahead = turns - (run.t[-1] / scene.period - round(run.t[-1] / scene.period))
+    assert late(sw.charts.run_picture(scene, run)) == pytest.approx(-ahead, rel=0.05)
+
+
+def test_a_run_that_stays_on_the_orbit_says_by_how_much_it_is_late():
+    """Leapfrog is late by ω³h²/24 a unit of time on a circle: of 2π·N turns with ω = 1 by the share h²/24 of a period each."""
+    circle = sw.scenes.kepler(0.0)
+    run = circle.run("leapfrog", 0.15, every=1)
+    whole = sw.charts.run_picture(circle, run)
+    near = np.linspace(-0.05, 0.05, 2001) * circle.period
+    v, y = circle.exact(run.t[-1] - near)
+    del v
+    behind = near[np.argmin(((y - run.y[-1]) ** 2).sum(axis=(1, 2)))] / circle.period
+    assert abs(behind) > 2e-3
+    assert late(whole) == pytest.approx(behind, abs=3e-4)
+    assert finding_of_run(sw.charts.run_picture(circle, circle.run("leapfrog", 0.02, every=1))).startswith("the exact motion to ")

@@ -99,7 +99,7 @@ def test_an_energy_that_forces_change_is_no_error(system: sw.System) -> None:
     assert picture.energy_error is None
     assert picture.columns()["energy"].tolist() == run.energy.tolist()
     assert finding(picture) == f"y from {run.y.min():.3g} to {run.y.max():.3g}".replace(" -", " −")
-    energy = picture.plot().axes[-2]
+    energy = picture.plot().axes[-1]
     assert energy.get_title(loc="left").startswith("energy over time")
     assert np.array_equal(energy.lines[0].get_ydata(), run.energy)
 
@@ -269,7 +269,7 @@ def test_what_keeps_a_length_is_not_judged_by_the_energy() -> None:
 
 def test_control_and_none_stand_side_by_side(both: RunPicture) -> None:
     figure = both.plot()
-    left, right, *_, energy, _ = figure.axes
+    left, right, *_, energy = figure.axes
     assert [axes.get_title(loc="left") for axes in (left, right)] == ["without control", "with control"]
     assert left.get_xlim() == right.get_xlim()
     assert left.get_ylim() == right.get_ylim()

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
-from stepwell.views.charts import style, zplane_picture
+from stepwell.views.charts import curves_picture, figures_picture, style, zplane_picture
 from stepwell.views.charts.zplane import ladder, largest
+from support.looks import faults
 from support.truths import CLOSED_FORMS
 
 METHODS = sw.methods()
@@ -95,7 +96,7 @@ def check_page(figure, path):
     figure.draw_without_rendering()
     image = imread(path)
     height, width = image.shape[:2]
-    assert [width, height] == [round(100 * inches) for inches in figure.get_size_inches()]
+    assert [width, height] == [round(figure.dpi * inches) for inches in figure.get_size_inches()]
     assert 0.01 < np.mean(image[..., :3].max(axis=2) < 0.6) < 0.5
     texts = [t for t in (*figure.texts, *(t for a in figure.axes if a.get_visible() for t in shown(a))) if t.get_text()]
     boxes = [text.get_window_extent() for text in texts]
@@ -259,7 +260,6 @@ def panels(figure, chart):
     ("methods", "kind"),
     [
         (None, "loci"),
-        pytest.param(None, "curves", marks=pytest.mark.long),  # three seconds
         *itertools.product([["false_heun"], ["verlet", "rk4", "standard_euler"]], ["loci", "curves"]),
     ],
     ids=str,
@@ -332,7 +332,32 @@ def test_branches_do_not_jump(chart):
             assert np.abs(np.diff(line)).max() < 4 * math.sqrt(locus.phi[1] - locus.phi[0])
 
 
-def test_the_curves_are_exact_and_series_with_the_limit(chart):
+def test_the_curves_of_many_methods_share_two_panels(chart, tmp_path):
+    """Of eight that are not the same; each ends at its limit, with a dot, and what keeps the energy is named below."""
+    figure = chart.plot(tmp_path / "curves.png", kind="curves")
+    assert faults(figure) == []
+    chosen = curves_picture.choose(zplane_picture.groups(chart))
+    assert len(chosen) == curves_picture.MOST
+    energy, turns = figure.axes
+    drawn = {locus[0].method.name: locus[0] for locus in chosen}
+    for name, locus in drawn.items():
+        below = (locus.eigenvalues[0].imag != 0.0) & (locus.phi <= (locus.limit or np.inf))
+        assert has_line(turns, locus.phi, np.where(below & (locus.ratio != 1.0), np.abs(locus.ratio - 1.0), np.nan)), name
+        dots = [line.get_xdata()[0] for line in lines_of(turns) if len(line.get_xdata()) == 1]
+        assert (float(locus.limit) in dots) is (0.0 < locus.limit <= locus.phi[-1])
+    names = {text.get_text() for text in turns.texts}
+    assert names == {locus.method.title for locus in drawn.values()}
+    kept = {locus.method.title for locus in drawn.values()} - {text.get_text() for text in energy.texts}
+    assert kept == {"False Euler", "PEFRL", "Implicit Midpoint"}
+    assert all(name in figure.texts[-1].get_text() for name in kept)
+
+
+def lines_of(axes):
+    return [line for line in axes.lines if line.get_marker() == "o"]
+
+
+def test_the_curves_of_few_methods_are_exact_and_series_with_the_limit():
+    chart = sw.charts.stability(["standard_euler", "verlet", "false_heun", "rk4"])
     figure = chart.plot(kind="curves")
     for row, (locus, *_) in enumerate(zplane_picture.groups(chart)):
         radius, ratio = figure.axes[2 * row : 2 * row + 2]
@@ -460,7 +485,7 @@ def test_a_picture_for_each_method_and_one_of_all(figures, tmp_path):
         figure = figures.plot(method=samples.method.name)
         check_page(figure, path)
         texts = [text.get_text() for text in figure.texts]
-        assert f"{samples.method.title} ({samples.method.section}): y(t)" in texts
+        assert f"{style.named(samples.method)}: {figures_picture.in_words(samples)}" in texts
         sentence = next(text for text in texts if text.startswith("r₁² − 1 = "))
         change, turn = samples.r1_squared - 1, 100 * (samples.ratio - 1)
         change = "0" if abs(change) < 1e-13 else f"{change:+.3g}"
@@ -471,7 +496,12 @@ def test_a_picture_for_each_method_and_one_of_all(figures, tmp_path):
 
 def test_both_curves_are_in_a_figure_and_what_grows_is_told(figures):
     for samples in figures.samples:
-        axes = figures.plot(method=samples.method).axes[0]
+        figure = figures.plot(method=samples.method)
+        axes = figure.axes[0]
+        if np.abs(samples.y - np.cos(samples.t)).max() <= figures_picture.SEEN:  # what looks exact has the difference below
+            assert np.array_equal(figure.axes[1].lines[1].get_ydata(), samples.y - np.cos(samples.t))
+        else:
+            assert len(figure.axes) == 1
         dots = [line for line in axes.lines if line.get_marker() == "o"]
         assert len(dots) == 1
         assert np.array_equal(dots[0].get_xydata(), np.stack([samples.t / (2 * math.pi), samples.y], axis=1))

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of that size in inches, which leaves pyplot's global state as it is.
+def new_figure(width: float, height: float, dpi: float = 100.0) -> Figure:
+    """An empty figure of that size in inches and so many dots an inch, which leaves pyplot's global state as it is.
 
     Raises:
         UnsupportedError: if matplotlib is missing.
@@ -27,7 +27,7 @@ def new_figure(width: float, height: float) -> Figure:
         from matplotlib.figure import Figure
     except ImportError:
         raise UnsupportedError("plot: a picture needs matplotlib; pip install 'stepwell[chart]'") from None
-    figure = Figure(figsize=(width, height), dpi=100)
+    figure = Figure(figsize=(width, height), dpi=dpi)
     FigureCanvasAgg(figure)
     # A notebook knows how to show matplotlib's figures only after pyplot was imported.
     vars(figure)["_repr_png_"] = partial(png, figure)

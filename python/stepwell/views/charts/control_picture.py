@@ -12,7 +12,7 @@ from ...model.methods import Method
 from .control import ControlSweep
 from .control_runs import Held
 from .labels import at_ends, title
-from .style import GREY, Axes, Figure, apart, page
+from .style import DPI, GREY, Axes, Figure, apart, ink, page
 
 #: Lines of the two forms.
 FORMS: dict[str, dict[str, Any]] = {
@@ -20,18 +20,17 @@ FORMS: dict[str, dict[str, Any]] = {
     "printed": {"linestyle": (0, (1, 1.2)), "linewidth": 1.4, "fillstyle": "none", "markersize": 6.0},
 }
 
-#: Marks of the runs without a gain, and their names.
-MARKS: dict[str, tuple[str, str]] = {
-    "none": ("o", "without control"),
-    "scaling": ("s", "velocities scaled"),
-    "nacozy": ("D", "Nacozy's projection"),
-}
+#: Control that lowers an error by less than this factor does not help.
+HELPS = 1.5
 
 #: Height of the strip of diverged runs, as a fraction of that of the panel below it.
 STRIP = 0.1
 
 #: The distance of names at the ends of the curves, as a fraction of the panel's height.
-ROOM = 0.065
+ROOM = 0.12
+
+#: The width of the picture in inches.
+WIDTH = 12.5
 
 #: The smallest error on the logarithmic axis, on which 0 has no place; and the error below which it is rounding, drawn at the
 #: edge.
@@ -40,47 +39,67 @@ LEAST_DRAWN, ROUNDING = 1e-17, 1e-12
 
 def draw(chart: ControlSweep) -> Figure:
     """Draw the chart on a new figure."""
-    with page(16.0, 10.0) as figure:
+    rows = 0.42 * len(_methods(chart))
+    height = 5.7 + rows
+    with page(WIDTH, height, dpi=DPI) as figure:
         kinds = ("energy_error", "state_error" if chart.exact else "largest")
         names = ("largest |E − E₀| / K₀", "error of the last state, relative" if chart.exact else "largest coordinate")
         for i, (what, name) in enumerate(zip(kinds, names, strict=True)):
-            _over_gains(figure.add_axes((0.065 + 0.49 * i, 0.135, 0.325, 0.31)), chart, what, name)
+            _over_gains(figure.add_axes((0.095 + 0.5 * i, 1.5 / height, 0.275, 2.0 / height)), chart, what, name)
         for i, (what, name) in enumerate(zip(kinds, names, strict=True)):
-            _before_and_after(figure.add_axes((0.122 + 0.466 * i, 0.6, 0.392, 0.25)), chart, what, name, named=i == 0)
-        title(figure, 0.012, 0.95, f"{chart.title}: {finding(chart)}", 20)
+            place = (0.155 + 0.43 * i, 4.3 / height, 0.385, (rows + 0.25) / height)
+            _before_and_after(figure.add_axes(place), chart, what, name, named=i == 0)
+        title(figure, 0.012, 1.0 - 0.42 / height, f"{chart.title}: {finding(chart)}", 20)
         evaluations = ", ".join(map(str, chart.evaluations))
-        what = f"{chart.system!r}, {chart.horizon:.6g} units of time, {evaluations} function evaluations per run"
-        figure.text(0.012, 0.915, textwrap.shorten(what, 150), size=13.5, color=GREY)
+        what = f"{chart.horizon:.6g} units of time, {evaluations} function evaluations per run"
+        figure.text(0.012, 1.0 - 0.74 / height, textwrap.shorten(what, 120), size=13, color=GREY)
+        few = "" if len(_swept(chart)) == len(_methods(chart)) else ", of the methods that it helps most and least"
         note = (
-            "Above: hollow without control; full the median of all gains in the limited form, its line from the least to the "
-            "largest;\nsquare: velocities scaled after every step; diamond: Nacozy's projection; left edge: rounding alone. "
-            "Below: solid limited form, dotted printed form; in the strip: diverged. K: kinetic energy."
+            "Above: hollow without control, full the median of all gains of the limited form. At the left edge: rounding alone.\n"
+            f"Below: each gain{few}; solid the limited form, dotted the printed one; in the strip: diverged.\n"
+            "E: energy, K: kinetic energy; C: the gain, h: the step."
         )
-        figure.text(0.012, 0.018, note, size=12, color=GREY, linespacing=1.35)
+        figure.text(0.012, 0.12 / height, note, size=11.3, color=GREY, linespacing=1.3)
     return figure
 
 
 def finding(chart: ControlSweep) -> str:
-    """The number of methods whose energy error the control lowers at the median gain, and the factor, as a title."""
-    factors = []
-    for line in chart.lines:
-        if line.kind != "limited":
-            continue
-        count = chart.evaluations[
-            [same for same in chart.lines if (same.method, same.kind) == (line.method, "limited")].index(line)
-        ]
+    """The methods whose energy error the control lowers at the median gain, with the factor, and those that it does not help."""
+    helped = {method: factor for method, factor in factors(chart).items() if factor >= HELPS}
+    others = [method.title for method in factors(chart) if method not in helped]
+    if not helped and not others:
+        return "energy and state under control"
+    if not helped:
+        return f"energy control does not help {others[0] if len(others) == 1 else f'any of {len(others)} methods'}"
+    most = sorted(helped, key=lambda method: -helped[method])
+    words = [f"{method.title} (÷{helped[method]:.2g})" for method in most]
+    if len(words) > 2:
+        words = [f"{len(words)} of {len(words) + len(others)} methods, most {words[0]}"]
+    return f"energy control helps {' and '.join(words)}{f', not {others[0]}' if len(others) == 1 else ''}"
+
+
+def factors(chart: ControlSweep) -> dict[Method, float]:
+    """By what factor the control lowers the energy error of each method: medians of its gains, and of its steps."""
+    found: dict[Method, list[float]] = {}
+    for line in (each for each in chart.lines if each.kind == "limited"):
+        alike = [same for same in chart.lines if (same.method, same.kind) == (line.method, "limited")]
         try:
-            before = float(chart.line(line.method, "none", count).energy_error[0])
+            before = float(chart.line(line.method, "none", chart.evaluations[alike.index(line)]).energy_error[0])
         except UnknownNameError:
             continue
         errors = line.energy_error[np.isfinite(line.energy_error)]
         after = float(np.median(errors)) if errors.size else np.inf
-        factors.append(before / max(after, LEAST_DRAWN))
-    if not factors:
-        return "energy and state under control"
-    better = sum(1 for factor in factors if factor > 1.0)
-    better_in = f"control lowers the energy error of {better} of {len(factors)} runs"
-    return f"{better_in}, by a factor of {float(np.median(factors)):.2g}" if better == len(factors) else better_in
+        found.setdefault(line.method, []).append(before / max(after, LEAST_DRAWN))
+    return {method: float(np.median(each)) for method, each in found.items()}
+
+
+def _swept(chart: ControlSweep) -> list[Method]:
+    """The two methods whose errors are drawn over the gain: those that control helps most and least."""
+    known = factors(chart)
+    chosen = (
+        [max(known, key=lambda method: known[method]), min(known, key=lambda method: known[method])] if len(known) > 1 else []
+    )
+    return [method for method in _methods(chart) if method in chosen or not chosen]
 
 
 def _look(chart: ControlSweep, method: Method) -> dict[str, Any]:
@@ -94,42 +113,38 @@ def _methods(chart: ControlSweep) -> list[Method]:
 
 
 def _before_and_after(axes: Axes, chart: ControlSweep, what: str, name: str, *, named: bool) -> None:
-    """A row for each method: an error without control and with it."""
+    """A row for each method: an error without control, and with it."""
     methods = _methods(chart)
-    values = np.concatenate([getattr(line, what) for line in chart.lines] or [np.ones(1)])
+    values = np.concatenate([getattr(line, what) for line in chart.lines if line.kind in ("none", "limited")] or [np.ones(1)])
     values = values[np.isfinite(values) & (values > ROUNDING)]
     low, high = (0.3 * values.min(), 3.0 * values.max()) if values.size else (LEAST_DRAWN, 1.0)
-    axes.set(xscale="log", xlim=(low, high), ylim=(len(methods) - 0.4, -0.6))
+    axes.set(xscale="log", xlim=(low, high), ylim=(len(methods) - 0.5, -0.95))
+    told = False
     for row, method in enumerate(methods):
         colour = _look(chart, method)["color"]
-        kinds: dict[str, list[Held]] = {}
-        for line in chart.lines:
-            if line.method == method:
-                kinds.setdefault(line.kind, []).append(line)
-        limited = np.concatenate([getattr(line, what) for line in kinds.get("limited", [])] or [np.empty(0)])
+        of = [line for line in chart.lines if line.method == method]
+        limited = np.concatenate([getattr(line, what) for line in of if line.kind == "limited"] or [np.empty(0)])
         limited = np.maximum(limited[np.isfinite(limited)], low)
-        before = [float(getattr(line, what)[0]) for line in kinds.get("none", [])]
-        if limited.size:
-            axes.plot([limited.min(), limited.max()], [row, row], color=colour, linewidth=2.0, zorder=2)
-            after = float(np.median(limited))
-            axes.plot([after], [row], color=colour, marker="o", markersize=12, zorder=4)
-            for each in before:
-                if np.isfinite(each):
-                    way: dict[str, Any] = {"arrowstyle": "-|>", "color": "#888888", "shrinkA": 7, "shrinkB": 7}
-                    axes.annotate("", (after, row - 0.28), (max(each, low), row - 0.28), arrowprops=way)
-        for kind, (mark, _) in MARKS.items():
-            for line in kinds.get(kind, []):
-                value = float(getattr(line, what)[0])
-                if np.isfinite(value):
-                    size = 12 if kind == "none" else 8
-                    style: dict[str, Any] = {"markerfacecolor": "white", "markeredgewidth": 2.2, "clip_on": False}
-                    axes.plot([max(value, low)], [row], color=colour, marker=mark, markersize=size, zorder=3, **style)
+        before = [max(float(getattr(line, what)[0]), low) for line in of if line.kind == "none"]
+        before = [each for each in before if np.isfinite(each)]
+        after = [float(np.median(limited))] if limited.size else []
+        for each in before:
+            axes.plot([each, *after], [row] * (1 + len(after)), color=colour, linewidth=2.5, zorder=2)
+            look: dict[str, Any] = {"markerfacecolor": "white", "markeredgewidth": 2.2, "clip_on": False}
+            axes.plot([each], [row], color=colour, marker="o", markersize=11, zorder=3, **look)
+        axes.plot(after, [row] * len(after), color=colour, marker="o", markersize=11, zorder=4, linestyle="", clip_on=False)
+        if before and after and not told:
+            told = True
+            sides = ("left", "right") if before[0] > after[0] else ("right", "left")
+            for at, word, side in ((after[0], "with control", sides[1]), (before[0], "without", sides[0])):
+                axes.annotate(word, (at, row), (7 if side == "left" else -7, 9), textcoords="offset points", size=11.5, ha=side)
     axes.set_yticks(range(len(methods)), [method.title for method in methods] if named else [""] * len(methods))
     for tick, method in zip(axes.get_yticklabels(), methods, strict=True):
-        tick.set_color(_look(chart, method)["color"])
+        tick.set_color(ink(_look(chart, method)["color"]))
         tick.set_fontweight("bold")
+        tick.set_fontsize(13.0)
     axes.tick_params(axis="y", length=0, pad=9)
-    axes.set_title(f"{name}: before and after", loc="left", size=14)
+    axes.set_title(f"{name}: before and after", loc="left", size=13)
     axes.grid(which="major", axis="x", color="#dddddd", linewidth=0.8)
     axes.minorticks_off()
 
@@ -141,16 +156,17 @@ def _over_gains(axes: Axes, chart: ControlSweep, what: str, name: str) -> None:
     gains = np.unique(np.concatenate([line.relative[np.isfinite(line.relative)] for line in chart.lines] or [np.ones(1)]))
     low, high = (gains[0], gains[-1]) if gains.size else (1e-1, 1e1)
     wide = max(float(np.log10(high / low)), 1.0)
-    axes.set(xscale="log", yscale="log", xlabel="gain h·C·K at the start", ylabel=name)
+    axes.set(xscale="log", yscale="log", xlabel="gain h·C·K at the start")
+    axes.set_ylabel(name, size=12.0)
     axes.set_xlim(low / 10 ** (0.02 * wide), high * 10 ** (0.02 * wide))
     axes.axvline(1.0, color=GREY, linewidth=0.9)
     axes.grid(which="major", color="#dddddd", linewidth=0.8)
     below: dict[str, Any] = {"transform": axes.transAxes, "facecolor": "#eeeeee", "clip_on": False, "zorder": 0}
     axes.add_patch(Rectangle((0.0, 1.0), 1.0, STRIP, **below))
     axes.text(1.012, 1.0 + 0.5 * STRIP, "diverged", transform=axes.transAxes, size=12, color=GREY, va="center")
-    methods = _methods(chart)
+    methods = _swept(chart)
     ends = []
-    for line in (each for each in chart.lines if each.kind in FORMS):
+    for line in (each for each in chart.lines if each.kind in FORMS and each.method in methods):
         values = np.maximum(getattr(line, what), LEAST_DRAWN)
         shown = np.where(np.isfinite(values), values, np.nan)
         look = _look(chart, line.method) | FORMS[line.kind]

@@ -11,6 +11,7 @@ from ...base.arrays import Array
 from ...model.methods import stable_for
 from .figures import HARMONIC_PERIODS, Figures, HarmonicCase, Samples
 from .labels import at_ends, title
+from .runs_finding import percent
 from .style import FAMILIES, GREY, Axes, Figure, family, look, named, page
 
 #: Samples are shown up to here; what grows more leaves the picture.
@@ -23,10 +24,13 @@ COLUMNS = 2
 SEEN = 0.05
 
 #: The panel of errors is so much wider than the lines, for their names, which are so far apart, as a share of its height.
-NAMES, ROOM = 1.45, 0.095
+NAMES, ROOM = 1.6, 0.105
 
 #: Of methods that differ by less in r₁² and in Ψ/Φ the eigenvalues are the same but for rounding.
 ALIKE = 1e-9
+
+#: A frequency that is wrong by less is right.
+ON_TIME = 1e-9
 
 MARKS = (
     "Grey: exact, cos ω₀t. Dots: samples, joined by straight lines.",
@@ -40,10 +44,10 @@ def overview(chart: Figures) -> Figure:
     count = len(apart) + bool(exact)
     across = min(COLUMNS, count)
     down = -(-count // across)
-    width, height = 17.0, 2.9 * down + 2.3
+    width, height = 12.5, 2.3 * down + 2.3
     with page(width, height) as figure:
-        places = {"left": 0.055, "right": 0.988, "bottom": 1.15 / height, "top": 1.0 - 1.5 / height, "wspace": 0.1}
-        panels = figure.subplots(down, across, squeeze=False, gridspec_kw=places | {"hspace": 0.42})
+        places = {"left": 0.06, "right": 0.985, "bottom": 1.15 / height, "top": 1.0 - 1.55 / height, "wspace": 0.13}
+        panels = figure.subplots(down, across, squeeze=False, gridspec_kw=places | {"hspace": 0.62})
         for i, axes in enumerate(panels.ravel()):
             if i >= count:
                 axes.set_visible(False)
@@ -54,9 +58,9 @@ def overview(chart: Figures) -> Figure:
                 _errors(axes, exact)
             if i + across >= count:
                 axes.set_xlabel("time in periods of the exact solution")
-        title(figure, 0.008, 1.0 - 0.45 / height, finding(chart), 20)
-        figure.text(0.008, 1.0 - 0.82 / height, _start(chart), size=13.5, color=GREY)
-        figure.text(0.008, 0.14 / height, "   ".join(MARKS), size=12, color=GREY)
+        title(figure, 0.008, 1.0 - 0.42 / height, finding(chart), 20)
+        figure.text(0.008, 1.0 - 0.74 / height, _start(chart), size=13, color=GREY)
+        figure.text(0.008, 0.14 / height, MARKS[0], size=12, color=GREY)
     return figure
 
 
@@ -91,7 +95,7 @@ def finding(chart: Figures) -> str:
         (len(exact), "", "look exact"),
     ]
     parts = [f"{count} {one if count == 1 else several}" for count, one, several in kinds if count]
-    return f"Of {len(chart.samples)} methods {', '.join(parts)}" if len(chart.samples) > 1 else _words(chart.samples[0], digits=2)
+    return f"Of {len(chart.samples)} methods {', '.join(parts)}" if len(chart.samples) > 1 else in_words(chart.samples[0])
 
 
 def _distance(samples: Samples) -> Array:
@@ -101,18 +105,20 @@ def _distance(samples: Samples) -> Array:
 
 
 def _together(axes: Axes, chart: Figures, same: list[Samples]) -> None:
-    """The samples of methods with the same eigenvalues; several have their names in the panel."""
+    """The samples of methods with the same eigenvalues."""
     for samples in same:
         _samples(axes, chart, samples, FAMILIES[family(samples.method)], name=len(same) > 1)
-    first = same[0]
     if len(same) > 1:
         _largest(axes, np.concatenate([samples.y for samples in same]))
-        axes.legend(loc="lower left", ncols=len(same), frameon=False, fontsize=11.5, borderpad=0.1, columnspacing=1.2)
-        axes.set_title(f"{len(same)} of the same eigenvalues", loc="left", size=13.5, weight="bold")
-    else:
-        axes.set_title(named(first.method), loc="left", size=13.5, weight="bold")
-    axes.set_title(_words(first, digits=2).split(" (")[0], loc="right", size=11)  # the rest has no room
+    names = named(same[0].method) if len(same) == 1 else ", ".join(samples.method.title for samples in same)
+    _head(axes, names, in_words(same[0]))
     axes.set_ylabel("y")
+
+
+def _head(axes: Axes, name: str, words: str) -> None:
+    """The title of a panel, and below it what it shows."""
+    axes.set_title(name, loc="left", size=13, weight="bold", pad=23.0)
+    axes.text(0.0, 1.03, words, transform=axes.transAxes, size=12, color=GREY)
 
 
 def _errors(axes: Axes, exact: list[Samples]) -> None:
@@ -128,24 +134,44 @@ def _errors(axes: Axes, exact: list[Samples]) -> None:
             ends.append((end, float(error[-1]), samples.method.title, colour))
     axes.set(yscale="log", xlim=(0.0, NAMES * end))
     axes.minorticks_off()
-    at_ends(axes, ends, 12.0, ROOM)
-    axes.set_title(f"{len(exact)} methods that look exact: largest |y − cos ω₀t| so far", loc="left", size=13.5, weight="bold")
+    axes.locator_params(axis="y", numticks=6)
+    at_ends(axes, ends, 11.0, ROOM)
+    _head(axes, f"{len(exact)} methods that look exact", "the largest |y − cos ω₀t| so far")
     axes.grid(which="major", color="#dddddd", linewidth=0.8)
 
 
 def one(chart: Figures, samples: Samples) -> Figure:
     """One method on a figure of its own."""
+    looks_exact = bool(_distance(samples).max() <= SEEN)
     with page(11.0, 5.6) as figure:
-        axes = figure.add_axes((0.075, 0.245, 0.91, 0.535))
-        _samples(axes, chart, samples, FAMILIES[family(samples.method)])
-        axes.set(xlabel="time in periods of the exact solution", ylabel="y")
+        low = 0.5 if looks_exact else 0.245
+        axes = figure.add_axes((0.1, low, 0.885, 0.78 - low))
+        colour = FAMILIES[family(samples.method)]
+        _samples(axes, chart, samples, colour)
+        axes.set(ylabel="y")
+        below = _difference(figure, axes, samples, colour) if looks_exact else axes
+        below.set(xlabel="time in periods of the exact solution")
         method = samples.method
-        figure.text(0.012, 0.925, f"{method.title} ({method.section}): y(t)", size=18, weight="bold")
+        title(figure, 0.012, 0.925, f"{named(method)}: {in_words(samples)}", 18)
         figure.text(0.012, 0.865, _start(chart, samples), size=12.5, color=GREY)
         limit = f"Stable for {stable_for(samples.limit)}." if samples.limit else "Never stable."
         figure.text(0.012, 0.805, f"{_words(samples)}. {limit}", size=12.5)
         figure.text(0.012, 0.03, "\n".join(MARKS), size=12, color=GREY, linespacing=1.35)
     return figure
+
+
+def _difference(figure: Figure, above: Axes, samples: Samples, colour: str) -> Axes:
+    """A panel of y − cos ω₀t, where the samples cannot be told from the exact solution."""
+    axes = figure.add_axes((0.1, 0.245, 0.885, 0.2), sharex=above)
+    above.tick_params(labelbottom=False)
+    axes.axhline(0.0, color="#cccccc", linewidth=0.8)
+    turns = samples.t / (2.0 * math.pi)
+    axes.plot(turns, samples.y - np.cos(samples.t), color=colour, linewidth=1.3, marker=".", markersize=4.0)
+    axes.set_ylabel("difference", size=12.0)
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 2), useMathText=True)
+    axes.locator_params(axis="y", nbins=3)
+    axes.grid(which="major", axis="x", color="#dddddd", linewidth=0.8)
+    return axes
 
 
 def harmonic(cases: tuple[HarmonicCase, ...]) -> Figure:
@@ -196,6 +222,19 @@ def _largest(axes: Axes, y: Array) -> None:
         box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none"}
         largest = f"|y| up to {np.nanmax(np.abs(y)):.3g}"
         axes.text(0.985, 0.07, largest, transform=axes.transAxes, size=11.5, ha="right", bbox=box, zorder=5)
+
+
+def in_words(samples: Samples) -> str:
+    """What a method makes of energy and frequency."""
+    if not math.isfinite(samples.ratio) or "double eigenvalue" in samples.kind:
+        return samples.kind
+    change, turn = samples.r1_squared - 1.0, samples.ratio - 1.0
+    energy = (
+        "keeps the energy"
+        if abs(change) < ALIKE
+        else f"{'gains' if change > 0.0 else 'loses'} {percent(abs(change))} energy a step"
+    )
+    return f"{energy}, {'on time' if abs(turn) < ON_TIME else percent(abs(turn)) + (' fast' if turn > 0.0 else ' slow')}"
 
 
 def _words(samples: Samples, digits: int = 3) -> str:

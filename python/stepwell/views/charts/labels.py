@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
-from .style import Axes, Figure
+from .style import Axes, Figure, ink
 
 #: Places that are tried along a curve, points of a curve that a label should not cover, and pixels from a curve to its label.
 ANCHORS, POINTS, GAP = 24, 240, 7.0
+
+#: A name at the end of a curve is so far from it, as a share of the width of the axes, with a line between them.
+LEADER = 0.025
 
 #: Air on each side of a label, in pixels.
 AIR = 1.5
@@ -49,7 +52,7 @@ def beside(axes: Axes, labels: Sequence[Label], keep_off: Sequence[tuple[float, 
     taken += keep_off
     left: list[str] = []
     for label, curve in zip(labels, curves, strict=True):
-        text = axes.text(0.0, 0.0, label.text, transform=None, ha="left", va="bottom", zorder=6, **label.style)
+        text = axes.text(0.0, 0.0, label.text, transform=None, ha="left", va="bottom", zorder=6, **_dark(label.style))
         size = text.get_window_extent(renderer)
         width, height = size.width + 2 * AIR, size.height + 2 * AIR
         best: tuple[float, float, float] | None = None
@@ -104,8 +107,19 @@ def at_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]], size: flo
     for i in reversed(range(len(heights))):
         heights[i] = min(heights[i], top)
         top = heights[i] - room
-    for height, (_, x, name, colour) in zip(heights, placed, strict=True):
-        axes.text(x + 0.012, height, name, transform=axes.transAxes, color=colour, size=size, weight="bold", va="center")
+    for height, (at, x, name, colour) in zip(heights, placed, strict=True):
+        line: dict[str, Any] = {
+            "color": ink(colour),
+            "linewidth": 0.9,
+            "clip_on": False,
+            "transform": axes.transAxes,
+            "zorder": 5,
+            "scalex": False,
+        }
+        axes.plot([x + 0.004, x + LEADER], [at, height], scaley=False, **line)
+        axes.text(
+            x + 1.2 * LEADER, height, name, transform=axes.transAxes, color=ink(colour), size=size, weight="bold", va="center"
+        )
 
 
 def title(figure: Figure, x: float, y: float, text: str, size: float) -> None:
@@ -116,6 +130,11 @@ def title(figure: Figure, x: float, y: float, text: str, size: float) -> None:
     room = figure.bbox.width * (1.0 - x) - 10.0
     if box.width > room:
         drawn.set_fontsize(0.98 * size * room / box.width)  # letters do not shrink quite in proportion
+
+
+def _dark(style: dict[str, Any]) -> dict[str, Any]:
+    """The keywords of a text, in a colour that can be read."""
+    return style | ({"color": ink(style["color"])} if "color" in style else {})
 
 
 def _pixels(axes: Axes, points: Array) -> Array:

@@ -26,7 +26,7 @@ LABEL_DISTANCE = 0.03
 
 def draw(chart: StabilityMap) -> Figure:
     """Draw the map on a new figure."""
-    with page(10.0, 7.0, **{"hatch.color": "#444444", "hatch.linewidth": 0.5}) as figure:
+    with page(10.0, 7.0, options={"hatch.color": "#444444", "hatch.linewidth": 0.5}) as figure:
         from matplotlib import colormaps
         from matplotlib.colors import ListedColormap, TwoSlopeNorm
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...model.systems import NBody
-from .run_panels import Points, on_plane
+from .run_panels import Points, falling, on_plane
 from .runs import LARGEST, RunPicture
 from .style import BOTTOM, EXACT, FAMILIES, GREY, LONG_CURVE, TOP, Axes, Figure
 
@@ -34,26 +34,72 @@ ONE_CURVE = 0.01
 #: The view of the run without control is at most so many times as wide as that of the run with it.
 BEFORE_FACTOR = 2.5
 
+#: How many times a net is drawn.
+NET_TIMES = 4
+
+#: The height of the time above it, as a share of the picture's.
+NET_HEAD = 0.045
+
 
 def draw_orbits(figure: Figure, chart: RunPicture) -> list[str]:
-    """Draw one panel for points in a plane, or two projections to the same scale for points in space. Return notes.
+    """Draw one panel for points in a plane or hanging ones, or two projections to one scale for points in space. Return notes.
 
     With a control, draw the run without it and the run with it instead, seen along z.
     """
     if chart.before is not None:
         return _before_and_after(figure, chart, chart.before)
-    planes = ((0, 1),) if chart.places.shape[2] == 2 else ((0, 1), (0, 2))
-    views = [on_plane(chart, plane) for plane in planes]
+    planes = ((0, 1),) if chart.places.shape[2] == 2 or hanging(chart) else ((0, 1), (0, 2))
+    views = [falling(chart)] if hanging(chart) else [on_plane(chart, plane) for plane in planes]
     size = max(view.half for view in views)
-    side, gap, left = (0.44, 0.0, 0.065) if len(planes) == 1 else (0.29, 0.06, 0.058)
+    side, gap, left = (0.44, 0.0, 0.065) if len(planes) == 1 else (0.28, 0.065, 0.058)
     for i, (plane, view) in enumerate(zip(planes, views, strict=True)):
         axes = figure.add_axes((left + i * (side + gap), BOTTOM, side, TOP - BOTTOM))
         square(axes, view, size, plane)
         _paths(axes, chart, view)
+        if hanging(chart):
+            axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
+            axes.set_title("", loc="left")
         if i == 0:
             _legend(axes, chart, crowded(chart, 2.0 * size), above=len(planes) == 1)
     notes = ["A body leaves the picture."] * any(view.leave(size) for view in views)
+    notes += [f"The motion is {views[0].name}."] * hanging(chart)
     return [*notes, "Broad: where each body went last."] if one_curve(chart) else notes
+
+
+def hanging(chart: RunPicture) -> bool:
+    """Whether points in space hang on something or on each other, so that they are seen from the front and not along an axis."""
+    return bool(chart.places.shape[2] == 3 and (len(chart.links) or chart.fixed_points))
+
+
+def is_net(chart: RunPicture) -> bool:
+    """Whether the points are the knots of a net, which are drawn without their paths."""
+    return bool(chart.links.size and chart.places.shape[1] > len(BODIES))
+
+
+def draw_net(figure: Figure, chart: RunPicture, right: float) -> list[str]:
+    """Draw a net at several times, one above the other or two side by side. Return notes."""
+    from matplotlib.collections import LineCollection
+
+    view = falling(chart) if hanging(chart) else on_plane(chart)
+    finite = np.flatnonzero(chart.finite)
+    shown = finite[np.round(np.linspace(0, len(finite) - 1, NET_TIMES)).astype(int)]
+    points = view.places[shown]
+    low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
+    middle, size = 0.5 * (low + high), np.maximum(1.06 * (high - low), 1e-300)
+    wide, tall = figure.get_size_inches()
+    panels = {n: (wide * (right - 0.02) / n, tall * ((TOP - 0.115) * n / NET_TIMES - NET_HEAD)) for n in (1, 2, 4)}
+    across, panel = max(panels.items(), key=lambda item: min(item[1] / size))  # where the net is largest
+    half = 0.5 * np.array(panel) / min(panel / size)
+    for i, (saved, places) in enumerate(zip(shown, points, strict=True)):
+        row, column = divmod(i, across)
+        height = (TOP - 0.115) * across / NET_TIMES
+        axes = figure.add_axes((0.02 + column * panel[0] / wide, TOP - (row + 1) * height, panel[0] / wide, panel[1] / tall))
+        axes.add_collection(LineCollection(places[chart.links], colors="#222222", linewidths=0.6))
+        (x, y), (dx, dy) = middle, half
+        axes.set(xlim=(x - dx, x + dx), ylim=(y - dy, y + dy))
+        axes.axis("off")
+        axes.set_title(f"t = {chart.run.t[saved]:.4g}", loc="left", size=13, pad=2)
+    return [f"The net is {view.name}."] if view.name else []
 
 
 def _before_and_after(figure: Figure, chart: RunPicture, before: RunPicture) -> list[str]:
@@ -65,10 +111,9 @@ def _before_and_after(figure: Figure, chart: RunPicture, before: RunPicture) -> 
         axes = figure.add_axes((0.055 + 0.33 * i, BOTTOM, 0.275, TOP - BOTTOM))
         view = replace(view, centre=new.centre)
         square(axes, view, size)
-        axes.locator_params(nbins=6)
+        axes.locator_params(nbins=4)
         _paths(axes, each, view)
-        if i == 0:
-            _legend(axes, each, crowded(each, 2.0 * size), above=False)
+        _legend(axes, each, crowded(each, 2.0 * size), above=False, part=i)
         axes.set_title(f"{name}, {view.name}" if view.name else name, loc="left", size=13)
         if view.leave(size):
             notes.append(f"A body leaves the picture {name}.")
@@ -111,7 +156,7 @@ def radii(axes: Axes, chart: RunPicture) -> None:
     for i in range(y.shape[1]):
         look = body(chart, i)
         axes.plot(angles[:, i], np.hypot(*y[:, i].T), color=look["color"], linestyle=look["linestyle"], linewidth=1.4, zorder=3)
-    axes.set_title("distance from the centre r(θ) over turns θ/2π", loc="left", size=13.5)
+    axes.set_title("distance from the centre by turns", loc="left", size=13.5)
     shown = np.clip(np.hypot(*y.transpose(2, 0, 1)), 0.0, 1.6 * r.max())
     low, high = min(float(shown.min()), float(r.min())), max(float(shown.max()), float(r.max()))
     room = max(0.12 * (high - low), 1e-9 * high)
@@ -148,6 +193,7 @@ def square(axes: Axes, view: Points, half: float, plane: tuple[int, int] = (0, 1
     axes.set_xlabel("xyz"[plane[0]])
     axes.set_ylabel("xyz"[plane[1]], rotation=0, labelpad=10)
     axes.set_title(view.name, loc="left", size=13)
+    axes.locator_params(nbins=6)
     axes.grid(color="#e6e6e6", linewidth=0.8)
     axes.set_axisbelow(True)
 
@@ -180,11 +226,8 @@ def _paths(axes: Axes, chart: RunPicture, view: Points) -> None:
     """Draw the path of each point, with its start and its end."""
     y, bodies = view.places, view.places.shape[1]
     fixed(axes, view)
-    if (joined := chart.links).size:
-        from matplotlib.collections import LineCollection
-
-        for state, colour in ((y[0], "#b0b0b0"), (y[-1], "#000000")):
-            axes.add_collection(LineCollection(state[joined], colors=colour, linewidths=1.0, zorder=3))
+    joined = chart.links
+    _draw_links(axes, joined, view)
     low, high = axes.get_xlim()
     long, many, shared = crowded(chart, high - low), bodies > len(BODIES), one_curve(chart)
     if view.exact is not None:
@@ -208,8 +251,22 @@ def _paths(axes: Axes, chart: RunPicture, view: Points) -> None:
         axes.plot(*y[-1:, i].T, zorder=5, markeredgewidth=0.4 if many else 1.0, **mark, **end)
 
 
-def _legend(axes: Axes, chart: RunPicture, long: bool, *, above: bool) -> None:
-    """Draw the names of the bodies where there are no orbits: above the panel, or below it if its title is above."""
+def _draw_links(axes: Axes, joined: Any, view: Points) -> None:
+    """Draw springs and rods at the start and at the end, with those that hang on a fixed point."""
+    from matplotlib.collections import LineCollection
+
+    held = [(point.place, i) for point in view.fixed for i in point.joined]
+    for state, colour in ((view.places[0], "#b0b0b0"), (view.places[-1], "#000000")):
+        lines = [*state[joined], *(np.array([place, state[i]]) for place, i in held)]
+        if lines:
+            axes.add_collection(LineCollection(lines, colors=colour, linewidths=1.6, zorder=3))
+
+
+def _legend(axes: Axes, chart: RunPicture, long: bool, *, above: bool, part: int | None = None) -> None:
+    """Draw the names of the bodies where there are no orbits: above the panel, or below it if its title is above.
+
+    Of two panels beside each other the first has the names of the bodies, part 0, and the second the others, part 1.
+    """
     from matplotlib.lines import Line2D
 
     bodies = chart.places.shape[1]
@@ -229,8 +286,18 @@ def _legend(axes: Axes, chart: RunPicture, long: bool, *, above: bool) -> None:
         net = {"color": "#b0b0b0" if label == "start" else "#000000", "linewidth": 1.6}
         handles.append(Line2D([], [], **(net if many and chart.links.size else mark)))
         labels.append(label)
+    if part is not None:
+        names = 0 if many else bodies
+        chosen = slice(names) if part == 0 else slice(names, None)
+        handles, labels = handles[chosen], labels[chosen]
     place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
     if not above:
-        place = {"loc": "upper left", "bbox_to_anchor": (-0.05, -0.13)}
-    spacing: dict[str, Any] = {"handlelength": 1.8, "columnspacing": 1.0, "handletextpad": 0.4, "borderpad": 0.1}
+        place = {"loc": "upper left", "bbox_to_anchor": (-0.05, -0.17)}
+    spacing: dict[str, Any] = {
+        "handlelength": 1.3,
+        "columnspacing": 0.8,
+        "handletextpad": 0.4,
+        "borderpad": 0.1,
+        "fontsize": 11.5,
+    }
     axes.legend(handles, labels, frameon=False, ncols=len(handles), **place, **spacing)

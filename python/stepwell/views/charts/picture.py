@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -16,13 +17,10 @@ from ...studies.measuring.data import Curve, WorkPrecision
 from ...studies.measuring.peers import Peer
 from .labels import Label, beside
 from .labels import title as put_title
-from .style import GREY, PALE, Axes, Figure, look, page, peer_look
-
-#: Orders for which a slope is drawn.
-SLOPES = (1, 2, 4)
+from .style import DPI, GREY, PALE, SIZE, Axes, Figure, look, page, peer_look
 
 #: The most letters of a line below the panels.
-NOTE = 190
+NOTE = 140
 
 #: The height of the strip of runs without a correct digit, as a fraction of that of the panels.
 STRIP = 0.1
@@ -50,7 +48,7 @@ FRONT: dict[str, Any] = {"color": "#e4e4e4", "linewidth": 10.0, "solid_capstyle"
 
 def draw(chart: WorkPrecision, error: str, time: str) -> Figure:
     """Draw the chart on a new figure."""
-    with page() as figure:
+    with page(*SIZE, dpi=DPI) as figure:
         unnamed = _panels(figure, chart, error, time)
         _text(figure, chart, error, time, unnamed)
     return figure
@@ -86,10 +84,10 @@ def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> list
         2,
         height_ratios=(STRIP, 1.0 - STRIP),
         width_ratios=(1.0, 1.0) if beside else (1.1, 1.0),
-        left=0.092,
+        left=0.102,
         right=0.985,
-        bottom=0.175,
-        top=0.88,
+        bottom=0.245,
+        top=0.87,
         hspace=0.0,
         wspace=0.24 if beside else 0.07,
     )
@@ -104,8 +102,6 @@ def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> list
         _spreads(measured, chart, time)
     _wrong(above_counted, chart, "evaluations")
     _wrong(above_measured, chart, other_cost)
-    _slopes(counted)
-
     for axes in (counted, measured, above_counted, above_measured):
         axes.minorticks_off()
     counted.set_xlabel(COUNTED)
@@ -115,10 +111,9 @@ def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> list
     else:
         measured.set_xlabel(f"measured ns per unit of time, {TIMES[time]}")
         measured.tick_params(labelleft=False)
-    above_counted.set_ylabel(
-        "no digit right:\n○ bounded\n× unstable", rotation=0, ha="right", va="top", y=0.98, labelpad=10, size=10.5
-    )
-    return name_curves(counted, chart, error, "evaluations", 11.5)
+    above_counted.set_ylabel("no digit\nright", rotation=0, ha="right", va="bottom", y=0.15, labelpad=8, size=11.5)
+    name_curves(measured, chart, other_error, other_cost, 12.0)
+    return name_curves(counted, chart, error, "evaluations", 13.0)
 
 
 def draw_errors(axes: Axes, chart: WorkPrecision, error: str, cost: str) -> None:
@@ -147,18 +142,16 @@ def muted(chart: WorkPrecision, curve: Curve, front: list[dict[str, Any]]) -> di
     return style | {"color": PALE, "linewidth": 1.0, "markersize": 4.5, "zorder": 2.0}
 
 
-def name_curves(axes: Axes, chart: WorkPrecision, error: str, cost: str, size: float, *, all_of_them: bool = True) -> list[str]:
-    """Write the names of the curves of the front, or of all, beside them; returns those for which there was no space."""
-    front = chart.front(error, cost)
-    leading = {row["method"] for row in front}
+def name_curves(axes: Axes, chart: WorkPrecision, error: str, cost: str, size: float) -> list[str]:
+    """Write the names of the curves of the front beside them; returns those for which there was no space."""
+    leading = {row["method"] for row in chart.front(error, cost)}
     labels = []
-    for curve in sorted(chart.curves, key=lambda curve: curve.name not in leading):
+    for curve in (each for each in chart.curves if each.name in leading):
         y = [point.error(error) if point.usable else math.nan for point in curve.points]
-        first = curve.name in leading
-        style = {"color": look_of(chart, curve)["color"] if first else GREY, "weight": "bold" if first else "normal"}
         points = np.array([curve.costs(cost), y], dtype=np.float64).T
-        if (first or all_of_them) and np.isfinite(points).all(axis=1).any():
-            labels.append(Label(curve.title.replace(", ", "\n"), points, style | {"size": size if first else size - 1.5}))
+        if np.isfinite(points).all(axis=1).any():
+            style = {"color": look_of(chart, curve)["color"], "weight": "bold", "size": size}
+            labels.append(Label(curve.title.replace(", ", "\n"), points, style))
     return [name.replace("\n", ", ") for name in beside(axes, labels)]
 
 
@@ -237,18 +230,6 @@ def _at_edge(curve: Curve, cost: str) -> float:
     return (curve.step_time if cost == "batch" else curve.single_time).median / curve.largest_stable_step
 
 
-def _slopes(axes: Axes) -> None:
-    """Thin lines of the slopes of some orders, in the corner that is always empty: little cost and little error."""
-    left, right = (math.log10(x) for x in axes.get_xlim())
-    low, high = (math.log10(y) for y in axes.get_ylim())
-    x, y = left + 0.05 * (right - left), low + 0.52 * (high - low)
-    for order in SLOPES:
-        run = min(0.14 * (right - left), 0.45 * (high - low) / order)
-        to_x, to_y = 10 ** (x + run), 10 ** (y - order * run)
-        axes.plot([10**x, to_x], [10**y, to_y], color=GREY, linewidth=0.9)
-        axes.annotate(f"order {order}", (to_x, to_y), (5, -4), textcoords="offset points", size=11, color=GREY)
-
-
 def title_of(name: str) -> str:
     """The title of a method, or the name of a peer."""
     first, *kinds = name.split(", ")
@@ -257,28 +238,37 @@ def title_of(name: str) -> str:
 
 def _text(figure: Figure, chart: WorkPrecision, error: str, time: str, unnamed: list[str]) -> None:
     scene = chart.scene
-    put_title(figure, 0.012, 0.955, f"{scene.title}: {finding(chart, error)}", 20)
-    where = f" ({scene.section})" if scene.section else ""
-    system = f"{scene.system!r} over {scene.horizon:.4g} units of time{known_to(chart)}"
-    system = f"{system}: {chart.stiff}" if chart.stiff else f"{system}{where}"
-    figure.text(0.012, 0.915, textwrap.shorten(system, 150), size=13.5, color=GREY)
+    put_title(figure, 0.012, 0.95, f"{scene.title}: {finding(chart, error)}", 20)
+    parts = [f"{scene.horizon:.4g} units of time{known_to(chart)}"]
+    parts += [str(chart.stiff)] if chart.stiff else []
+    parts += [f"Hoffmann (2002), {scene.section}"] if scene.section.startswith("§") else []
+    figure.text(0.012, 0.908, textwrap.shorten("; ".join(parts), NOTE - 15), size=13, color=GREY)
     what = f"one member of a batch of {chart.members}" if time == "batch" else "a single run"
-    reasons: dict[str, list[str]] = {}
-    for name, reason in chart.refused.items():
-        reasons.setdefault(reason, []).append(title_of(name))
-    refusals = " ".join(
-        f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} refused: {reason}." for reason, names in reasons.items()
-    )
     not_named = f" Not named: {', '.join(unnamed)}." if unnamed else ""
     notes = (
         f"In colour: cheapest for some error.{not_named} Error 1, no digit right: {scene.error}."
         + (" Grey: not known." if chart.floor else ""),
-        "Unstable: not finite, or no digit right and a growing amplitude; a method's own marker is where that begins.",
+        "Above the panels: runs without a right digit, ○ bounded, × unstable; a method's own marker is where that begins.",
         f"Time: {what}, one thread, {chart.isa}; median of {chart.repeats} runs, the bar at a curve's end spans them.",
+        *not_applicable(chart),
     )
-    shortened = textwrap.shorten(refusals, 2 * NOTE, placeholder=" …")
-    lines = [*(textwrap.shorten(note, NOTE, placeholder=" …") for note in notes), *textwrap.wrap(shortened, NOTE)]
-    figure.text(0.012, 0.012, "\n".join(lines), size=10.5, color=GREY, linespacing=1.25)
+    lines = [textwrap.shorten(note, NOTE, placeholder=" …") for note in notes]
+    figure.text(0.012, 0.014, "\n".join(lines), size=11.0, color=GREY, linespacing=1.25)
+
+
+def not_applicable(chart: WorkPrecision) -> list[str]:
+    """The methods and programs that cannot solve the system, by reason, in one line; none if all can."""
+    reasons: dict[str, list[str]] = {}
+    for name, reason in chart.refused.items():
+        reasons.setdefault(in_short(name, reason), []).append(title_of(name))
+    return ["Not applicable: " + "; ".join(f"{', '.join(names)} ({reason})" for reason, names in reasons.items()) + "."] * bool(
+        reasons
+    )
+
+
+def in_short(name: str, reason: str) -> str:
+    """The reason alone: without the method's name before it, the system's numbers and what to do instead."""
+    return re.sub(r", but \w+\(.*\) has (.*?)(?:;.*)?$", r"; here: \1", reason).removeprefix(f"{name} ")
 
 
 def known_to(chart: WorkPrecision) -> str:

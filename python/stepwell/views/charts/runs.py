@@ -289,10 +289,21 @@ def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
     at_rest = float(scene.system.energy(0.0 * scene.v, scene.y))
     scale, name = float(scene.system.energy(scene.v, scene.y)) - at_rest, "the kinetic energy at the start"
     if scale == 0.0:
-        scale, name = abs(at_rest) or 1.0, "the energy at the start"
+        scale, name = abs(at_rest), "the energy at the start"
+    if scale == 0.0:
+        scale, name = _largest_kinetic(scene, run) or 1.0, "the largest kinetic energy of the run"
     with np.errstate(all="ignore"):
         error = np.abs(energy - energy[0]) / scale
     return np.where(np.isfinite(error), error, np.inf), name
+
+
+def _largest_kinetic(scene: Scene, run: Run) -> float:
+    """The largest kinetic energy of the saved states."""
+    with np.errstate(all="ignore"):
+        kinetic = [
+            float(scene.system.energy(v, y)) - float(scene.system.energy(0.0 * v, y)) for v, y in zip(run.v, run.y, strict=True)
+        ]
+    return max((each for each in kinetic if np.isfinite(each)), default=0.0)
 
 
 def _of_points(y: Array) -> Array:

@@ -36,6 +36,10 @@ SETTLED, LAST_SHARE = 0.5, 0.1
 #: What constraints keep is no energy.
 CONSTRAINTS = ("length", "norm")
 
+#: A run within this share of the orbit's size is on it; the number of states that are looked at, and the least share of a period
+#: that is told.
+ON_THE_ORBIT, LATE_STATES, MIN_LAG = 0.02, 400, 2e-3
+
 #: Control that changes an error by less than this factor makes no difference.
 MIN_DIFFERENCE = 1.5
 
@@ -59,18 +63,38 @@ def _words(chart: RunPicture) -> str:
     if chart.before is not None and (change := _of_control(chart, chart.before)):
         return change
     if chart.state_error is not None and np.isfinite(chart.state_error).any():
-        return _of_error(chart.state_error, chart.run.t)
+        return _of_error(chart.state_error, chart.run.t, _late(chart))
     if chart.energy_error is not None:
         return _of_energy(chart.energy_error, run.energy)
     return _of_motion(chart)
 
 
-def _of_error(error: Array, t: Array) -> str:
-    """The largest state error that is known."""
+def _late(chart: RunPicture) -> str | None:
+    """By what share of the period a run is late or early at its end, if it stays on the exact orbit; None if it leaves it."""
+    period, exact = chart.scene.period, chart.exact
+    if chart.kind != "orbits" or period is None or exact is None or exact[0][-1] - exact[0][0] < 0.999 * period:
+        return None
+    finite = np.flatnonzero(chart.finite)
+    at = finite[np.unique(np.round(np.linspace(0, len(finite) - 1, LATE_STATES)).astype(int))]
+    places, curve = chart.run.y[at].reshape(len(at), -1), exact[2].reshape(len(exact[0]), -1)[::4]
+    squares = (places**2).sum(axis=1)[:, np.newaxis] + (curve**2).sum(axis=1) - 2.0 * places @ curve.T
+    nearest = squares.argmin(axis=1)
+    off = float(np.sqrt(np.maximum(squares.min(axis=1), 0.0).max() / (curve**2).sum(axis=1).max()))
+    lags = np.unwrap(chart.run.t[at] - exact[0][::4][nearest], period=period) / period
+    lag = float(lags[-1] - lags[0])
+    if off > ON_THE_ORBIT or abs(lag) < MIN_LAG:
+        return None
+    return f"on the exact orbit, but {percent(abs(lag))} of a period {'late' if lag > 0.0 else 'early'}"
+
+
+def _of_error(error: Array, t: Array, late: str | None = None) -> str:
+    """The largest state error that is known, or by how much the run is late."""
     largest = float(np.nanmax(error))
     known = "" if not np.isnan(error).any() else f" up to t = {float(t[~np.isnan(error)][-1]):.3g}"
     if largest <= MAX_ERROR_IN_DIGITS:
         return f"the exact motion to {_digits(largest)}{known}"
+    if late is not None:
+        return late
     if largest <= 1.0:
         return f"up to {percent(largest)} from the exact motion{known}"
     return f"not the exact motion, the error reaches {largest:.2g}{known}"

@@ -8,30 +8,37 @@ import numpy as np
 
 from .kinds import kind_of
 from .labels import title
-from .orbits_picture import draw_orbits, radii, turning
+from .orbits_picture import draw_net, draw_orbits, hanging, is_net, radii, turning
 from .run_panels import swings
 from .runs import LARGEST, RunPicture
 from .runs_finding import broke_off, finding, steps_of
 from .series_picture import draw_column, draw_errors, over_time
 from .solids_picture import draw_aircraft, draw_body
-from .style import BOTTOM, EXACT, GREY, LONG_CURVE, RIGHT, TOP, Axes, Figure, page
+from .style import BOTTOM, DPI, EXACT, GREY, LONG_CURVE, RIGHT, SIZE, TOP, Axes, Figure, page
 
 #: Rows of a chain are drawn up to here; of more, these many evenly chosen ones.
 MOST_ROWS = 24
+
+#: The most letters of a line of notes.
+LETTERS = 135
 
 
 def draw(chart: RunPicture) -> Figure:
     """Draw the run on a new figure."""
     motions = {"attitude": draw_aircraft, "body": draw_body, "orbits": _orbits, "swing": _curves, "rows": _curves}
-    with page() as figure:
+    with page(*SIZE, dpi=DPI) as figure:
         notes = motions[chart.kind](figure, chart)
         _text(figure, chart, notes)
     return figure
 
 
 def _orbits(figure: Figure, chart: RunPicture) -> list[str]:
+    if chart.before is None and is_net(chart):
+        notes = draw_net(figure, chart, 0.63)
+        _errors_beside(figure, chart, 0.71)
+        return notes
     notes = draw_orbits(figure, chart)
-    left = 0.55 if chart.places.shape[2] == 2 and chart.before is None else 0.735
+    left = 0.55 if (chart.places.shape[2] == 2 or hanging(chart)) and chart.before is None else 0.735
     if turning(chart):
         radii(figure.add_axes((left, 0.68, RIGHT - left, TOP - 0.68)), chart)
         draw_errors(figure, chart, (left, 0.4225, RIGHT - left, 0.145), (left, BOTTOM, RIGHT - left, 0.145))
@@ -132,9 +139,10 @@ def _text(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
     scene, run = chart.scene, chart.run
     result = finding(chart)
     title(figure, 0.012, 0.955, f"{chart.title}: {result}", 20)
-    section = f" ({scene.section})" if scene.section else ""
-    about = f"{steps_of(run)} from t = {run.t[0]:g} to {run.t[-1]:.6g}; {run.system!r}{section}"
-    figure.text(0.012, 0.918, textwrap.shorten(about, 165, placeholder=" …"), size=13, color=GREY)
+    section = f"; Hoffmann (2002), {scene.section}" if scene.section.startswith("§") else ""
+    control = "" if run.system.keeper is None else f", under {type(run.system.keeper).__name__}"
+    about = f"{steps_of(run)} from t = {run.t[0]:g} to {run.t[-1]:.6g}{control}{section}"
+    figure.text(0.012, 0.915, textwrap.shorten(about, 120, placeholder=" …"), size=13, color=GREY)
     sentences = []
     if run.status:
         sentences.append(f"{broke_off(run)}: drawn as far as it is finite.")
@@ -142,19 +150,21 @@ def _text(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
         sentences.append(f"State error 1: {scene.error}.")
     if chart.energy_error is not None:
         sentences.append(f"Energy error: relative to {chart.energy_scale}.")
+        if chart.state_error is None:
+            sentences.append("No exact solution is known: a correct energy alone does not make a motion correct.")
     sentences += dict.fromkeys(notes)
     if "control makes" in result:
         sentences.append("What control changes: medians of the saved states.")
     if run.paces is None and len(run.t) < run.steps + 1:
         sentences.append(f"{len(run.t)} states of {run.steps + 1} were saved and are drawn.")
-    figure.text(0.012, 0.02, "\n".join(_lines(sentences)), size=12, color=GREY, linespacing=1.4)
+    figure.text(0.012, 0.014, "\n".join(_lines(sentences)), size=11.3, color=GREY, linespacing=1.3)
 
 
 def _lines(sentences: list[str]) -> list[str]:
     """Sentences in as few lines of the page's width as they need."""
     lines: list[str] = []
-    for sentence in sentences:
-        if lines and len(lines[-1]) + len(sentence) < 175:
+    for sentence in (part for whole in sentences for part in textwrap.wrap(whole, LETTERS)):
+        if lines and len(lines[-1]) + len(sentence) < LETTERS:
             lines[-1] += "  " + sentence
         else:
             lines.append(sentence)

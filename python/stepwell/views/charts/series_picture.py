@@ -9,10 +9,10 @@ import numpy as np
 from ...base.arrays import Array
 from .run_panels import Series, errors
 from .runs import RunPicture
-from .style import EXACT, GREY, LONG_CURVE, Axes, Figure
+from .style import EXACT, GREY, LONG_CURVE, Axes, Figure, ink
 
-#: Labels at the end of lines are at least this share of a panel's height apart.
-LABEL_DISTANCE = 0.11
+#: Labels at the end of lines are at least so many inches apart.
+LABEL_DISTANCE = 0.2
 
 #: Between two panels of errors beside an animation, as a share of the picture's height.
 PALE_GAP = 0.1
@@ -57,9 +57,14 @@ def draw_series(axes: Axes, chart: RunPicture, series: Series) -> Axes:
 
 
 def draw_errors(figure: Figure, chart: RunPicture, energy: Place, state: Place) -> None:
-    """The error of the energy above that of the state, never the one alone, with those of the run without control."""
+    """The error of the energy above that of the state, as far as they are known, with those of the run without control."""
     before = chart.before
-    panels = draw_column(figure, chart, list(errors(chart, before)), [energy, state])
+    known = [series for series in errors(chart, before) if not series.missing]
+    if not known:
+        return
+    left, bottom, width, _ = state
+    whole = (left, bottom, width, energy[1] + energy[3] - bottom)
+    panels = draw_column(figure, chart, known, [energy, state] if len(known) == 2 else [whole])
     if before is not None and chart.energy_error is not None and before.energy_error is not None:
         for line, label in zip(panels[0].lines, ("with control", "without"), strict=False):
             line.set_label(label)
@@ -85,6 +90,7 @@ def over_time(axes: Axes, chart: RunPicture) -> None:
     first, last = float(chart.run.t[0]), float(chart.run.t[-1])
     margin = 0.01 * (last - first)
     axes.set_xlim(first - margin, last + margin)
+    axes.locator_params(axis="x", nbins=5)
     axes.grid(color="#e6e6e6", linewidth=0.8)
     axes.set_axisbelow(True)
 
@@ -113,6 +119,7 @@ def _not_known(axes: Axes, chart: RunPicture, series: Series) -> None:
 def label_ends(axes: Axes, series: Series) -> None:
     """The name of each line at its right end, beside the panel; names that would cover each other are moved apart."""
     low, high = axes.get_ylim()
+    apart = LABEL_DISTANCE * axes.figure.dpi / axes.get_window_extent().height
     ends: list[tuple[float, str, str]] = []
     for line in series.lines:
         known = line.values[np.isfinite(line.values)]
@@ -120,7 +127,7 @@ def label_ends(axes: Axes, series: Series) -> None:
             ends.append(((float(known[-1]) - low) / (high - low), line.name, line.colour))
     heights: list[float] = []
     for height, _, _ in sorted(ends):
-        heights.append(max([height, *(each + LABEL_DISTANCE for each in heights[-1:])]))
+        heights.append(max([height, *(each + apart for each in heights[-1:])]))
     over = max([0.0, *(each - 1.0 for each in heights[-1:])])
     for height, (_, name, colour) in zip(heights, sorted(ends), strict=True):
-        axes.text(1.008, height - over, name, transform=axes.transAxes, color=colour, va="center", size=12)
+        axes.text(1.008, height - over, name, transform=axes.transAxes, color=ink(colour), va="center", size=12)

@@ -59,11 +59,11 @@ def draw_body(figure: Figure, chart: RunPicture) -> list[str]:
     ball.set_title(f"path of the tip of axis {'−' if side < 0.0 else ''}{axis + 1}", size=13.5, pad=4)
     width = (RIGHT - 0.012) / BODY_ATTITUDES
     for i, saved in enumerate(attitudes(chart, BODY_ATTITUDES)):
-        axes = figure.add_axes((0.012 + i * width, 0.105, width, 0.175))
+        axes = figure.add_axes((0.012 + i * width, 0.127, width, 0.16))
         draw_solid(axes, solid)(solid.matrices[..., saved])
         axes.set_title(f"t = {chart.run.t[saved]:.4g}", size=12, pad=1)
-    draw_column(figure, chart, [angular_velocity(chart)], [(0.365, 0.365, 0.265, 0.48)])
-    draw_errors(figure, chart, (0.72, 0.645, RIGHT - 0.72, 0.2), (0.72, 0.365, RIGHT - 0.72, 0.2))
+    draw_column(figure, chart, [angular_velocity(chart)], [(0.365, 0.4, 0.255, 0.445)])
+    draw_errors(figure, chart, (0.72, 0.665, RIGHT - 0.72, 0.18), (0.72, 0.4, RIGHT - 0.72, 0.18))
     return [_about_body(chart, axis)]
 
 

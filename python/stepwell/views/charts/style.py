@@ -37,6 +37,9 @@ PEERS = "1234+|"
 LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 3: (0, (8, 1.8)), 5: (0, (12, 1.5)), 8: (0, (24, 1.2))}
 GREY = "#666666"
 
+#: The least contrast of text on white (WCAG 2, level AA).
+CONTRAST = 4.5
+
 #: The exact motion of a run, below all else.
 EXACT: dict[str, Any] = {"color": "#d4d4d4", "linewidth": 5.0, "zorder": 1, "solid_capstyle": "round"}
 
@@ -44,20 +47,48 @@ EXACT: dict[str, Any] = {"color": "#d4d4d4", "linewidth": 5.0, "zorder": 1, "sol
 LONG_CURVE = 3000
 
 #: Where the panels of a run's picture are, as shares of width and height.
-BOTTOM, TOP, RIGHT = 0.165, 0.87, 0.978
+BOTTOM, TOP, RIGHT = 0.19, 0.845, 0.978
 
-#: Sizes in points, for pictures of about 1600 pixels' width at 100 dots per inch.
+#: The size of a page in inches on which 11 points are still 9 pixels where a site shows pictures 736 pixels wide, and its dots an
+#: inch, which make it 1600 pixels wide.
+SIZE, DPI = (12.5, 7.03125), 128.0
+
+#: Sizes in points.
 FONT: Any = {"font.size": 14.0, "axes.labelsize": 14.0, "legend.fontsize": 12.0}
 
 
 @contextmanager
-def page(width: float = 16.0, height: float = 9.0, **options: Any) -> Iterator[Figure]:
+def page(
+    width: float = 16.0, height: float = 9.0, dpi: float = 100.0, *, options: dict[str, Any] | None = None
+) -> Iterator[Figure]:
     """A new figure, on which text has the sizes of ``FONT``; options are matplotlib's."""
-    figure = new_figure(width, height)
+    figure = new_figure(width, height, dpi)
     from matplotlib import rc_context
 
-    with rc_context(FONT | options):
+    with rc_context(FONT | (options or {})):
         yield figure
+
+
+def ink(colour: str) -> str:
+    """The colour of a text that belongs to marks of that colour: darker where its contrast on white would be too small."""
+    from matplotlib.colors import to_hex, to_rgb
+
+    rgb = to_rgb(colour)
+    share = 1.0
+    while contrast((share * rgb[0], share * rgb[1], share * rgb[2])) < CONTRAST:
+        share -= 0.01
+    return str(to_hex((share * rgb[0], share * rgb[1], share * rgb[2])))
+
+
+def contrast(rgb: tuple[float, float, float], ground: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> float:
+    """The contrast of two colours by WCAG 2; each of red, green and blue is between 0 and 1."""
+    light, dark = sorted((_luminance(rgb), _luminance(ground)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def _luminance(rgb: tuple[float, float, float]) -> float:
+    linear = [each / 12.92 if each <= 0.04045 else ((each + 0.055) / 1.055) ** 2.4 for each in rgb]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
 def look(method: Method) -> dict[str, Any]:

@@ -11,14 +11,18 @@ import numpy as np
 from ...analysis.stability.eigen import Complex
 from ...base.arrays import Array
 from ...model.methods import stable_for
+from .curves_picture import overview
 from .style import FAMILIES, GREY, Axes, Figure, family, named, page
 from .zplane import Locus, Stability
 
 #: Panels side by side at most, and the least width in inches, which the title and the notes need.
-COLUMNS, WIDTH = 4, 10.5
+COLUMNS, WIDTH = 3, 10.5
 
 #: A panel of the z-plane shows so much of it in each direction.
 REACH = 1.72
+
+#: More methods than these share two panels.
+MOST_PAIRS = 4
 
 #: Angles of the guides, the harmonic cases 1, 2 and 3 of §4, and where their names stand.
 GUIDES = {30: (1.36, 0.79), 90: (0.21, 1.56), 150: (-1.36, 0.79)}
@@ -38,7 +42,7 @@ ALIKE = 1e-6
 LETTERS = 34
 
 #: The height of a number.
-HIGH = 0.125
+HIGH = 0.14
 
 #: Ψ/Φ is shown up to here.
 TURNS = 2.3
@@ -90,7 +94,7 @@ def _plane(axes: Axes) -> None:
     for degrees, place in GUIDES.items():
         x, y = 1.45 * math.cos(math.radians(degrees)), 1.45 * math.sin(math.radians(degrees))
         axes.plot([0.0, x], [0.0, y], color="#777777", linewidth=1.0, linestyle=(0, (1, 2)), zorder=0.6)
-        axes.text(*place, f"{degrees}°", size=9.5, color=GREY, ha="center", va="center")
+        axes.text(*place, f"{degrees}°", size=11, color=GREY, ha="center", va="center")
     axes.set(xlim=(-REACH, REACH), ylim=(-REACH, REACH), aspect="equal", xticks=(-1, 0, 1), yticks=(-1, 0, 1))
 
 
@@ -134,7 +138,7 @@ def _angles(axes: Axes, phi: Array, z: Complex, path: Complex, taken: list[tuple
             room = [_room(place, lines, taken) for place in places]
             best = places[int(np.argmax(room))]
             if max(room) > 0.6 * ASIDE:
-                axes.text(best.real, best.imag, f"{angle:g}", size=10, ha="center", va="center", zorder=6)
+                axes.text(best.real, best.imag, f"{angle:g}", size=11, ha="center", va="center", zorder=6)
                 taken.append((best.real, best.imag))
 
 
@@ -157,8 +161,10 @@ def branches(eigenvalues: Complex) -> Complex:
 
 
 def curves(chart: Stability) -> Figure:
-    """r₁² − 1 and Ψ/Φ over Φ, a pair of panels for each method."""
+    """r₁² − 1 and Ψ/Φ over Φ, a pair of panels for each method; of many methods, both errors on two panels."""
     shared = groups(chart)
+    if len(shared) > MOST_PAIRS:
+        return overview(chart, shared)
     across, down = _grid(len(shared))
     width, height = max(WIDTH, 3.8 * across + 1.4), 4.75 * down + 2.2
     with page(width, height) as figure:
