@@ -55,6 +55,16 @@ def test_without_an_exact_solution_the_energy_is_compared_with_the_start():
     assert chart.energy_scale == "the energy at the start"
 
 
+def test_a_start_at_rest_without_energy_is_compared_with_the_largest_kinetic_energy():
+    """A ball that falls from height 0: its energy is 0 at the start, and its kinetic energy the largest where it is lowest."""
+    ball = sw.Scene(sw.Particles(gravity=2.0, dim=1), v=[[0.0]], y=[[0.0]], dt=0.1, horizon=1.0)
+    chart = looked_at(ball, "standard_euler")
+    assert chart.energy_scale == "the largest kinetic energy of the run"
+    kinetic = 0.5 * chart.run.v[:, 0, 0] ** 2
+    np.testing.assert_allclose(chart.energy_error, np.abs(chart.run.energy) / kinetic.max(), rtol=1e-12)
+    assert chart.energy_error.max() > 0.01
+
+
 def test_what_is_not_known_is_left_out_of_the_largest():
     scene = dataclasses.replace(sw.scenes.clover(), until=3.0)
     chart = looked_at(scene)

@@ -291,19 +291,18 @@ def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
     if scale == 0.0:
         scale, name = abs(at_rest), "the energy at the start"
     if scale == 0.0:
-        scale, name = _largest_kinetic(scene, run) or 1.0, "the largest kinetic energy of the run"
+        scale, name = _largest_kinetic(scene, run, energy) or 1.0, "the largest kinetic energy of the run"
     with np.errstate(all="ignore"):
         error = np.abs(energy - energy[0]) / scale
     return np.where(np.isfinite(error), error, np.inf), name
 
 
-def _largest_kinetic(scene: Scene, run: Run) -> float:
+def _largest_kinetic(scene: Scene, run: Run, energy: Array) -> float:
     """The largest kinetic energy of the saved states."""
+    places = np.moveaxis(run.y, 0, -1)
     with np.errstate(all="ignore"):
-        kinetic = [
-            float(scene.system.energy(v, y)) - float(scene.system.energy(0.0 * v, y)) for v, y in zip(run.v, run.y, strict=True)
-        ]
-    return max((each for each in kinetic if np.isfinite(each)), default=0.0)
+        kinetic = energy - np.asarray(scene.system.energy(np.zeros((*scene.v.shape, 1)), places))
+    return float(np.max(kinetic, where=np.isfinite(kinetic), initial=0.0))
 
 
 def _of_points(y: Array) -> Array:
