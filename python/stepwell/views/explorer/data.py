@@ -20,16 +20,25 @@ from ...model.methods import method as find_method
 from ...runs.integration import quietly
 from ...runs.options import Options
 from ...runs.request import Request
+from ...runs.result import Run
 from ...scenes import Scene
 from ...scenes import scene as find_scene
 from ...scenes.taylor import Orbit
+from ...scenes.truth import METHOD_IF_STIFF, method_for
 from ...source.exports import export
 from ...source.exports.tapes import about
 from ..charts.style import look
 from . import sliders, systems
 
-#: The methods for the run with small steps that is the reference for errors; the first that can step the scene is used.
-TRUTH_METHODS = ("dop853", "rk4", "standard_heun")
+#: The methods for the run with small steps that is the reference for errors; the first that can step the scene is used. Those of
+#: a stiff scene stand before them: explicit ones would take steps that are far too short for a page.
+TRUTH_METHODS, TRUTH_METHODS_IF_STIFF = ("dop853", "rk4", "standard_heun"), ("rodas5p", "rodas4")
+
+#: The methods with which the page begins a scene of users' own; those of a stiff one.
+PAIR, PAIR_IF_STIFF = ("false_euler", "rk4"), ("rk4", "rosenbrock23")
+
+#: The methods whose step is two shears of the phase plane, and which block each changes first.
+SHEARS = {"false_euler": "vy", "damped_euler": "yv"}
 
 #: The class in an exported module; what the page needs from all of them.
 CLASS = "step"
@@ -37,6 +46,13 @@ CLASS = "step"
 #: The number of states that give the size of a motion, the most steps of their run, and the fraction of extreme values on either
 #: side that pictures leave out.
 SAMPLES, MAX_SIZE_STEPS, SHARE_LEFT_OUT = 1000, 20_000, 0.005
+
+#: The tolerance of that run of a stiff scene.
+SIZE_TOLERANCE = 1e-6
+
+#: What a step of the run that is the truth may change when its parts are halved, and of the run that it is checked by; by DOP853,
+#: and by methods of lower order.
+TIGHT, LOOSE = (1e-11, 1e-9), (1e-9, 1e-7)
 
 #: The longest step that goes into a page, in characters; and in operations, which are counted before a step is written.
 MAX_SOURCE, MAX_OPERATIONS = 400_000, 80_000
@@ -49,7 +65,7 @@ def of_method(method: Method) -> dict[str, Any]:
     record = {name: getattr(method, name) for name in ("name", "title", "order", "evaluations", "limit", "carry", "section")}
     if math.isinf(method.limit):
         record["limit"] = None  # JSON has no infinity
-    return record | {"colour": look(method)["color"]}
+    return record | {"colour": look(method)["color"], "shears": SHEARS.get(method.name)}
 
 
 def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
@@ -58,12 +74,16 @@ def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
     Raises:
         UnsupportedError: if none of the methods can step it, or its steps are too long for a page.
     """
-    sources, names, refused, truth_by = _sources(scene, methods)
-    parameters = parameters_of(sources[next(iter(names.values()))])
-    offer = sliders.OFFERS.get(scene.name, sliders.Offer())
     known = built_in(scene)
+    offer = sliders.OFFERS[scene.name] if known else sliders.Offer()
+    size, finite = sizes(scene)
+    # Steps of a page have a fixed length: a scene on which those of Runge-Kutta blow up is stiff for it as well.
+    stiff = offer.truth is None and (not finite or method_for(scene) == METHOD_IF_STIFF)
+    sources, names, refused, truth_by = _sources(
+        scene, methods, TRUTH_METHODS_IF_STIFF + TRUTH_METHODS if stiff else TRUTH_METHODS
+    )
+    parameters = parameters_of(sources[next(iter(names.values()))])
     own = offer.sliders if known else sliders.generic(scene.system, parameters, scene.control is not None)
-    truth = offer.truth if known else None
     v, y = ([float(each) for each in block.reshape(-1)] for block in (scene.v, scene.y))
     energy = systems.energy(scene.system)
     values = {"m": parameters, "e": energy or {}, "v": v, "y": y}
@@ -74,20 +94,24 @@ def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
         "description": scene.description,
         "dt": scene.dt,
         "horizon": scene.horizon,
-        "rate": (offer.rate if known else None) or scene.horizon / 20.0,
+        "pair": offer.pair or (PAIR_IF_STIFF if stiff else PAIR),
+        "step": offer.dt or scene.dt,
+        "finding": offer.finding,
+        "rate": offer.rate or scene.horizon / 20.0,
         "v": v,
         "y": y,
         "motion": systems.motion(scene.system),
         "energy": energy,
         "phases": systems.phase_planes(scene.system),
-        "phase": offer.phase if known else 0,
+        "phase": offer.phase,
         "linear": scene.system.linear,
-        "limit": offer.limit if known else None,
-        "truth": truth,
-        **sizes(scene),
+        "limit": offer.limit,
+        "truth": offer.truth,
+        **size,
         "sliders": [record for each in own if (record := _slider(each, values)) is not None],
         "steps": names,
         "truth_by": truth_by,
+        "truth_tolerances": TIGHT if truth_by == "dop853" else LOOSE,
         "refused": refused,
         "packed": packed(sources),
     }
@@ -100,7 +124,9 @@ def built_in(scene: Scene) -> bool:
     return scene == (sliders.rope() if scene.name == "rope" else find_scene(scene.name))
 
 
-def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[str, int], dict[str, str], str | None]:
+def _sources(
+    scene: Scene, methods: Sequence[Method], truth_methods: Sequence[str]
+) -> tuple[list[str], dict[str, int], dict[str, str], str | None]:
     """The steps as JavaScript, the index of each method and of the "truth", why others are missing, what makes the truth."""
     sources: list[str] = []
     places: dict[str, int] = {}
@@ -117,7 +143,7 @@ def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[s
         why = next(iter(refused.values()))
         raise UnsupportedError(f"scenes: no method steps {scene.name} in a page: {why}")
     truth_by = None
-    for name in TRUTH_METHODS:
+    for name in truth_methods:
         if scene.control is None and name in places:
             truth_by, places["truth"] = name, places[name]
             break
@@ -163,12 +189,16 @@ def packed(sources: list[str]) -> str:
     return base64.b64encode(zlib.compress(text, 9)).decode()
 
 
-def sizes(scene: Scene) -> dict[str, Any]:
-    """The size of the motion, from the exact solution where there is a formula, else from a run by Runge-Kutta.
+def sizes(scene: Scene) -> tuple[dict[str, Any], bool]:
+    """The size of the motion, and whether Runge-Kutta's steps follow it.
+
+    It is that of the exact solution where there is a formula, else of a run by Runge-Kutta; and where that blows up, of one to a
+    tolerance by an implicit method.
 
     ``scales`` are the largest lengths of v and y, in which errors are measured; ``ranges`` the least and largest value of each
     number of a block, for the axes of pictures.
     """
+    finite = True
     if scene.exact is not None and scene.until >= scene.horizon and not isinstance(scene.exact, Orbit):
         lengths = list(scene.scales)
         blocks = scene.exact(np.linspace(0.0, scene.horizon, SAMPLES))
@@ -177,6 +207,9 @@ def sizes(scene: Scene) -> dict[str, Any]:
         state: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": scene.dt, "steps": steps, "control": scene.control}
         with np.errstate(all="ignore"):  # a size need not be exact
             run = quietly(scene.system, "rk4", **state, every=max(1, steps // SAMPLES))
+        finite = all(bool(np.isfinite(block).all()) for block in (run.v, run.y))
+        if not finite:
+            run = _implicit(scene) or run
         blocks = run.v, run.y
         rows = (block.reshape(len(block), -1) for block in blocks)
         lengths = [float(_finite(np.sqrt((row * row).sum(axis=1))).max(initial=0.0)) for row in rows]
@@ -184,7 +217,17 @@ def sizes(scene: Scene) -> dict[str, Any]:
     for name, block in zip("vy", blocks, strict=True):
         columns = block.reshape(len(block), -1).T
         ranges[name] = [np.quantile(_finite(each), [SHARE_LEFT_OUT, 1.0 - SHARE_LEFT_OUT]).tolist() for each in columns]
-    return {"scales": lengths, "ranges": ranges}
+    return {"scales": lengths, "ranges": ranges}, finite
+
+
+def _implicit(scene: Scene) -> Run | None:
+    """The run of a stiff scene to a tolerance; None if no implicit method makes it."""
+    motion: dict[str, Any] = {"v": scene.v, "y": scene.y, "at": np.linspace(0.0, scene.horizon, SAMPLES)}
+    try:
+        run = quietly(scene.system, METHOD_IF_STIFF, tolerance=SIZE_TOLERANCE, **motion, **scene.adaptive_options)
+    except StepwellError:
+        return None
+    return None if run.status else run
 
 
 def _finite(values: Array) -> Array:

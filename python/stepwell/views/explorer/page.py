@@ -29,7 +29,7 @@ WEB = Path(__file__).resolve().parent / "web"
 
 #: The modules of the page, each after those that it imports.
 MODULES = (
-    *("roots", "energies", "truths", "trajectory", "state", "palette", "texts", "limits", "slider"),
+    *("roots", "energies", "truths", "trajectory", "conserved", "state", "palette", "texts", "limits", "slider"),
     *("motion", "plots", "race", "pictures", "app"),
 )
 

@@ -1,4 +1,4 @@
-"""The controls that the page offers for each built-in scene: sliders, speed, the exact solution if the page has its formula.
+"""What the page offers for each built-in scene: two methods that tell something, sliders, speed, the formula of the motion.
 
 A slider sets numbers by their *paths*: ``m.omega`` a parameter of the exported step, ``m.Gm[1]`` an element of one, ``m.mass[*]``
 all of one; ``e.`` likewise of the energy, ``v`` and ``y`` of the start. Each is set to the slider's value times a factor.
@@ -41,10 +41,13 @@ class Slider:
 
 @dataclass(frozen=True)
 class Offer:
-    """The controls that the page offers for a scene.
+    """What the page offers for a scene.
 
     Attributes:
         sliders: the sliders.
+        pair: the methods with which the page begins; None for those of any scene.
+        dt: the step with which it begins; None for the scene's own.
+        finding: what these methods and this step show, in a sentence or two.
         rate: units of time that pass in a second; None for a twentieth of the horizon.
         truth: the exact solution among those that the page has formulas for, or None: a run with small steps.
         limit: how the page finds the stability limit: "oscillator" and "chain" by the method's own, "scan" by the roots; or None.
@@ -52,6 +55,9 @@ class Offer:
     """
 
     sliders: tuple[Slider, ...] = ()
+    pair: tuple[str, str] | None = None
+    dt: float | None = None
+    finding: str = ""
     rate: float | None = None
     truth: str | None = None
     limit: str | None = None
@@ -79,9 +85,19 @@ def rod_masses(n: int) -> tuple[Slider, ...]:
 
 
 OFFERS: dict[str, Offer] = {
-    "clover": Offer((*masses(3), SOFTENING), rate=3.0),
+    "clover": Offer(
+        (*masses(3), SOFTENING),
+        pair=("false_euler", "rk4"),
+        finding="False Euler makes a clover leaf of the circle. Runge-Kutta 4 stays on it.",
+        rate=3.0,
+    ),
     "oscillator": Offer(
         (Slider("omega", "ω₀", 0.2, 6.0, {"m.omega": 1.0}), Slider("start", "y at the start", -2.0, 2.0, {"y[0]": 1.0})),
+        pair=("standard_euler", "false_euler"),
+        finding=(
+            "Standard Euler gains 9 % of its energy in every step. False Euler uses the new velocity, one line of "
+            "code, and stays on an ellipse for ever."
+        ),
         rate=3.0,
         truth="oscillator",
         limit="oscillator",
@@ -93,6 +109,10 @@ OFFERS: dict[str, Offer] = {
             Slider("amplitude", "amplitude of the drive", 0.0, 3.0, {"m.a_amplitude": 1.0}),
             Slider("drive", "frequency of the drive", 0.05, 3.0, {"m.a_omega": 1.0}),
         ),
+        pair=("standard_euler", "false_euler"),
+        finding=(
+            "The oscillator is damped, and yet it swings up by Standard Euler: the method feeds in more than the damping takes."
+        ),
         rate=3.0,
         truth="forced_oscillator",
         limit="scan",
@@ -103,6 +123,9 @@ OFFERS: dict[str, Offer] = {
             Slider("start", "angle at the start", -3.14, 3.14, {"y[0]": 1.0}),
             Slider("push", "angular velocity at the start", -3.0, 3.0, {"v[0]": 1.0}),
         ),
+        pair=("standard_euler", "leapfrog"),
+        dt=0.1,
+        finding="By Standard Euler the pendulum swings ever higher and goes over the top. Leapfrog swings back and forth.",
         rate=2.0,
         limit="oscillator",
     ),
@@ -111,23 +134,74 @@ OFFERS: dict[str, Offer] = {
             Slider("stiffness", "stiffness", 0.1, 6.0, {"m.stiffness[*]": 1.0, "e.stiffness[*]": 1.0}),
             Slider("mass", "masses", 0.1, 6.0, {"m.mass[*]": 1.0, "e.mass[*]": 1.0}),
         ),
+        pair=("standard_heun", "leapfrog"),
+        finding=(
+            "A trace of the fastest mode grows by Standard Heun until it hides the slow one. Leapfrog takes half the "
+            "work and stays."
+        ),
         rate=5.0,
         limit="chain",
     ),
-    "energy_control": Offer((Slider("gain", "gain C of the control", 0.0, 1.0, {"m.control_gain": 1.0}),), rate=3.0),
-    "kepler": Offer((*masses(2), SPEED), rate=1.5),
-    "figure_eight": Offer((*masses(3), SPEED), rate=1.5),
-    "pythagorean": Offer((*masses(3), SOFTENING), rate=2.0),
-    "arenstorf": Offer((SPEED,), rate=1.0),
-    "double_pendulum": Offer((*rod_masses(2), ROD_GRAVITY), rate=2.0),
+    "energy_control": Offer(
+        (Slider("gain", "gain C of the control", 0.0, 1.0, {"m.control_gain": 1.0}),),
+        pair=("standard_euler", "rk4"),
+        finding="The control keeps Standard Euler's bodies together. Slide the gain to 0: they leave.",
+        rate=3.0,
+    ),
+    "kepler": Offer(
+        (*masses(2), SPEED),
+        pair=("rk4", "leapfrog"),
+        dt=0.0125,
+        finding="Runge-Kutta 4 loses energy for good at every close pass. Leapfrog gets it back, but its ellipse turns.",
+        rate=1.5,
+    ),
+    "figure_eight": Offer(
+        (*masses(3), SPEED),
+        pair=("standard_euler", "leapfrog"),
+        finding=("By Standard Euler the three bodies leave the eight within one turn. Leapfrog, at the same cost, stays on it."),
+        rate=1.5,
+    ),
+    "pythagorean": Offer(
+        (*masses(3), SOFTENING),
+        pair=("leapfrog", "dop853"),
+        finding=(
+            "Leapfrog's step is too long for the near collision at t = 1.9 and throws the bodies apart. DOP853 passes "
+            "it with the same step."
+        ),
+        rate=2.0,
+    ),
+    "arenstorf": Offer(
+        (SPEED,),
+        pair=("rk4", "dop853"),
+        dt=0.005,
+        finding="Runge-Kutta 4 leaves the orbit at the first passes of the moon. DOP853 comes back to where it began.",
+        rate=1.0,
+    ),
+    "double_pendulum": Offer(
+        (*rod_masses(2), ROD_GRAVITY),
+        pair=("false_euler", "rk4"),
+        finding=(
+            "False Euler, so good on springs, loses energy on rods from the first swing on. Runge-Kutta 4 stays right "
+            "until chaos sets in."
+        ),
+        rate=2.0,
+    ),
     "conical_pendulum": Offer(
-        (Slider("gravity", "gravity", 0.0, 5.0, {"m.gravity": 1.0, "e.gravity[2]": -1.0}), SPEED), rate=1.0
+        (Slider("gravity", "gravity", 0.0, 5.0, {"m.gravity": 1.0, "e.gravity[2]": -1.0}), SPEED),
+        pair=("false_euler", "rk4"),
+        finding=("The bob should go round at one height. By False Euler it climbs and falls; by Runge-Kutta 4 it stays level."),
+        rate=1.0,
     ),
     "rope": Offer(
         (
             Slider("stiffness", "stiffness", 20.0, 2000.0, {"m.stiffness[*]": 1.0, "e.stiffness[*]": 1.0}),
             Slider("load", "mass at the end", 0.1, 10.0, {"m.masses[5]": 1.0, "e.masses[5]": 1.0}),
             Slider("gravity", "gravity", 0.0, 20.0, {"m.gravity[1]": -1.0, "e.gravity[1]": -1.0}),
+        ),
+        pair=("leapfrog", "rk4"),
+        dt=0.035,
+        finding=(
+            "At this step the stiff springs shake themselves apart by Leapfrog. Runge-Kutta 4 damps them, which is wrong, too."
         ),
         rate=1.0,
         phase=10,
@@ -136,6 +210,11 @@ OFFERS: dict[str, Offer] = {
         (
             Slider("restitution", "restitution e", 0.0, 1.0, {"m.contact_0_restitution": 1.0}),
             Slider("gravity", "gravity", 1.0, 20.0, {"m.gravity[1]": -1.0, "e.gravity[1]": -1.0}),
+        ),
+        pair=("false_euler", "rk4"),
+        finding=(
+            "Impacts fall between two steps. By False Euler the ball bounces early or late; by Runge-Kutta 4 within a "
+            "hundredth of a second."
         ),
         rate=0.5,
         truth="bouncing_ball",
@@ -146,19 +225,57 @@ OFFERS: dict[str, Offer] = {
             Slider("friction", "friction μg", 0.5, 15.0, {"m.friction_limit": 1.0}),
             Slider("start", "speed at the start", 0.0, 6.0, {"v[0]": 1.0}),
         ),
+        pair=("standard_euler", "rk4"),
+        dt=0.05,
+        finding="By Standard Euler the block stops some 8 % too far; by Runge-Kutta 4 within half a per cent.",
         rate=0.2,
         truth="sliding_block",
     ),
     "sticking_block": Offer(
-        (Slider("friction", "friction μN", 0.02, 0.6, {"m.friction_limit": 1.0}),), rate=2.0, truth="sticking_block"
+        (Slider("friction", "friction μN", 0.02, 0.6, {"m.friction_limit": 1.0}),),
+        pair=("standard_euler", "false_euler"),
+        dt=0.15,
+        finding=(
+            "The block should stick after some swings. By Standard Euler it swings on; by False Euler it sticks in the "
+            "right place."
+        ),
+        rate=2.0,
+        truth="sticking_block",
     ),
     "dzhanibekov": Offer(
         tuple(
             Slider(f"J{i + 1}", f"inertia {i + 1}", 0.3, 4.0, {f"m.inertia[{i}]": 1.0, f"e.inertia[{i}]": 1.0}) for i in range(3)
         ),
+        pair=("standard_euler", "rk4"),
+        dt=0.1,
+        finding="By Standard Euler the body gains energy and tumbles too soon. Runge-Kutta 4 turns over in time.",
         rate=3.0,
     ),
-    "heavy_top": Offer((Slider("weight", "weight", 0.0, 12.0, {"m.weight": 1.0, "e.weight": 1.0}),), rate=1.0),
+    "van_der_pol": Offer(
+        (Slider("mu", "damping μ", 0.5, 100.0, {"m.mu": 1.0}),),
+        pair=("rk4", "rosenbrock23"),
+        dt=0.01,
+        finding=(
+            "Stiff: by Runge-Kutta 4 it blows up at once, though nothing fast happens yet. Rosenbrock 2(3), an "
+            "implicit method, creeps and jumps as it should."
+        ),
+        rate=10.0,
+    ),
+    "rober": Offer(
+        (Slider("k2", "rate of the fast reaction, ×", 0.0, 2.0, {"m.fast": 1.0}, relative=True),),
+        pair=("rk4", "rosenbrock23"),
+        dt=0.002,
+        finding=(
+            "Stiff: Runge-Kutta 4 blows up at once at this step. Rosenbrock 2(3), an implicit method, is right to six digits."
+        ),
+        rate=2.0,
+    ),
+    "heavy_top": Offer(
+        (Slider("weight", "weight", 0.0, 12.0, {"m.weight": 1.0, "e.weight": 1.0}),),
+        pair=("standard_euler", "rk4"),
+        finding="By Standard Euler the axis leaves its cusps. Runge-Kutta 4 meets every one.",
+        rate=1.0,
+    ),
 }
 
 

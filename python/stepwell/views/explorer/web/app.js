@@ -1,7 +1,8 @@
 // The page: its controls, the loop over frames, and the link that holds its state.
 
+import { conserved } from "./conserved.js";
 import { limitOf, marksOf } from "./limits.js";
-import { colourOf, palette } from "./palette.js";
+import { colourOf, inkOn, palette } from "./palette.js";
 import { draw, tell } from "./pictures.js";
 import { Race } from "./race.js";
 import { sliderOf } from "./slider.js";
@@ -13,8 +14,8 @@ import { Trajectory, unpack } from "./trajectory.js";
 const STEP_BUDGET = 8;
 // The longest time between two frames that counts, in seconds: a page in the background does not run on.
 const MAX_FRAME = 0.1;
-// Milliseconds between two updates of texts and roots.
-const SELDOM = 120;
+// Milliseconds between two updates of texts and roots, which are those of either run in turn.
+const SELDOM = 60;
 // Seconds that a trail goes back.
 const TRAIL = 5;
 // The ends of the slider of dt, as multiples of the scene's step.
@@ -28,7 +29,8 @@ const still = matchMedia("(prefers-reduced-motion: reduce)");
 
 const page = {
   scene: null,
-  keys: ["false_euler", "rk4"],
+  keys: ["", ""],
+  chosen: [false, false], // whether a user chose the method: it then stays with the next scene
   dt: 0.1,
   speed: 0,
   phase: 0,
@@ -37,13 +39,16 @@ const page = {
   race: null,
   target: 0, // the time up to which steps are wanted
   roots: [[], []],
+  trueRoots: [[], []],
+  ellipses: [null, null],
+  shears: [null, null],
   limits: [null, null],
   framesMs: [],
 };
 
 // ---- stability limits on the slider of dt
 
-const ends = () => DT_ENDS.map((share) => share * page.scene.dt);
+const ends = () => [Math.min(page.scene.dt, page.scene.step) * DT_ENDS[0], Math.max(page.scene.dt, page.scene.step) * DT_ENDS[1]];
 const place = (dt) => Math.log(dt / ends()[0]) / Math.log(ends()[1] / ends()[0]);
 
 function showLimits() {
@@ -66,9 +71,10 @@ async function load(name, words = {}) {
   scene.sources ??= await unpack(scene.packed);
   page.scene = scene;
   const known = Object.keys(scene.steps).filter((key) => key !== "truth");
-  const asked = [words.a ?? page.keys[0], words.b ?? page.keys[1]];
-  page.keys = asked.map((key, i) => (known.includes(key) ? key : known.includes(["false_euler", "rk4"][i]) ? ["false_euler", "rk4"][i] : known[0]));
-  page.dt = number(words.dt, ...ends().map((end, i) => end * [0.01, 100][i]), scene.dt);
+  const asked = [words.a, words.b];
+  page.chosen = asked.map((key) => known.includes(key));
+  page.keys = asked.map((key, i) => [key, scene.pair[i], "false_euler", "rk4"].find((each) => known.includes(each)) ?? known[0]);
+  page.dt = number(words.dt, ...ends().map((end, i) => end * [0.01, 100][i]), scene.step);
   page.speed = number(words.speed, -4, 4, 0);
   page.phase = Math.round(number(words.phase, 0, scene.phases.length - 1, scene.phase));
   page.values = {};
@@ -101,6 +107,7 @@ function fillControls(known) {
   const { scene } = page;
   document.title = `${scene.title} · stepwell explorer`;
   byId("scene").value = scene.name;
+  say("title", scene.title);
   say("about", scene.description);
   LANES.forEach((lane, i) => {
     const options = data.methods.map((each) => option(each.name, each.title, known.includes(each.name) ? "" : scene.refused[each.name]));
@@ -132,18 +139,35 @@ function showNumbers() {
 // Begin anew with the settings as they are.
 function restart() {
   const { scene } = page;
-  page.race = new Race(scene, page.keys, page.dt, page.values, trailTime());
+  const { right } = scene.phases[page.phase];
+  page.race = new Race(scene, page.keys, page.dt, page.values, trailTime(), right);
+  page.ellipses = page.keys.map((key) => conserved(scene, key, page.dt, page.values));
+  page.shears = page.keys.map((key) => (scene.linear && scene.phases.length === 1 ? methods.get(key).shears : null));
+  byId("error").closest("figure").hidden = page.race.truth.until === 0;
+  showFinding();
   page.target = 0;
   page.zoom = 1; // pictures zoom out while a run goes on, and in again with the next
   page.told = ["", ""];
-  say("truth", page.race.truth.about);
   showLimits();
   if (byId("code").open) showCode();
-  const [a, b] = colours();
-  document.documentElement.style.setProperty("--a", a);
-  document.documentElement.style.setProperty("--b", b);
+  setColours();
   page.dirty = true;
   page.seldom = 0;
+}
+
+// The finding of a scene is true with its own methods, step and parameters.
+function showFinding() {
+  const { scene, keys, dt, values } = page;
+  const own = keys.every((key, i) => key === scene.pair[i]) && dt === scene.step && scene.sliders.every(({ name, value }) => values[name] === value);
+  say("finding", own ? scene.finding : "");
+}
+
+function setColours() {
+  const { style } = document.documentElement;
+  colours().forEach((colour, i) => {
+    style.setProperty(`--${LANES[i]}`, colour);
+    style.setProperty(`--on-${LANES[i]}`, inkOn(colour));
+  });
 }
 
 function showCode() {
@@ -244,7 +268,7 @@ const trailTime = () => TRAIL * page.scene.rate * 2 ** page.speed;
 
 function show() {
   draw(page, colours(), trailTime());
-  tell(page, methods, colours(), announce);
+  tell(page, methods, colours(), announce, LANES);
 }
 
 function frame(now) {
@@ -264,7 +288,8 @@ function frame(now) {
     draw(page, colours(), trailTime());
     if (began - (page.seldom || 0) > SELDOM || page.dirty) {
       page.seldom = began;
-      tell(page, methods, colours(), announce);
+      page.turn = 1 - (page.turn ?? 1);
+      tell(page, methods, colours(), announce, page.dirty ? LANES : [LANES[page.turn]]);
     }
     page.dirty = false;
     if (page.playing) {
@@ -281,18 +306,21 @@ function listen() {
   on("scene", "change", async (event) => {
     const going = page.playing;
     play(false);
-    await load(event.target.value, { a: page.keys[0], b: page.keys[1] });
+    const [a, b] = page.keys.map((key, i) => (page.chosen[i] ? key : undefined));
+    await load(event.target.value, { a, b });
     play(going);
   });
   LANES.forEach((lane, i) =>
     on(`method-${lane}`, "change", (event) => {
       page.keys[i] = event.target.value;
+      page.chosen[i] = true;
       restart();
       wanted();
     }),
   );
   on("phase", "change", (event) => {
     page.phase = Number(event.target.value);
+    if (!page.scene.energy) restart(); // the curve is then that of another number
     page.dirty = true;
     wanted();
   });
@@ -327,9 +355,7 @@ function listen() {
 }
 
 function restartColours() {
-  const [a, b] = colours();
-  document.documentElement.style.setProperty("--a", a);
-  document.documentElement.style.setProperty("--b", b);
+  setColours();
   showLimits();
 }
 

@@ -54,7 +54,7 @@ export function marksOf(limits, place, colours) {
     node.textContent = `${mark.lanes} ${short(mark.limit)}`;
     node.title = `stable up to dt = ${mark.limit}`;
     node.style.left = `${100 * mark.at}%`;
-    node.style.color = mark.colour;
+    node.style.setProperty("--mark", mark.colour);
     if (marks.length === 2) node.className = i ? "east" : "west";
     else if (mark.at > 0.9 || mark.at < 0.1) node.className = mark.at > 0.5 ? "west" : "east";
     return node;

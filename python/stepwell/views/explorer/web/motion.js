@@ -31,12 +31,31 @@ function disc(pen, [x, y], radius, fill) {
   else pen.stroke();
 }
 
+// The true place of a block, around it.
+function outline(pen, x, y, long, high, look) {
+  pen.strokeStyle = look.truth;
+  pen.lineWidth = 2.5;
+  pen.strokeRect(x - long / 2 - 3, y - high / 2 - 3, long + 6, high + 6);
+}
+
 // A zigzag from one place to another.
-function spring(pen, [x0, y], [x1]) {
+function spring(pen, [x0, y], [x1], half) {
   const turns = 12;
   const points = [[x0, y]];
-  for (let i = 1; i < turns; i++) points.push([x0 + ((x1 - x0) * (i - 0.5)) / (turns - 1), y + (i % 2 ? -6 : 6)]);
+  for (let i = 1; i < turns; i++) points.push([x0 + ((x1 - x0) * (i - 0.5)) / (turns - 1), y + (i % 2 ? -half : half)]);
   line(pen, [...points, [x1, y]]);
+}
+
+// What a pen on the block draws on paper that is drawn away downwards: the place over the last seconds, and the true one in grey.
+function strip(pen, { trail, trueTrail, now }, look, right, top, bottom) {
+  const down = ({ k }) => top + ((now - k * look.dt) / look.back) * (bottom - top);
+  const seen = (states) => states.filter((state) => down(state) <= bottom).map((state) => [right(state.y[0]), down(state)]);
+  pen.lineWidth = 2.5;
+  pen.strokeStyle = look.truth;
+  line(pen, seen(trueTrail));
+  pen.lineWidth = 1.75;
+  pen.strokeStyle = look.colour;
+  line(pen, seen(trail));
 }
 
 // Points of a block of states in the plane of the picture.
@@ -63,43 +82,43 @@ function boxOf(ranges, motion) {
 
 // How each kind draws: of a sheet, what is to be drawn, and the look.
 const KINDS = {
-  spring({ pen, width, height }, { y, truth, range }, look) {
-    const { at } = window_([Math.min(range[0], 0) * 1.15, Math.max(range[1], 0) * 1.15, -0.1, 0.1], width, height, 34);
-    const wall = 10;
-    const middle = height / 2;
-    const [x] = at([y[0], 0]);
+  spring({ pen, width, height }, drawn, look) {
+    const { y, truth, range } = drawn;
+    const size = Math.min(0.2 * height, 56);
+    const { at } = window_([Math.min(range[0], 0) * 1.1, Math.max(range[1], 0) * 1.1, -0.01, 0.01], width, height, size / 2 + 12);
+    const right = (z) => at([z, 0])[0];
+    const wall = 8;
+    const middle = 10 + size / 2;
+    const ground = middle + size / 2;
     pen.strokeStyle = look.faint;
     pen.lineWidth = 1;
-    line(pen, [[wall, middle - 34], [wall, middle + 14], [width - 6, middle + 14]]);
-    const [rest] = at([0, 0]);
+    line(pen, [[wall, 4], [wall, ground], [width - 6, ground]]);
     pen.setLineDash([3, 4]);
-    line(pen, [[rest, middle - 30], [rest, middle + 14]]);
+    line(pen, [[right(0), 4], [right(0), height - 4]]);
     pen.setLineDash([]);
-    if (truth) {
-      const [there] = at([truth.y[0], 0]);
-      pen.strokeStyle = look.truth;
-      pen.strokeRect(there - 13, middle - 13, 26, 26);
-    }
+    strip(pen, drawn, look, right, ground + 6, height - 4);
     pen.strokeStyle = look.faint;
-    pen.lineWidth = 1.5;
-    spring(pen, [wall, middle], [x - 13, middle]);
+    pen.lineWidth = 2;
+    const x = right(y[0]);
+    spring(pen, [wall, middle], [x - size / 2, middle], size / 4);
     pen.fillStyle = look.colour;
-    pen.fillRect(x - 13, middle - 13, 26, 26);
+    pen.fillRect(x - size / 2, middle - size / 2, size, size);
+    if (truth) outline(pen, right(truth.y[0]), middle, size, size, look);
   },
 
-  block(paper, given, look) {
-    const { pen, width, height } = paper;
-    const { at } = window_([given.range[0], given.range[1], -0.05, 0.05], width, height, 34);
+  block({ pen, width, height }, drawn, look) {
+    const { y, truth, range } = drawn;
+    const [long, high] = [Math.min(0.26 * height, 72), Math.min(0.2 * height, 56)];
+    const { at } = window_([range[0], range[1], -0.01, 0.01], width, height, long / 2 + 12);
+    const right = (z) => at([z, 0])[0];
+    const ground = 10 + high;
     pen.strokeStyle = look.faint;
     pen.lineWidth = 1;
-    const ground = height / 2 + 14;
     line(pen, [[8, ground], [width - 8, ground]]);
-    if (given.truth) {
-      pen.strokeStyle = look.truth;
-      pen.strokeRect(at([given.truth.y[0], 0])[0] - 16, ground - 26, 32, 26);
-    }
+    strip(pen, drawn, look, right, ground + 6, height - 4);
     pen.fillStyle = look.colour;
-    pen.fillRect(at([given.y[0], 0])[0] - 16, ground - 26, 32, 26);
+    pen.fillRect(right(y[0]) - long / 2, ground - high, long, high);
+    if (truth) outline(pen, right(truth.y[0]), ground - high / 2, long, high, look);
   },
 
   pendulum({ pen, width, height }, { y, truth }, look) {
@@ -172,7 +191,8 @@ const KINDS = {
     pen.globalAlpha = 1;
     if (truth) {
       pen.strokeStyle = look.truth;
-      placesOf(truth.y, dim).forEach((place) => disc(pen, at(place), 8, false));
+      pen.lineWidth = 2.25;
+      placesOf(truth.y, dim).forEach((place) => disc(pen, at(place), 9, false));
     }
     pen.strokeStyle = look.text;
     pen.lineWidth = 1.5;
@@ -219,21 +239,36 @@ const KINDS = {
     disc(pen, at(seen(turned(y, [0, 0, 1.2]))), 4, true);
   },
 
-  // Numbers of a state over the steps of the trail, for systems of which the page knows nothing else.
-  curves({ pen, width, height }, { y, trail, ranges, block }, look) {
+  // Numbers of a state over the time of the trail, for systems of which the page knows nothing else.
+  curves({ pen, width, height }, { y, trail, trueTrail, ranges, block, truth }, look) {
     const low = Math.min(...ranges.map((each) => each[0]));
     const high = Math.max(...ranges.map((each) => each[1]));
     const up = (z) => height - 12 - ((z - low) / (high - low || 1)) * (height - 24);
-    const x = (i) => 8 + ((width - 22) * i) / Math.max(1, trail.length - 1);
-    pen.strokeStyle = look.colour;
-    pen.fillStyle = look.colour;
-    for (let i = 0; i < Math.min(y.length, 12); i++) {
+    const end = Math.max(trail.at(-1)?.k ?? 0, trueTrail.at(-1)?.k ?? 0);
+    const begin = Math.min(trail[0]?.k ?? 0, trueTrail[0]?.k ?? 0);
+    const x = (k) => 8 + ((width - 40) * (k - begin)) / Math.max(1, end - begin);
+    const path = (states, i) => line(pen, states.map((state) => [x(state.k), up(state[block][i])]));
+    const count = Math.min(y.length, 12);
+    pen.font = look.font;
+    pen.textAlign = "left";
+    for (let i = 0; i < count; i++) {
+      pen.strokeStyle = look.truth;
+      pen.lineWidth = 3.5;
+      path(trueTrail, i);
+      pen.strokeStyle = look.colour;
+      pen.fillStyle = look.colour;
       pen.globalAlpha = 1 - 0.06 * i;
       pen.lineWidth = 1.5;
-      line(pen, trail.map((state, k) => [x(k), up(state[block][i])]));
-      disc(pen, [x(trail.length - 1), up(y[i])], 3, true);
+      path(trail, i);
+      disc(pen, [x(trail.at(-1)?.k ?? 0), up(y[i])], 3, true);
+      pen.globalAlpha = 1;
+      if (truth) {
+        pen.strokeStyle = look.truth;
+        disc(pen, [x(end), up(truth[block][i])], 7, false);
+      }
+      pen.fillStyle = look.text;
+      pen.fillText(count > 1 ? `${block}[${i}]` : block, x(end) + 10, up(truth ? truth[block][i] : y[i]) + 4);
     }
-    pen.globalAlpha = 1;
   },
 };
 
@@ -279,13 +314,14 @@ export function widened(ranges, zoom) {
 
 // Draw a run: its state, the true one if that is known, its trail; look has the colours.
 export function drawMotion(paper, scene, allRanges, run, truth, trail, look) {
+  const trueTrail = look.truthTrail;
   const state = run.lost === null ? run : (trail.at(-1) ?? run);
   const block = state.y.length ? "y" : "v";
   const ranges = allRanges[block];
   const range = [Math.min(...ranges.map((each) => each[0])), Math.max(...ranges.map((each) => each[1]))];
   const { motion } = scene;
   if (run.lost !== null) paper.pen.globalAlpha = 0.35;
-  KINDS[motion.kind](paper, { y: state[block], truth, trail, motion, range, ranges, block }, look);
+  KINDS[motion.kind](paper, { y: state[block], truth, trail, trueTrail, motion, range, ranges, block, now: look.now }, look);
   paper.pen.globalAlpha = 1;
   if (motion.kind !== "pendulum" && motion.kind !== "body" && outside(state[block], ranges)) {
     paper.pen.fillStyle = look.bad;

@@ -24,6 +24,13 @@ export function colourOf(method, dark) {
   return `rgb(${channels.map((x) => Math.round(255 * (x + (1 - x) * share))).join(" ")})`;
 }
 
+// Black or white, whichever is read more easily on a colour.
+export function inkOn(colour) {
+  const channels = colour.startsWith("#") ? [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16)) : colour.match(/\d+/g).map(Number);
+  const [r, g, b] = channels.map((x) => (x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b > 0.179 ? "#000000" : "#ffffff"; // the light at which both have the same contrast
+}
+
 // The context of a canvas, cleared, in CSS pixels, and its size in these.
 export function sheet(canvas) {
   const ratio = Math.min(window.devicePixelRatio || 1, 3);

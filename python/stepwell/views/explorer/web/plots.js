@@ -1,8 +1,12 @@
 // The phase plane, the z-plane, and curves over time.
 
 import { radius } from "./roots.js";
+import { power } from "./texts.js";
 
 const MARGIN = 10;
+
+// So many of the last steps show their shears.
+const SHEARS = 12;
 
 // Curves leave the picture where they are this many of its sizes away.
 const FAR = 3;
@@ -46,6 +50,15 @@ export function drawPhase({ pen, width, height }, ranges, pair, run, truth, trai
   pen.lineWidth = 1;
   curve(pen, [[x(0), 0], [x(0), height]]);
   curve(pen, [[0, y(0)], [width, y(0)]]);
+  pen.strokeStyle = look.truth;
+  curve(pen, look.truthTrail.map(of));
+  if (look.ellipse) {
+    pen.strokeStyle = look.text;
+    pen.setLineDash([5, 4]);
+    curve(pen, look.ellipse.map(([v, z]) => of({ v: [v], y: [z] })));
+    pen.setLineDash([]);
+  }
+  if (look.shears) drawShears(pen, trail, of, look);
   pen.strokeStyle = look.colour;
   pen.lineWidth = 1.25;
   pen.globalAlpha = 0.7;
@@ -78,9 +91,23 @@ export function drawPhase({ pen, width, height }, ranges, pair, run, truth, trai
   pen.fillText(pair.up[2], Math.min(Math.max(x(0) + 5, 4), width - 24), 13);
 }
 
-// The unit circle and roots, which may be far outside.
-export function drawRoots({ pen, width, height }, roots, look) {
-  const most = Math.min(Math.max(1.15, radius(roots) * 1.1 || 0), 4);
+// The last steps as the two shears of which each is made: one block changes, then the other.
+function drawShears(pen, trail, of, look) {
+  const corners = [];
+  for (let i = Math.max(1, trail.length - SHEARS); i < trail.length; i++) {
+    const [before, after] = [trail[i - 1], trail[i]];
+    corners.push(before, look.shears === "vy" ? { v: after.v, y: before.y } : { v: before.v, y: after.y }, after);
+  }
+  pen.strokeStyle = look.faint;
+  pen.lineWidth = 1.25;
+  curve(pen, corners.map(of));
+}
+
+// The unit circle, the roots of a step, which may be far outside, and those of the true motion as rings. A root is red where it
+// means that the method is unstable: it is outside in a linear scene whose true motion does not grow as fast.
+export function drawRoots({ pen, width, height }, roots, trueRoots, linear, look) {
+  const worst = linear ? Math.max(1, radius(trueRoots) || 0) + 1e-6 : Infinity;
+  const most = Math.min(Math.max(1.15, radius(roots) * 1.1 || 0, radius(trueRoots) * 1.1 || 0), 4);
   const unit = (Math.min(width, height) / 2 - MARGIN) / most;
   const at = (z) => {
     const size = Math.hypot(z.re, z.im);
@@ -100,10 +127,17 @@ export function drawRoots({ pen, width, height }, roots, look) {
   pen.font = look.font;
   pen.textAlign = "left";
   pen.fillText("z", 5, 14);
+  pen.strokeStyle = look.truth;
+  pen.lineWidth = 1.75;
+  for (const root of trueRoots) {
+    pen.beginPath();
+    pen.arc(...at(root), 6, 0, 2 * Math.PI);
+    pen.stroke();
+  }
   for (const root of roots) {
     const [x, y] = at(root);
     pen.lineWidth = 2.25;
-    pen.strokeStyle = Math.hypot(root.re, root.im) > 1 + 1e-6 ? look.bad : look.colour;
+    pen.strokeStyle = Math.hypot(root.re, root.im) > worst ? look.bad : look.colour;
     curve(pen, [[x - 4, y - 4], [x + 4, y + 4]]);
     curve(pen, [[x - 4, y + 4], [x + 4, y - 4]]);
   }
@@ -120,9 +154,6 @@ function ticks(low, high, most) {
 }
 
 const written = (x) => (x !== 0 && (Math.abs(x) >= 1e5 || Math.abs(x) < 1e-3) ? x.toExponential(0).replace("e+", "e") : String(x));
-
-const EXPONENTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
-const power = (n) => `10${n < 0 ? "⁻" : ""}${[...String(Math.abs(n))].map((digit) => EXPONENTS[digit]).join("")}`;
 
 // Curves over time: each has values and a look; with log, their decimal logarithms are drawn.
 export function drawCurves({ pen, width, height }, t, curves, range, look, log) {

@@ -117,8 +117,15 @@ export class Trajectory {
     return this;
   }
 
-  // The derivatives of the state after a step by that before it; blocks in the order of their names in the state.
-  jacobian() {
+  // Go on from a state at a time in steps.
+  goTo(step, v, y) {
+    this.s = this.m.start(...[v, y].filter((block) => block.length));
+    this.s.step = step;
+    return this;
+  }
+
+  // The derivatives of the state after steps by that before them; blocks in the order of their names in the state.
+  jacobian(steps = 1) {
     const { m, s, slot } = this;
     const { scales, linear } = this.scene;
     const blocks = [slot, "y"].filter((name) => name && s[name]?.length);
@@ -128,7 +135,7 @@ export class Trajectory {
       const copy = { ...s };
       for (const each of blocks) copy[each] = linear ? new Float64Array(s[each].length) : Float64Array.from(s[each]);
       if (name) copy[name][i] += x;
-      m.step(copy);
+      for (let k = 0; k < steps; k++) m.step(copy);
       return blocks.flatMap((each) => Array.from(copy[each]));
     };
     const rest = linear ? after(null, 0, 0) : null;
