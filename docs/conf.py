@@ -31,6 +31,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
+    "explorer_parts",
 ]
 exclude_patterns = ["gallery/**.ipynb", "gallery/**.py"]
 nitpicky = True

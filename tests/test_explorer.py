@@ -25,7 +25,7 @@ from support.explored import CHANGED, STEPS, data_of, expected, in_node, needs_n
 RUN = """
 told = given.map(([name, key, values, steps]) => {
   const run = new Trajectory(scene(name), key, scene(name).dt, values).steps(steps);
-  return [...run.v, ...run.y].map(bits);
+  return run.lost === null ? [...run.v, ...run.y].map(bits) : [`lost after ${run.lost}`];
 });
 """
 

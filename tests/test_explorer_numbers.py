@@ -130,6 +130,9 @@ def energies(folder: Path, change: Any = None) -> list[tuple[str, float, float]]
     every = []
     for name in sliders.OFFERS:
         scene = scene_of(name)
+        if data_of(name)["energy"] is None:
+            assert name in ("van_der_pol", "rober")  # equations without a formula for it
+            continue
         for _ in range(3):
             every.append((name, rng.normal(size=scene.system.v_shape), rng.normal(size=scene.system.y_shape)))
     got = in_node(ENERGY, folder, [[name, np.ravel(v).tolist(), np.ravel(y).tolist()] for name, v, y in every], change)

@@ -129,9 +129,9 @@ def lost(site: Path) -> list[str]:
                 good = parts.scheme == "https" and re.fullmatch(r"[\w-]+(\.[\w-]+)+", parts.netloc)
             else:
                 target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
-                good = target.is_file() and (
-                    not parts.fragment or target.suffix != ".html" or unquote(parts.fragment) in read(target).places
-                )
+                # What stands behind the # of the explorer is its state.
+                place = unquote(parts.fragment) if target.suffix == ".html" and target.name != "explorer.html" else ""
+                good = target.is_file() and (not place or place in read(target).places)
             if not good:
                 broken.append(f"{path.relative_to(site)}: {link}")
     return broken
@@ -307,3 +307,84 @@ def test_formulas_are_mathematics(site: Path) -> None:
     text = (site / "theory" / "stability.html").read_text(encoding="utf-8")
     assert text.count("<math ") > 4
     assert "\\begin{pmatrix}" not in text
+
+
+# ---- the explorer
+
+
+def states(site: Path) -> dict[str, list[str]]:
+    """The states that links to the explorer restore, by page."""
+    found = {path.relative_to(site).as_posix(): read(path).links for path in site.rglob("*.html")}
+    return {page: ends for page, links in found.items() if (ends := [x.partition("#")[2] for x in links if "explorer.html" in x])}
+
+
+def test_every_page_about_a_scene_opens_it_in_the_explorer(site: Path) -> None:
+    """Found by another way than the site does: a page whose code makes a scene that the explorer has."""
+    offered = {scene.name for scene in sw.explore().scenes}
+    linked = states(site)
+    about = 0
+    for path in site.rglob("*.html"):
+        page = path.relative_to(site).as_posix()
+        if (
+            re.match(r"index|developing/|reference/|genindex|search|py-modindex|explorer|_|howto/explorer", page)
+            or "/index" in page
+        ):
+            continue
+        text = re.sub(r"<[^>]+>", "", path.read_text(encoding="utf-8"))
+        named = set(re.findall(r"scenes\.(\w+)\(", text)) & offered
+        opened = {dict(pair.split("=") for pair in state.split("&"))["scene"] for state in linked.get(page, [])}
+        assert named <= opened, page
+        about += bool(opened)
+    assert about > 30
+    assert "scene=oscillator&a=false_euler&b=rk4&dt=0.5" in linked["gallery/methods/energies.html"]
+
+
+@needs_browser
+def test_links_to_the_explorer_open_their_state(site: Path, browser: Any) -> None:
+    page = browser.new_page()
+    page.set_default_timeout(60_000)
+    for state in sorted({each for ends in states(site).values() for each in ends}):
+        page.goto("about:blank")
+        page.goto((site / "explorer.html").as_uri() + f"#{state}&play=0")
+        page.evaluate("explorer.page.ready")
+        words = dict(pair.split("=") for pair in state.split("&"))
+        got = page.evaluate(
+            "({ scene: explorer.page.scene.name, a: explorer.page.keys[0], b: explorer.page.keys[1], dt: explorer.page.dt })"
+        )
+        assert {name: str(got[name]).removesuffix(".0") for name in words} == {
+            name: word.removesuffix(".0") for name, word in words.items()
+        }
+    page.close()
+
+
+@needs_browser
+@pytest.mark.parametrize("name", ["index", "howto/explorer"])
+def test_the_explorer_is_live_on_pages_and_loaded_when_it_is_seen(site: Path, browser: Any, name: str) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.set_default_timeout(60_000)
+    page.goto((site / f"{name}.html").as_uri())
+    frame = page.locator("iframe.explorer")
+    assert frame.get_attribute("loading") == "lazy"
+    assert "srcdoc" not in (frame.evaluate("(node) => node.outerHTML")), "one file for all pages"
+    frame.scroll_into_view_if_needed()
+    inside = page.frame_locator("iframe.explorer")
+    inside.locator("#play").wait_for()
+    live = next(each for each in page.frames if "explorer.html" in each.url)
+    live.wait_for_function("window.explorer?.page.race?.k > 3")
+    assert live.evaluate("explorer.page.playing")
+    # The part that is played with is seen without scrolling in the frame.
+    height = frame.bounding_box()["height"]
+    for each in ("#motion-a", "#motion-b", "#error-a", "#energy", "#error"):
+        box = live.evaluate("(name) => document.querySelector(name).getBoundingClientRect().bottom", each)
+        assert box <= height, each
+    page.close()
+
+
+@needs_browser
+def test_the_page_on_false_euler_is_one_sheet(site: Path, browser: Any, tmp_path: Path) -> None:
+    """A4, as the browser prints it."""
+    page = browser.new_page()
+    page.goto((site / "theory" / "why_false_euler_works.html").as_uri())
+    sheet = page.pdf(format="A4", margin=dict.fromkeys(("top", "bottom", "left", "right"), "12mm"))
+    page.close()
+    assert len(re.findall(rb"/Type\s*/Page\b", sheet)) == 1
