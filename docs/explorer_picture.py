@@ -15,7 +15,7 @@ PICTURE = Path(__file__).resolve().parent / "images" / "explorer.png"
 
 #: Of the picture: the link, the milliseconds that the page plays for a trail, the window in pixels, how many colours are kept.
 LINK, PLAYED, WINDOW, COLOURS = (
-    "#scene=clover&a=false_euler&b=rk4&dt=0.2&play=1",
+    "#scene=clover&play=1",
     6500,
     (1180, 1060),
     96,

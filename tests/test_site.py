@@ -130,7 +130,7 @@ def lost(site: Path) -> list[str]:
             else:
                 target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
                 # What stands behind the # of the explorer is its state.
-                place = unquote(parts.fragment) if target.suffix == ".html" and target.name != "explorer.html" else ""
+                place = unquote(parts.fragment) if target.suffix == ".html" and target != site / "explorer.html" else ""
                 good = target.is_file() and (not place or place in read(target).places)
             if not good:
                 broken.append(f"{path.relative_to(site)}: {link}")
@@ -315,7 +315,11 @@ def test_formulas_are_mathematics(site: Path) -> None:
 def states(site: Path) -> dict[str, list[str]]:
     """The states that links to the explorer restore, by page."""
     found = {path.relative_to(site).as_posix(): read(path).links for path in site.rglob("*.html")}
-    return {page: ends for page, links in found.items() if (ends := [x.partition("#")[2] for x in links if "explorer.html" in x])}
+    return {
+        page: ends
+        for page, links in found.items()
+        if (ends := [x.partition("#")[2] for x in links if "explorer.html#scene=" in x])
+    }
 
 
 def test_every_page_about_a_scene_opens_it_in_the_explorer(site: Path) -> None:
@@ -369,7 +373,7 @@ def test_the_explorer_is_live_on_pages_and_loaded_when_it_is_seen(site: Path, br
     frame.scroll_into_view_if_needed()
     inside = page.frame_locator("iframe.explorer")
     inside.locator("#play").wait_for()
-    live = next(each for each in page.frames if "explorer.html" in each.url)
+    live = next(each for each in page.frames if "explorer.html#" in each.url)
     live.wait_for_function("window.explorer?.page.race?.k > 3")
     assert live.evaluate("explorer.page.playing")
     # The part that is played with is seen without scrolling in the frame.

@@ -303,7 +303,7 @@ export function zoomFor(ranges, states) {
       }
     });
   }
-  return most > 1.1 ? Math.min(MAX_ZOOM, Math.ceil(2 * most) / 2) : 1;
+  return most > 1.1 ? Math.min(MAX_ZOOM, Math.ceil(4 * most) / 4) : 1;
 }
 
 // Ranges that are this many times as wide, about the same middle.
