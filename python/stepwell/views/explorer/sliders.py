@@ -172,7 +172,7 @@ OFFERS: dict[str, Offer] = {
             "Leapfrog's step is too long for the near collision at t = 1.9 and throws the bodies apart. DOP853 passes "
             "it with the same step."
         ),
-        rate=2.0,
+        rate=1.0,
     ),
     "arenstorf": Offer(
         (SPEED,),

@@ -11,7 +11,7 @@ import { LANES, byId, say, short } from "./texts.js";
 import { Trajectory, unpack } from "./trajectory.js";
 
 // Milliseconds of a frame in which steps are made; the rest of its 16 is for drawing.
-const STEP_BUDGET = 8;
+const STEP_BUDGET = 6;
 // The longest time between two frames that counts, in seconds: a page in the background does not run on.
 const MAX_FRAME = 0.1;
 // Milliseconds between two updates of texts and roots, which are those of either run in turn.
