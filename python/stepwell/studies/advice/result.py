@@ -162,7 +162,7 @@ class Advice:
         evaluations = best.evaluations_per_frame if best.evaluations_per_frame is not None else best.evaluations_per_time
         worst = f", {best.worst_evaluations} in the worst frame" if best.tolerance is not None and best.worst_evaluations else ""
         counted = f"{evaluations:.4g} function evaluation{'s' * (evaluations != 1)}{worst}"
-        lines.append(f"Cost {per}: {counted}; {ns:.2g} ns measured in a batch on one thread.")
+        lines.append(f"Cost per {per.removeprefix('a ')}: {counted}; {ns:.2g} ns measured in a batch on one thread.")
         lines += self._as_cheap(best) + self._beside(best)
         if best.objects is not None:
             objects = f"{about(best.objects)} such object{'s' * (best.objects != 1)}{', also then' * bool(worst)}"

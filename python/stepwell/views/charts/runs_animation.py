@@ -31,7 +31,7 @@ MOST_FRAMES = 20_000
 
 #: Inches of an animation with panels beside the motion, dots per inch for a width of 1000 pixels, and inches of a motion alone:
 #: the width, and the least height.
-SIZE, DPI = (13.6, 7.65), 1000.0 / 13.6
+SIZE, DPI = (12.8, 7.2), 1000.0 / 12.8
 ALONE, LOWEST = 9.0, 4.0
 
 #: What is above and below a motion alone, in inches.
@@ -105,9 +105,9 @@ def stage(chart: RunPicture) -> tuple[Figure, Show]:
     width, height = _size_alone(points) if points is not None and alone else SIZE
     figure = new_figure(width, height)
     figure.set_dpi(DPI)
-    now = figure.text(1.0 - 0.3 / width, 1.0 - 0.68 / height, "", size=17 if alone else 20, ha="right", family="monospace")
-    title(figure, 0.16 / width, 1.0 - 0.4 / height, chart.title, 20)
-    figure.text(0.16 / width, 1.0 - 0.7 / height, steps_of(chart.run), size=15, color=GREY)
+    now = figure.text(1.0 - 0.3 / width, 1.0 - 0.6 / height, "", size=17 if alone else 20, ha="right", family="monospace")
+    title(figure, 0.16 / width, 1.0 - 0.34 / height, chart.title, 20)
+    figure.text(0.16 / width, 1.0 - 0.6 / height, steps_of(chart.run), size=15, color=GREY)
     motions = {"attitude": _aircraft, "body": _body, "swing": _swing, "rows": _rows}
     if points is None:
         show_motion, moving, panels = motions[chart.kind](figure, chart)

@@ -197,7 +197,7 @@ def animate_aircraft(figure: Figure, chart: RunPicture) -> tuple[Callable[[int],
     axes = figure.add_axes((0.012, 0.06, 0.5, 0.8))
     turn = draw_solid(axes, solid)
     axes.text(0.5, 0.02, "dark wing: the right one", transform=axes.transAxes, ha="center", color=GREY, size=13)
-    panels = draw_angles(figure, chart, (0.56, 0.1, 0.36, 0.74))
+    panels = draw_angles(figure, chart, (0.56, 0.1, 0.335, 0.74))
     return lambda saved: turn(solid.matrices[..., saved]), panels
 
 

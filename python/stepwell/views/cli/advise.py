@@ -79,12 +79,18 @@ def _print(advice: Advice, notes: list[str]) -> None:
     show.table(
         advice.title,
         columns,
-        advice.table(),
+        [_without_exponents(row) for row in advice.table()],
         [f"{explained}.", *notes],
         answer=advice.summary(),
         least=("predicted", "objects", "dt"),
         marked=0,
     )
+
+
+def _without_exponents(row: tuple[str, ...]) -> list[str]:
+    """The row with its nanoseconds as plain numbers."""
+    place = COLUMNS.index("ns>")
+    return [*row[:place], show.number(float(row[place])), *row[place + 1 :]]
 
 
 def _frame(text: str) -> float | None:

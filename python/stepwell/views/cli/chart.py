@@ -130,7 +130,7 @@ def _summary(chart: WorkPrecision, files: list[str], error: str) -> None:
 def _best(chart: WorkPrecision) -> list[str]:
     """The cheapest method for each target error, in one line."""
     rows = [(error, row) for error in TARGETS if (row := chart.best(error)) is not None]
-    text = "; ".join(f"for {error:g} {row['method']} ({_step(row)})" for error, row in rows)
+    text = "; ".join(f"for {error:g} {row['method'].replace(', tolerance', '')} ({_step(row)})" for error, row in rows)
     return [f"Cheapest {text}."] if text else []
 
 
