@@ -56,7 +56,7 @@ def command(args: argparse.Namespace) -> None:
             ("scene", "methods>", "title", "sliders beside dt"),
             [(each["name"], str(len(each["methods"])), each["title"], ", ".join(each["sliders"]) or "none") for each in scenes],
             [f"A page of {size} for browsers since 2023; it needs no network."],
-            answer=written.notes(),
+            answer=written.notes() if args.output is not None else [f"opened in the browser: {written.files[0]}"],
             least=("methods", "title"),
         )
     written.close()
