@@ -43,6 +43,10 @@ def main() -> None:
                 IMAGES / f"explorer-{scheme}.png", optimize=True
             )
             if scheme == "light":
+                # What a link to the site becomes elsewhere: 1200 × 630 is the usual size.
+                card = Image.new("RGB", (1200, 630), "#f4f6f8")
+                card.paste(few.crop((0, 0, WINDOW[0], 630)), (10, 0))
+                card.save(IMAGES.parent / "_static" / "card.png", optimize=True)
                 few.save(IMAGES / "explorer.png", optimize=True)
         browser.close()
 
