@@ -22,6 +22,8 @@ from PIL import Image
 from stepwell import _core
 from stepwell.runs import engine
 
+import contact_errors
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -96,7 +98,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "work-precision-contact.png": ("bouncing_ball", "sliding_block", "sticking_block"),
 }
 #: Dots an inch of these, the largest pictures of all.
-PANEL_DPI = 75
+PANEL_DPI = 100
 #: Where the error of one step says nothing of the next, a table of the cheapest would list lucky ones.
 NO_ROWS = ("work-precision-contact.png",)
 
@@ -684,7 +686,9 @@ if __name__ == "__main__":
     write("heavy-top.png", sw.charts.run_picture(top, top.run("rk4", every=1)).plot())
     panels = {name: sw.charts.panel(scenes) for name, scenes in FAMILIES.items()}
     for name, panel in panels.items():
-        write(name, panel.plot(), PANEL_DPI)
+        contact = name == "work-precision-contact.png"
+        figure = contact_errors.draw(panel.charts) if contact else panel.plot()
+        write(name, figure, PANEL_DPI)
     write_best(
         chart
         for name, panel in panels.items()

@@ -301,6 +301,10 @@ PICTURES = {
     "chart": lambda: few_charts().charts[2].plot(),
     "panel": lambda: few_charts().plot(),
     "control": lambda: sw.charts.control("kepler", evaluations=600, relative=[1e-3, 1e-2, 0.1, 1.0, 10.0]).plot(),
+    "control of rods": lambda: sw.charts.control(
+        "conical_pendulum", evaluations=[100, 200, 400], relative=[0.01, 0.1, 1.0]
+    ).plot(),
+    "norm": lambda: sw.charts.norm().plot(),
     "figures": lambda: sw.charts.figures().plot(),
     "figure of one that looks exact": lambda: sw.charts.figures(["rk4"]).plot(method="rk4"),
     "loci": lambda: sw.charts.stability(COUNTED, phi=np.linspace(0.05, 3.0, 60)).plot(),

@@ -23,16 +23,16 @@ RESETTING: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.6, "marker
 STRIP = 0.1
 
 #: Letters of a line of the title, its height, where what is below it begins, and the height of the name of a column.
-LINE, LINE_HEIGHT, HEAD, COLUMN_TITLE = 112, 0.036, 0.93, 0.035
+LINE, LINE_HEIGHT, HEAD, COLUMN_TITLE = 84, 0.036, 0.93, 0.035
 
 #: Columns of the legend, the height of a row of it, and the lower end of the panels without any.
-LEGEND_COLUMNS, LEGEND_ROW, BOTTOM = 6, 0.027, 0.138
+LEGEND_COLUMNS, LEGEND_ROW, BOTTOM = 6, 0.03, 0.15
 
 
 def draw(chart: ControlSweep) -> Figure:
     """Draw the chart on a new figure."""
     count = len(chart.evaluations)
-    with page(16.0, 10.0) as figure:
+    with page(13.0, 9.4) as figure:
         head = textwrap.wrap(chart.answer or f"{chart.title}: lengths under control", LINE, break_on_hyphens=False)
         strip = STRIP
         gap = strip + 0.02
@@ -115,12 +115,21 @@ def _legend(figure: Figure, chart: ControlSweep) -> None:
     labels = [line.method.title for line in _firsts(chart)]
     handles += [Line2D([], [], color=GREY, **CONTROL), Line2D([], [], color=GREY, **RESETTING)]
     labels += ["under control", "lengths reset after every step"]
-    figure.legend(handles, labels, frameon=False, loc="lower left", bbox_to_anchor=(0.005, 0.042), ncols=LEGEND_COLUMNS)
+    figure.legend(
+        handles,
+        labels,
+        frameon=False,
+        loc="lower left",
+        bbox_to_anchor=(0.005, 0.055),
+        ncols=LEGEND_COLUMNS,
+        columnspacing=1.0,
+        handlelength=1.7,
+    )
     note = (
-        "Where a solid line is below the dashed one of its colour, control is better. Marks in the grey strip: the run diverged. "
+        "Where a solid line is below the dashed one of its colour, control is better. Marks in the grey strip: a run diverged.\n"
         "Reset lengths are exact to rounding, and not drawn."
     )
-    figure.text(0.012, 0.02, note, size=12, color=GREY)
+    figure.text(0.012, 0.012, note, size=12, color=GREY, linespacing=1.3)
 
 
 def _firsts(chart: ControlSweep) -> list[Held]:

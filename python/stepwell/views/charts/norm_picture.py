@@ -8,7 +8,7 @@ import numpy as np
 
 from .labels import title
 from .norm import NormSweep, Settled
-from .style import GREY, Axes, Figure, look, page
+from .style import GREY, Axes, Figure, ink, look, page
 
 #: The least and the largest ratio that are drawn: below a thirtieth, ratios do not matter.
 LEAST_RATIO, LARGEST_RATIO = 0.03, 30.0
@@ -23,13 +23,13 @@ LEAST_NORM = 1e-17
 APART = 1.3
 
 #: Shades of the halves in which control and resetting are better.
-BETTER, WORSE = "#e8f2ea", "#f7ebe6"
+BETTER, WORSE = "#f1f8f3", "#fcf4f0"
 
 
 def draw(chart: NormSweep) -> Figure:
     """Draw the chart on a new figure."""
-    with page(16.0, 8.2) as figure:
-        places = {"left": 0.065, "right": 0.985, "bottom": 0.145, "top": 0.8, "wspace": 0.17}
+    with page(13.0, 7.8) as figure:
+        places = {"left": 0.065, "right": 0.985, "bottom": 0.17, "top": 0.8, "wspace": 0.17}
         left, right = figure.subplots(1, 2, gridspec_kw=places)
         _ratios(left, chart)
         _norms(right, chart)
@@ -38,10 +38,11 @@ def draw(chart: NormSweep) -> Figure:
         what = f"A body turns steadily, by {degrees:.3g}° a step (Φ = ½h|ω| = {chart.phi:g}). Control adds k·(1 − q·q)·q to q̇."
         figure.text(0.012, 0.9, what, size=13.5, color=GREY)
         note = (
-            "Resetting divides q by its length after every step: its norm error is rounding, its angles are those without any "
-            "correction. A line ends where the norm no longer settles."
+            "Resetting divides q by its length after every step: its norm error is rounding, "
+            "its angles are those without any correction.\n"
+            "A line ends where the norm no longer settles."
         )
-        figure.text(0.012, 0.025, note, size=12, color=GREY)
+        figure.text(0.012, 0.02, note, size=12, color=GREY, linespacing=1.3)
     return figure
 
 
@@ -58,7 +59,7 @@ def finding(chart: NormSweep) -> str:
             )
     parts = [f"{' and '.join(names)} {when}" for when, names in titles.items() if names]
     text = ", ".join(parts)
-    return f"Norm of a quaternion: control beats resetting for {text}" if parts else "Norm of a quaternion under control"
+    return f"Quaternion: control beats resetting for {text}" if parts else "Norm of a quaternion under control"
 
 
 def _ratios(axes: Axes, chart: NormSweep) -> None:
@@ -71,7 +72,7 @@ def _ratios(axes: Axes, chart: NormSweep) -> None:
     axes.set_title("error of the angle of a step: control / resetting", loc="left", size=14)
     where: dict[str, Any] = {"transform": axes.transAxes, "size": 14, "color": "#555555", "style": "italic"}
     axes.text(0.02, 0.96, "resetting is better", va="top", **where)
-    axes.text(0.02, 0.04, "control is better", va="bottom", **where)
+    axes.text(0.02, 0.14, "control is better", va="bottom", **where)
     _gain(axes, chart)
     axes.set_ylim(LEAST_RATIO, LARGEST_RATIO)
     axes.set_yticks([0.1, 0.5, 1.0, 2.0, 10.0], ["0.1", "0.5", "1", "2", "10"])
@@ -119,7 +120,7 @@ def _labels(axes: Axes, chart: NormSweep, values: list[Any], names: list[str]) -
             apart = np.nanmin([np.full(len(own), np.inf), *(np.abs(np.log(own / other)) for other in done)], axis=0)
         if apart[at] < np.log(APART):
             at, side = known[int(np.argmax(apart[known]))], "right"
-        color = look(line.method)["color"]
+        color = ink(look(line.method)["color"])
         place: dict[str, Any] = {"textcoords": "offset points", "ha": side, "color": color, "size": 13.5}
         axes.annotate(name, (line.gains[at], own[at]), (0 if side == "left" else -12, 7), **place)
         done.append(own)

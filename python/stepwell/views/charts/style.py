@@ -75,7 +75,7 @@ def ink(colour: str) -> str:
 
     rgb = to_rgb(colour)
     share = 1.0
-    while contrast((share * rgb[0], share * rgb[1], share * rgb[2])) < CONTRAST:
+    while contrast((share * rgb[0], share * rgb[1], share * rgb[2])) < CONTRAST + 0.5:  # on a tinted ground, too
         share -= 0.01
     return str(to_hex((share * rgb[0], share * rgb[1], share * rgb[2])))
 
