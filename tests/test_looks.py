@@ -2,10 +2,12 @@
 
 import itertools
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import stepwell as sw
+from PIL import Image
 from stepwell.base.pictures import new_figure
 from stepwell.views.charts import cheapest_picture, labels, style
 from stepwell.views.charts.figures_picture import finding as figures_finding
@@ -415,3 +417,22 @@ def test_a_run_that_stays_on_the_orbit_says_by_how_much_it_is_late():
     assert abs(behind) > 2e-3
     assert late(whole) == pytest.approx(behind, abs=3e-4)
     assert finding_of_run(sw.charts.run_picture(circle, circle.run("leapfrog", 0.02, every=1))).startswith("the exact motion to ")
+
+
+@pytest.mark.parametrize("page", ["light", "dark"])
+def test_the_first_picture_begins_with_the_state_that_shows_its_finding(page):
+    """Previews show the first frame, which is the last state; it moves for eight seconds, and is a small file."""
+    path = Path(__file__).resolve().parent.parent / "docs" / "images" / f"energy-control-{page}.gif"
+    assert path.stat().st_size <= 1.5e6
+    with Image.open(path) as moving:
+        last, spent = moving.n_frames - 1, 0.0
+        frames = {}
+        for i in range(moving.n_frames):
+            moving.seek(i)
+            spent += moving.info["duration"] / 1000.0
+            if i in (0, 1, last):
+                frames[i] = np.asarray(moving.convert("RGB"))
+    assert 7.0 <= spent <= 9.0
+    np.testing.assert_array_equal(frames[0], frames[last])
+    assert (frames[0] != frames[1]).any(axis=2).mean() > 0.01
+    assert frames[0].shape[1] == 736
