@@ -108,7 +108,7 @@ def _before_and_after(figure: Figure, chart: RunPicture, before: RunPicture) -> 
     size = min(max(old.half, new.half), BEFORE_FACTOR * new.half)
     notes = []
     for i, (each, view, name) in enumerate(((before, old, "without control"), (chart, new, "with control"))):
-        axes = figure.add_axes((0.055 + 0.33 * i, BOTTOM, 0.275, TOP - BOTTOM))
+        axes = figure.add_axes((0.068 + 0.332 * i, BOTTOM, 0.265, TOP - BOTTOM))
         view = replace(view, centre=new.centre)
         square(axes, view, size)
         axes.locator_params(nbins=4)
