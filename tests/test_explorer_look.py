@@ -365,3 +365,12 @@ def test_frames_of_every_scene_leave_half_of_their_time(shown: Any, file: str) -
         if frames[len(frames) // 2] >= 8.4:
             slow[data["name"]] = frames[len(frames) // 2]
     assert not slow
+
+
+@needs_browser
+def test_what_grows_does_not_hide_the_ellipse_of_the_other(shown: Any, file: str) -> None:
+    shown.goto(file + "#scene=oscillator&at=40&play=0")
+    shown.evaluate("explorer.page.ready")
+    assert "stays on the ellipse v² − 0.3·v·y + y² = 1" in shown.locator("#phase-told-b").inner_text()
+    grown, stays = shown.evaluate("explorer.page.zooms")
+    assert stays < 1.5 < 3 < grown

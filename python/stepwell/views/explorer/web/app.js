@@ -43,6 +43,7 @@ const page = {
   ellipses: [null, null],
   shears: [null, null],
   limits: [null, null],
+  zooms: [1, 1],
   framesMs: [],
 };
 
@@ -146,6 +147,7 @@ function restart() {
   byId("error").closest("figure").hidden = page.race.truth.until === 0;
   showFinding();
   page.target = 0;
+  page.zooms = [1, 1]; // of the phase planes
   page.zoom = 1; // pictures zoom out while a run goes on, and in again with the next
   page.told = ["", ""];
   showLimits();

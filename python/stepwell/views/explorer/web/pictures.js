@@ -35,13 +35,19 @@ export function draw(page, own, trailTime) {
   const seen = race.runs.flatMap((run, i) => (run.lost === null ? [race.trails[i][0], run] : [])).filter(Boolean);
   page.zoom = Math.max(page.zoom, zoomFor(scene.ranges, seen));
   const ranges = widened(scene.ranges, page.zoom);
+  // The pictures of the motion have one scale; a phase plane has its own, else what grows would hide the other's ellipse.
+  const planes = race.runs.map((run, i) => {
+    const states = run.lost === null ? [race.trails[i][0], run].filter(Boolean) : [];
+    page.zooms[i] = Math.max(page.zooms[i], zoomFor(scene.ranges, states));
+    return widened(scene.ranges, page.zooms[i]);
+  });
   race.runs.forEach((run, i) => {
     const lane = LANES[i];
     const ellipse = page.ellipses[i] ? around(page.ellipses[i]) : null;
     const mine = { ...look, colour: own[i], dots, ellipse, shears: page.shears[i], truthTrail, now: nowOf(page), dt: page.dt, back: trailTime };
     const trail = shown[i] === run ? race.trails[i] : [...race.trails[i].slice(0, race.trailEvery === 1 ? -1 : undefined), shown[i]];
     drawMotion(sheet(byId(`motion-${lane}`)), scene, ranges, shown[i], truth, trail, mine);
-    drawPhase(sheet(byId(`phase-${lane}`)), ranges, pair, shown[i], truth, trail, mine);
+    drawPhase(sheet(byId(`phase-${lane}`)), planes[i], pair, shown[i], truth, trail, mine);
   });
   const dash = page.keys[0] === page.keys[1] ? [6, 5] : [];
   const lines = (of) => [
