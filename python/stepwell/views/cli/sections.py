@@ -7,5 +7,5 @@ HOFFMANN = "Hoffmann (2002)"
 
 
 def section(name: str) -> str:
-    """A section as tables show it: a dash for what is not in the document."""
+    """A section as tables show it: a dash for what is not in Hoffmann (2002)."""
     return name.replace("Appendix", "App.") if name.startswith(("§", "Appendix")) else "–"
