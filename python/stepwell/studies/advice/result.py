@@ -180,8 +180,10 @@ class Advice:
         same = [row.name for row in self.ranked[1:] if row.seconds_per_time <= alike and row.error >= best.error]
         if not same:
             return []
-        sentence = f"{'; '.join(same)} cost{'s' * (len(same) == 1)} the same, and the error is larger"
-        return [f"As far as can be measured (±{100 * self.cost_noise:.0f} %), {sentence}."]
+        # A name may have a comma, as that of a curve by tolerance.
+        names = " and ".join(filter(None, ("; ".join(same[:-1]), same[-1])))
+        measured = f"within the error of measurement (±{100 * self.cost_noise:.0f} %)"
+        return [f"{names} cost{'s' * (len(same) == 1)} the same {measured}, with a larger error."]
 
     def _beside(self, best: Row) -> list[str]:
         """The gain and the cost of float32, if it was tried."""
