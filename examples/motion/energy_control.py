@@ -1,8 +1,8 @@
 """A push against the energy error keeps three bodies together
 ===========================================================
 
-Standard Euler gains energy in every step, and the bodies of Appendix D fly apart. The
-document's control adds a push along the velocity that takes the gain back. The energy
+Standard Euler gains energy in every step, and the bodies of Appendix D fly apart.
+Hoffmann's control adds a push along the velocity that takes the gain back. The energy
 is then right; the motion, which is chaotic, is another one.
 """
 

@@ -23,8 +23,8 @@ GAIN = 0.3
 def energy_control(pair: str = "matching", eps: Any = 0.01, form: ControlForm = "limited") -> Scene:
     """Three unit masses thrown out from the centre, one of them a little aside; Hoffmann's 100 000 steps of 0.01.
 
-    The places are those of ``clover``, the velocities radial with speed 1, and the third body's gets ε in x (Appendix D). The
-    document steps it by Standard Euler under energy control with C = 0.3. Without the control (``run(…, control=None)``) the
+    The places are those of ``clover``, the velocities radial with speed 1, and the third body's gets ε in x (Appendix D).
+    Hoffmann steps it by Standard Euler under energy control with C = 0.3. Without the control (``run(…, control=None)``) the
     bodies leave the picture. The motion is chaotic, so no solution is exact for long, and only bounds can be compared.
 
     With ε = 0 the three meet at the centre, where the true motion ends. A step goes past that: in the printed form the

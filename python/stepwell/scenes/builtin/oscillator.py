@@ -16,7 +16,7 @@ def oscillator(omega: Any = 1.0) -> Scene:
     """The undamped oscillator from v = 0, y = 1, over ten periods.
 
     In canonical form (§3): v is the velocity divided by ω₀, and the exact orbit is the unit circle. Hoffmann gives
-    no step for it; Φ = ω₀·dt = 0.3 is the angle per step of its Appendix C.
+    no step for it; Φ = ω₀·dt = 0.3 is the angle per step of his Appendix C.
 
     Args:
         omega: ω₀ in radians per unit of time, above zero.

@@ -102,7 +102,7 @@ class ControlSweep(Drawn, Table, ValueEquality):
 
     @property
     def answer(self) -> str:
-        """For rods, in a sentence: the methods for which control is better than resetting, as the document supposes (§12)."""
+        """For rods, in a sentence: the methods for which control is better than resetting, as Hoffmann supposes (§12)."""
         titles: dict[str, list[str]] = {"control": [], "resetting": [], "depends": []}
         for name, better in self.better.items():
             titles["control" if all(better) else "depends" if any(better) else "resetting"].append(find_method(name).title)

@@ -1,4 +1,4 @@
-"""The document's figures: the harmonic cases of §4, and the samples of each method on the undamped oscillator (§5 to §11)."""
+"""Hoffmann's figures: the harmonic cases of §4, and the samples of each method on the undamped oscillator (§5 to §11)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ HARMONIC_CASES = (30, 90, 150)
 #: The number of periods of these that are drawn: after two, the samples of 150° a step repeat.
 HARMONIC_PERIODS = 2
 
-#: The document starts Verlet with y₋₁ = y₀ (Appendix B), which is this for v₀ = 0.
+#: Hoffmann starts Verlet with y₋₁ = y₀ (Appendix B), which is this for v₀ = 0.
 DOCUMENTS_START = "first_order"
 
 
@@ -47,13 +47,13 @@ class Samples(ValueEquality):
 
     Attributes:
         method: the method.
-        start: how it was started, as in the document if it has several ways; None if it has one way.
+        start: how it was started, as in Hoffmann (2002) if it has several ways; None if it has one way.
         t: times in units of 1/ω₀: k·Φ.
         v: velocities, divided by ω₀.
         y: coordinates.
         r1_squared: r₁², the factor of the square of the amplitude in a step.
         ratio: Ψ/Φ, the frequency of the samples divided by the true one.
-        kind: what the samples do, in the document's words.
+        kind: what the samples do, in Hoffmann's words.
         limit: below this Φ the method is stable; 0 for never.
     """
 
@@ -217,9 +217,9 @@ class Figures(Table, ValueEquality):
 
 
 def figures(methods: Iterable[Method | str] | None = None, *, phi: float = 0.5, periods: float = 4) -> Figures:
-    """Run the undamped oscillator from v₀ = 0 and y₀ = 1 by each method, as the document's figures do (§5 to §11).
+    """Run the undamped oscillator from v₀ = 0 and y₀ = 1 by each method, as Hoffmann's figures do (§5 to §11).
 
-    Verlet starts as the document has it, with y₋₁ = y₀. Without a choice of methods there are also the harmonic cases of §4.
+    Verlet starts as Hoffmann has it, with y₋₁ = y₀. Without a choice of methods there are also the harmonic cases of §4.
 
     Args:
         methods: names, or what ``stepwell.method`` returns; all if None.

@@ -1,4 +1,4 @@
-"""The pictures of the document's figures: samples joined by straight lines, and the exact cosine."""
+"""The pictures of Hoffmann's figures: samples joined by straight lines, and the exact cosine."""
 
 from __future__ import annotations
 
@@ -245,5 +245,5 @@ def _words(samples: Samples, digits: int = 3) -> str:
 
 def _start(chart: Figures, samples: Samples | None = None) -> str:
     """Of all, or of one figure."""
-    verlet = "" if samples is None or samples.start is None else ", y₋₁ = y₀ as in the document"
+    verlet = "" if samples is None or samples.start is None else ", y₋₁ = y₀ as in Hoffmann (2002)"
     return f"v₀ = 0, y₀ = 1{verlet}; Φ = ω₀·dt = {chart.phi:g} rad, {2.0 * math.pi / chart.phi:.4g} steps per period"

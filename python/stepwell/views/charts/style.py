@@ -125,7 +125,7 @@ def family(method: Method) -> str:
 
 
 def named(method: Method) -> str:
-    """Its title, and its section if it is in the document."""
+    """Its title, and its section if it is in Hoffmann (2002)."""
     return f"{method.title} ({method.section})" if method.section.startswith("§") else method.title
 
 

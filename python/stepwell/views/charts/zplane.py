@@ -49,7 +49,7 @@ class Locus(ValueEquality):
         eigenvalues: z₁ and z₂ of the transition matrix, shape (2, n): the larger first, of a pair the one that turns forwards.
         r1_squared: r₁², the squared magnitude of z₁.
         ratio: Ψ/Φ, the angle per step of z₁ divided by the true one. Where both are real, Ψ is 0 or π.
-        kind: the behaviour of the samples, in the document's words.
+        kind: the behaviour of the samples, in Hoffmann's words.
         stable: whether they stay bounded.
         r1_squared_series: r₁² by 1 and the first two terms that follow.
         ratio_series: Ψ/Φ likewise.
