@@ -420,9 +420,9 @@ def test_each_member_its_tolerance() -> None:
     ("more", "error", "message"),
     [
         ({"method": "rk4"}, UnsupportedError, "rk4 does not estimate its error.*merson"),
-        ({"tolerance": None}, ArgumentError, "tolerance: expected too"),
+        ({"tolerance": None}, ArgumentError, "tolerance: at= needs"),
         ({"tolerance": (np.ones(2), np.ones(3))}, ArgumentError, "do not broadcast"),
-        ({"at": None}, ArgumentError, "at: expected too"),
+        ({"at": None}, ArgumentError, "at: tolerance= needs"),
         ({"tolerance": 0.0}, ArgumentError, "tolerance: expected numbers above zero"),
         ({"tolerance": (1e-3, 1e-3, 1e-3)}, ArgumentError, "expected a number or a pair"),
         ({"at": [1.0, 1.0]}, ArgumentError, "at: expected times that ascend"),

@@ -54,12 +54,12 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: run(method="merson", dt=None, steps=None, tolerance=1e-6),
         E.ArgumentError,
-        "at: expected too with tolerance=: the times at which states are saved, such as at=[t1, t2]",
+        "at: tolerance= needs the times at which to save states, too, such as at=[t1, t2]",
     ),
     (
         lambda: run(method="merson", dt=None, steps=None, at=[1.0]),
         E.ArgumentError,
-        "tolerance: expected too with at=: the error that a step may have, such as tolerance=1e-6",
+        "tolerance: at= needs the error that a step may have, too, such as tolerance=1e-6",
     ),
     (
         lambda: run(resume=run(y=[1.0, 2.0], steps=50, events=sw.Event(_height, terminal=True))),

@@ -294,8 +294,8 @@ def test_with_a_tolerance_a_member_that_stops_has_none() -> None:
     [
         ({"steps": 10}, "steps: works with fixed steps only"),
         ({"every": 10}, "every: works with fixed steps only"),
-        ({"at": None}, "at: expected too"),
-        ({"tolerance": None}, "tolerance: expected too"),
+        ({"at": None}, "at: tolerance= needs the times"),
+        ({"tolerance": None}, "tolerance: at= needs the error"),
         ({"at": [1.0, 1.0]}, "at: expected times after t0 = 0, ascending"),
         ({"at": [0.0, 1.0]}, "at: expected times after t0 = 0, ascending"),
         ({"transient": 2}, "transient: expected"),

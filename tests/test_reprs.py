@@ -104,6 +104,11 @@ def test_a_system_says_itself_in_one_line_and_a_table(name: str) -> None:
     assert_a_table(system._repr_html_(), type(system).__name__, str(system.v_shape))
 
 
+def test_a_net_counts_its_springs_and_particles() -> None:
+    assert repr(sw.Springs([(0, 1)], rest=1.0, fixed=[0])) == "Springs(1 spring, 2 particles, fixed=1 particle)"
+    assert repr(sw.Springs([(0, 1), (1, 2)], rest=1.0)) == "Springs(2 springs, 3 particles)"
+
+
 @pytest.mark.parametrize("name", TABLES)
 def test_a_notebook_shows_a_table(name: str) -> None:
     thing = OBJECTS[name]()

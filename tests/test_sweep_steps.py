@@ -67,7 +67,7 @@ def test_means_are_summed_state_after_state_whatever_the_pieces(monkeypatch: pyt
 
 def test_a_dimension_that_two_arguments_have_in_common_has_a_name_of_its_own() -> None:
     axes = {"omega": ("omega", [1.0, 2.0]), "dt": ("omega", [0.1, 0.05])}
-    with pytest.raises(ArgumentError, match=r"two coordinates 'omega'; .* as \{'omega': \(\"run\", values\), …\}"):
+    with pytest.raises(ArgumentError, match=r"two coordinates would .* such as \{'omega': \(\"run\", values\), …\}"):
         sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, steps=10)
 
 

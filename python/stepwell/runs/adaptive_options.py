@@ -42,9 +42,9 @@ def check_adaptive(options: Options, before: Continuation | None) -> None:
 def check_times(has_tolerance: bool, at: Any) -> None:
     """Raise if ``tolerance`` or ``at`` is missing."""
     if at is None:
-        raise ArgumentError("at: expected too with tolerance=: the times at which states are saved, such as at=[t1, t2]")
+        raise ArgumentError("at: tolerance= needs the times at which to save states, too, such as at=[t1, t2]")
     if not has_tolerance:
-        raise ArgumentError("tolerance: expected too with at=: the error that a step may have, such as tolerance=1e-6")
+        raise ArgumentError("tolerance: at= needs the error that a step may have, too, such as tolerance=1e-6")
 
 
 def check_estimates(system: System, method: Method, control: Any, options: Options, before: Continuation | None) -> None:

@@ -29,6 +29,7 @@ from ...reference.bits import NOT_SIGN, and_bits, less, sqrt, where
 from ...reference.log import log
 from ...reference.trig import cos
 from ...runs import engine
+from ...runs.adaptive_options import check_times
 from ...runs.events.members import Members
 from ...runs.integration import quietly
 from ..derivatives.traced import Traced, together
@@ -274,8 +275,7 @@ def adaptive_averages(
     """``lyapunov`` with a tolerance, without a warning. Members that stop before the last time have exponents NaN."""
     method = find_method(method)
     system, v, y = _start(system, method, v, y)
-    if tolerance is None or at is None:
-        raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
+    check_times(tolerance is not None, at)
     t0 = checks.number("t0", t0, unit="units of time")
     times = np.atleast_1d(checks.numbers("at", at, unit="units of time"))
     if times.ndim > 1:

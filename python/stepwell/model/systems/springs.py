@@ -9,6 +9,7 @@ import numpy as np
 from ...base import checks, registry
 from ...base.arrays import Array, Shape
 from ...base.immutable import changed
+from ...base.reprs import counted
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...reference.systems import springs as reference
 from ...reference.systems.nbody import square
@@ -124,8 +125,8 @@ class Springs(System):
         """Its arguments, for its repr."""
         optional = {"damping": self.damping, "gravity": self.gravity, "drag": self.drag}
         shorter = {name: each[0] if each is not None and each.shape == (1,) else each for name, each in optional.items()}
-        fixed = [f"fixed={len(self.fixed)} particles"] * bool(len(self.fixed))
-        return [f"{len(self.pairs)} springs, {self.n} particles", *fixed, *shown(**shorter)]
+        fixed = [f"fixed={counted(len(self.fixed), 'particle')}"] * bool(len(self.fixed))
+        return [f"{counted(len(self.pairs), 'spring')}, {counted(self.n, 'particle')}", *fixed, *shown(**shorter)]
 
     def for_state_shapes(self, *states: Any) -> Springs:
         """The net in as many dimensions as the states, v and y, have."""

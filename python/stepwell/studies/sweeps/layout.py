@@ -107,8 +107,8 @@ def coordinates(grid: Grid, units: Mapping[str, str]) -> dict[str, tuple[tuple[s
         values = np.moveaxis(axis.values, range(axis.own), range(-axis.own, 0)) if axis.own else axis.values
         if name in coords or (len(values.shape) > 1 and name in (*axis.dims, *own)) or (name in grid.dims and not alone):
             raise ArgumentError(
-                f"axes: there are two coordinates {name!r}; name the dimension that arguments have in common otherwise, as "
-                f'{{{axis.argument!r}: ("run", values), …}}'
+                f"axes: two coordinates would be called {name!r}; give the dimension that several arguments share another name, "
+                f'such as {{{axis.argument!r}: ("run", values), …}}'
             )
         coords[name] = ((*axis.dims, *own), values, attrs)
     return coords
