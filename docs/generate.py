@@ -220,13 +220,13 @@ TABLES = {
     "speeds": speeds,
     "stages": lambda: from_report("A call by stages"),
     "one_orbit": lambda: from_report(
-        "Chosen steps: Kepler's ellipse, e = 0.9, 10 periods, one orbit"
+        "Adaptive steps: Kepler's ellipse, e = 0.9, 10 periods, one orbit"
     ),
     "many_orbits": lambda: from_report(
-        "Chosen steps: Kepler's ellipse, e = 0.9, 10 periods, 10,000"
+        "Adaptive steps: Kepler's ellipse, e = 0.9, 10 periods, 10,000"
     ),
     "one_round": lambda: from_report(
-        "Chosen steps: Arenstorf's orbit, once round, one"
+        "Adaptive steps: Arenstorf's orbit, once round, one"
     ),
     "paper": paper,
     "methods": methods,

@@ -160,7 +160,7 @@ def table(years: tuple[float, ...], budget: float = BUDGET) -> Table:
             late = [["—", f"not in {budget:g} s"]] * (len(years) - len(found))
             lines.append([name, *(each for pair in cells + late for each in pair)])
     head = [each for length in years for each in (f"error after {length:,.0f} years", "ms")]
-    return "Chosen steps: the outer solar system at rounding level, relative error of the energy", ["contestant", *head], lines
+    return "Adaptive steps: the outer solar system at rounding level, relative error of the energy", ["contestant", *head], lines
 
 
 if __name__ == "__main__":

@@ -117,7 +117,7 @@ def table(orbits: Orbits, repeats: int, errors: tuple[float, ...], quick: bool) 
         cells = ["—" if math.isnan(s) else number(1e6 * s) for s in seconds]
         lines.append([name, *cells, f"{spread:.2f}"])
     many = "one orbit" if orbits.members == 1 else f"{orbits.members:,} orbits"
-    return f"Chosen steps: {orbits.name}, {many}", ["contestant", *(f"{e:.0e}" for e in errors), "spread"], lines
+    return f"Adaptive steps: {orbits.name}, {many}", ["contestant", *(f"{e:.0e}" for e in errors), "spread"], lines
 
 
 def tables(repeats: int, quick: bool, members: int = 10_000) -> Iterator[Table]:
