@@ -72,7 +72,7 @@ def methods() -> str:
 
 def names() -> str:
     """Hoffmann's names beside the standard ones."""
-    head = "document", "section", "name", "also called", "not to be taken for"
+    head = "title", "section", "name", "also called", "not to be taken for"
     rows = (
         (
             m.title,

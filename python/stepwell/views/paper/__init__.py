@@ -21,7 +21,7 @@ from ...errors import ArgumentError
 MODULES = ("introduction", "transform", "methods", "constraints", "series", "programs", "bodies", "aircraft")
 
 #: The kinds of statement.
-KINDS = ("demand", "formula", "algorithm", "program", "figure", "advice", "warning")
+KINDS = ("requirement", "formula", "algorithm", "program", "figure", "advice", "warning")
 
 
 class Finding(NamedTuple):

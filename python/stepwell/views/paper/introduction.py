@@ -19,7 +19,7 @@ section_1, section_2, section_3 = Section("§1"), Section("§2"), Section("§3")
 
 
 @section_1(
-    "demand",
+    "requirement",
     "A simple method is judged by four criteria: stability of an oscillator, deviation of its frequency, calculations per step, "
     "and the smallest step that is allowed.",
     "`sw.criteria`; `stepwell criteria`",
@@ -44,7 +44,7 @@ def _draw_reflection(path: Path) -> object:
 
 
 @section_1(
-    "demand",
+    "requirement",
     "An elastic reflection may have a wrong frequency, but must not add energy, even if the step is not small.",
     "`sw.Floor`, `sw.Sphere`: `Particles(floor=…)`; `sw.scenes.bouncing_ball()`",
     "A one-sided spring and a reversed velocity do not ensure that for every phase, step and method; the default of "
