@@ -109,6 +109,7 @@ html_title = f"stepwell {release}"
 html_favicon = "_static/favicon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["theme.js"]
 #: Of the card that a link to a page becomes elsewhere, and of a search engine's entry.
 ABOUT = "Fast, reproducible integration of motion, for games, simulators and courses"
 #: Addresses of the project, from its package's record: one place to enter them.

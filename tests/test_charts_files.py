@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -117,6 +118,21 @@ def test_a_panel_is_its_charts(tmp_path):
 
 
 # ---- what is refused
+
+
+def test_implicit_methods_are_left_out_where_they_would_take_most_of_an_hour():
+    """Of 23 bodies in space, 138 numbers, all are; of 21, 126 numbers, or if they are named, none is."""
+    implicit = {each.name for each in sw.methods() if each.is_implicit}
+
+    def left_out(bodies: int, methods: list[str] | None) -> dict[str, str]:
+        scene = sw.scenes.plummer(bodies)
+        return sw.charts.work_precision(replace(scene, horizon=4 * scene.dt), methods, [4], tolerances=[]).refused
+
+    many = left_out(23, None)
+    assert set(many) & implicit == implicit
+    assert many["rodas5p"] == "each step solves equations in 138 unknowns: name rodas5p in methods= to chart it"
+    assert not set(left_out(21, None)) & implicit
+    assert left_out(23, ["rodas5p"]) == {}
 
 
 def test_a_refused_method_is_named_with_the_reason(small, tmp_path):

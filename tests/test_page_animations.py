@@ -114,7 +114,7 @@ def test_on_a_phone_panels_are_below_each_other(name, tmp_path):
 def test_a_page_is_light_and_dark_and_says_no_code():
     chart = run_picture("rope_bridge", sw.scenes.rope_bridge().run("leapfrog", every=1))
     page = page_animation.page(chart, 10.0, 20.0)
-    assert "color-scheme: light dark" in page
+    assert ':root[data-theme="dark"]' in page
     assert 'matchMedia("(prefers-color-scheme: dark)")' in page
     assert re.fullmatch(
         r"720 steps of 0\.00416667\.( \d+ of 721 saved states, and straight lines between them\.)?", data_of(page)["about"]

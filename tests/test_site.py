@@ -259,6 +259,23 @@ def test_pages_open_without_a_complaint(site: Path, browser: Any, window: Any, s
 
 
 @needs_browser
+@pytest.mark.parametrize(("name", "kind"), [("index", "explorer"), ("tutorials/first_run", "animation")])
+def test_a_frame_has_the_theme_that_was_chosen_for_the_site(site: Path, browser: Any, name: str, kind: str) -> None:
+    from playwright.sync_api import expect
+
+    context = browser.new_context(viewport=DESKTOP, color_scheme="light")
+    page = context.new_page()
+    page.set_default_timeout(60_000)
+    page.goto((site / f"{name}.html").as_uri())
+    page.locator(f"iframe.{kind}").first.scroll_into_view_if_needed()
+    shown = page.frame_locator(f"iframe.{kind}").first.locator("html")
+    for theme, seen in (("auto", "light"), ("dark", "dark"), ("light", "light"), ("dark", "dark")):
+        page.evaluate("theme => { document.body.dataset.theme = theme }", theme)
+        expect(shown).to_have_attribute("data-theme", seen)
+    context.close()
+
+
+@needs_browser
 def test_a_tutorial_animates_and_the_search_finds(site: Path, browser: Any) -> None:
     page = browser.new_page()
     page.set_default_timeout(60_000)

@@ -114,7 +114,7 @@ def finding(known: dict[str, Any]) -> str:
 
 
 def draw(known: dict[str, Any], path: Path = PICTURE) -> None:
-    """Microseconds a member against achieved error, a panel for each problem."""
+    """Microseconds per trajectory against achieved error, a panel for each problem."""
     from stepwell.base.pictures import png
     from stepwell.views.charts import style
 
@@ -139,7 +139,7 @@ def draw(known: dict[str, Any], path: Path = PICTURE) -> None:
             axes.minorticks_off()
             axes.spines[["top", "right"]].set_visible(False)
             if place % 2 == 0:
-                axes.set_ylabel("µs a member")
+                axes.set_ylabel("µs per trajectory")
             if place >= 2:
                 axes.set_xlabel("achieved error")
         shown = dict(pair for axes in figure.axes for pair in zip(*reversed(axes.get_legend_handles_labels()), strict=True))

@@ -78,11 +78,10 @@ impl Level {
         }
     }
 
-    /// Whether this machine has it. How a program may execute what it has written differs between systems; for AArch64 it is
-    /// known here for Linux.
+    /// Whether this machine has it. Every AArch64 has NEON.
     #[cfg(not(target_arch = "x86_64"))]
     pub fn here(self) -> bool {
-        self == Level::Baseline || self == Level::Neon && cfg!(all(target_arch = "aarch64", target_os = "linux"))
+        self == Level::Baseline || self == Level::Neon && cfg!(target_arch = "aarch64")
     }
 
     /// The level whose instructions the interpreter's own loops use: of `Baseline`, which says that no machine code is written,

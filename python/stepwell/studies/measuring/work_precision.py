@@ -40,6 +40,10 @@ SMALL_BLOCK = 16
 #: But the most steps are at least this many times those of the scene: large nets are stable only near these.
 TIMES_THE_SCENE = 10.0
 
+#: A chart of all methods leaves implicit ones out for blocks of more numbers than this: the work of a step grows as the cube of
+#: this number, and 100 bodies in space would take them most of an hour.
+MOST_UNKNOWNS = 128
+
 #: Seconds that are expected, for the progress: of a method's times, of a point, of a number in each of its rate evaluations, and
 #: of a peer.
 TIMING, POINT, NUMBER, PEER = 0.15, 0.004, 1e-9, 2.0
@@ -70,7 +74,8 @@ def work_precision(
 
     Args:
         scene: a ``Scene``, or the name of one.
-        methods: names, or what ``stepwell.method`` returns; all if None.
+        methods: names, or what ``stepwell.method`` returns; all if None, without implicit ones if the state has more than
+            128 numbers.
         steps: numbers of steps over the horizon, each 4 or more; if None, ten in each factor of ten, from steps of 24
             times the scene's down to a 3000th of it, or to two million steps.
         tolerances: for a second curve, "merson, tolerance", of each method that estimates its error; if None, 1e-2 to
@@ -110,7 +115,7 @@ def work_precision(
     scene, floor = chartable(whole)
     ladder = _ladder(scene) if numbers is None else numbers
 
-    reasons = {method.name: measure.refusal(scene, method) for method in chosen}
+    reasons = {method.name: measure.refusal(scene, method) or _left_out(scene, method, methods) for method in chosen}
     refused = {name: reason for name, reason in reasons.items() if reason is not None}
     able = [method for method in chosen if reasons[method.name] is None]
     paced = wanted and scene.system.stick_friction is None and not scene.system.contacts  # adaptive steps do not work with these
@@ -162,6 +167,14 @@ def work_precision(
     return WorkPrecision(
         scene, tuple(curves), refused, timing.CHARTS.members_of(scene), timing.CHARTS.repeats, _core.isa(), floor, cut
     )
+
+
+def _left_out(scene: Scene, method: Method, methods: object) -> str | None:
+    """Why a chart of all methods has none of this one, or None."""
+    unknowns = scene.v.size + scene.y.size
+    if methods is not None or not method.is_implicit or unknowns <= MOST_UNKNOWNS:
+        return None
+    return f"each step solves equations in {unknowns} unknowns: name {method.name} in methods= to chart it"
 
 
 def _ladder(scene: Scene) -> list[int]:

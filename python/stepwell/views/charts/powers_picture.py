@@ -39,7 +39,7 @@ def draw(chart: Powers) -> Figure:
         error.annotate("n·2⁻⁵³", (middle, middle * 2.0**-53), (-58, 4), textcoords="offset points", color=GREY)
         time.legend(frameon=False, loc="upper left")
         put_title(figure, 0.012, 0.925, finding(chart), 20)
-        what = f"{chart.system!r}, dt = {chart.dt:g}; one member, {chart.isa}"
+        what = f"{type(chart.system).__name__}, dt = {chart.dt:g}, one trajectory, kernels for {chart.isa}"
         figure.text(0.012, 0.865, textwrap.shorten(what, 140), size=13.5, color=GREY)
         note = (
             "Error: distance from the method's own state in exact arithmetic. Time: median, from the call in Python to its end."

@@ -10,6 +10,7 @@ mod instruction_set;
 pub mod interpret;
 mod loops;
 mod machine;
+mod memory;
 pub mod pack;
 mod pages;
 mod plan;

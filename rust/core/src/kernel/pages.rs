@@ -1,11 +1,9 @@
-//! Pages of machine code. All unsafe code of the kernels is in this file.
-//!
-//! A page is writable first and executable then, never both. A system may refuse to make it executable (hardened ones do); then
-//! there is no kernel, and the interpreter is used.
+//! Kernels in memory, and their call. All unsafe code of the kernels is in this file and in `memory`.
 
 use super::{
     Tile, check,
     frame::{Arguments, Frame},
+    memory::Executable,
 };
 use crate::tape::real::Real;
 
@@ -18,34 +16,10 @@ type Function = extern "sysv64" fn(*mut Arguments);
 #[cfg(not(target_arch = "x86_64"))]
 type Function = extern "C" fn(*mut Arguments);
 
-/// Tells the CPU that there are new instructions: its caches of data and of instructions do not know of each other.
-#[cfg(target_arch = "aarch64")]
-#[allow(unsafe_code, reason = "caches have instructions of their own")]
-fn synchronise(code: &[u8]) {
-    use std::arch::asm;
-    // SAFETY: these instructions are allowed to every program, and change nothing but what is in which cache.
-    unsafe {
-        let sizes: u64;
-        asm!("mrs {}, ctr_el0", out(reg) sizes, options(nomem, nostack, preserves_flags));
-        // The shortest lines that any cache has, each as a power of two in words of four bytes.
-        let lines = |power: u64| {
-            (code.as_ptr_range().start as usize & !((4 << power) - 1)..code.as_ptr_range().end as usize).step_by(4 << power)
-        };
-        for line in lines(sizes >> 16 & 15) {
-            asm!("dc cvau, {}", in(reg) line, options(nostack, preserves_flags));
-        }
-        asm!("dsb ish", options(nostack, preserves_flags));
-        for line in lines(sizes & 15) {
-            asm!("ic ivau, {}", in(reg) line, options(nostack, preserves_flags));
-        }
-        asm!("dsb ish", "isb", options(nostack, preserves_flags));
-    }
-}
-
 /// Code that can be run.
 #[derive(Debug)]
 pub(crate) struct Pages {
-    map: memmap2::Mmap,
+    memory: Executable,
     frame: Frame,
 }
 
@@ -53,22 +27,17 @@ impl Pages {
     /// Code that was written for a frame, for this CPU. It must not access anything outside the frame, and must return: the
     /// writers ensure that, and the tests check it. None if the system has no memory left or does not allow executable pages.
     pub(super) fn new(code: &[u8], frame: Frame) -> Option<Pages> {
-        let mut map = memmap2::MmapMut::map_anon(code.len()).ok()?;
-        map.copy_from_slice(code);
-        let map = map.make_exec().ok()?;
-        #[cfg(target_arch = "aarch64")]
-        synchronise(&map);
-        Some(Pages { map, frame })
+        Some(Pages { memory: Executable::new(code)?, frame })
     }
 
     /// Whether the system allows executable pages, found by trying one.
     pub(super) fn allowed() -> bool {
-        memmap2::MmapMut::map_anon(1).and_then(memmap2::MmapMut::make_exec).is_ok()
+        Executable::new(&[0]).is_some()
     }
 
     /// The code.
     pub(crate) fn code(&self) -> &[u8] {
-        &self.map
+        self.memory.code()
     }
 
     /// What it may touch.
@@ -109,12 +78,12 @@ impl Pages {
             steps: tile.steps as u64,
             rounding: [0, TO_NEAREST],
         };
-        // SAFETY: the map holds a whole function of this signature from its first byte on, and stays until `self` is dropped. It
+        // SAFETY: the memory holds a whole function of this signature from its first byte on, and stays until `self` is dropped. It
         // writes to the state, to `own` and to the first number of `rounding` only, and reads besides them the rows, the pool,
         // the table of the steps and the rows held that it names: inside what was asserted above. Nobody else uses the state or
         // `own` meanwhile, both are borrowed exclusively. It keeps the registers that its convention asks to keep.
         unsafe {
-            let function: Function = std::mem::transmute(self.map.as_ptr());
+            let function: Function = std::mem::transmute(self.memory.code().as_ptr());
             function(&raw mut arguments);
         }
     }

@@ -242,14 +242,16 @@ function arranged(panels, width) {
 function start(given) {
   const byId = (id) => document.getElementById(id);
   const canvas = byId("picture"), play = byId("play"), slider = byId("time"), clock = byId("clock");
-  const last = given.t.length - 1, dark = matchMedia("(prefers-color-scheme: dark)");
-  let now = 0, running = true, before = null;
+  const last = given.t.length - 1, systemIsDark = matchMedia("(prefers-color-scheme: dark)");
+  let now = 0, running = true, before = null, siteTheme = "auto";
   byId("title").textContent = given.title;
   byId("about").textContent = given.about;
   slider.max = last;
 
   function show() {
-    look = dark.matches ? DARK : LIGHT;
+    const dark = siteTheme === "dark" || (siteTheme === "auto" && systemIsDark.matches);
+    document.documentElement.dataset.theme = dark ? "dark" : "light";
+    look = dark ? DARK : LIGHT;
     const size = arranged(given.panels, canvas.clientWidth);
     canvas.style.aspectRatio = `${size.width} / ${size.height}`;
     const scale = Math.max(1, (canvas.clientWidth / size.width) * (window.devicePixelRatio || 1));
@@ -284,7 +286,13 @@ function start(given) {
   play.addEventListener("click", () => run(!running));
   slider.addEventListener("input", () => go(Number(slider.value)));
   addEventListener("resize", show);
-  dark.addEventListener("change", show);
+  systemIsDark.addEventListener("change", show);
+  // A site that shows the page in a frame says by a message which theme its reader chose.
+  window.addEventListener("message", ({ data: { theme } = {} }) => {
+    if (!["light", "dark", "auto"].includes(theme)) return;
+    siteTheme = theme;
+    show();
+  });
   addEventListener("keydown", (event) => {
     const step = event.shiftKey ? 10 : 1;
     const to = { ArrowLeft: now - step, ArrowRight: now + step, Home: 0, End: last }[event.key];

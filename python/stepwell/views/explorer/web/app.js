@@ -26,6 +26,9 @@ const MAX_RESTORED = 200_000;
 const data = JSON.parse(byId("data").textContent);
 const methods = new Map(data.methods.map((each) => [each.name, each]));
 const still = matchMedia("(prefers-reduced-motion: reduce)");
+const systemIsDark = matchMedia("(prefers-color-scheme: dark)");
+// What a site that shows the page in a frame asks for, by a message: "light", "dark", or "auto" as the system.
+let siteTheme = "auto";
 
 const page = {
   scene: null,
@@ -349,16 +352,26 @@ function listen() {
   on("code", "toggle", () => byId("code").open && showCode());
   window.addEventListener("hashchange", () => location.hash !== own && readLink());
   window.addEventListener("resize", () => (page.dirty = true));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-    restartColours();
-    page.dirty = true;
+  systemIsDark.addEventListener("change", showTheme);
+  window.addEventListener("message", ({ data: { theme } = {} }) => {
+    if (!["light", "dark", "auto"].includes(theme)) return;
+    siteTheme = theme;
+    showTheme();
   });
   document.addEventListener("keydown", pressed);
 }
 
-function restartColours() {
+function setTheme() {
+  const dark = siteTheme === "dark" || (siteTheme === "auto" && systemIsDark.matches);
+  document.documentElement.dataset.theme = dark ? "dark" : "light";
+}
+
+function showTheme() {
+  setTheme();
+  if (!page.race) return;
   setColours();
   showLimits();
+  page.dirty = true;
 }
 
 function pressed(event) {
@@ -380,6 +393,7 @@ function pressed(event) {
 }
 
 byId("scene").replaceChildren(...data.scenes.map((each) => option(each.name, each.title)));
+setTheme();
 listen();
 page.ready = readLink();
 requestAnimationFrame(frame);
