@@ -53,41 +53,41 @@ Does a control of the energy, or a projection after each step, make a run better
 
 1. **With RK4: project.** `Projection("scaling")` made the state better on all six orbits, from 1.8 times (circle) to
    7.7 times (e = 0.9) in some 10 periods, 68 times on the figure-eight in 100. Without it energy drifts and the period
-   with it, so the phase error grows as t²; with it as t. Nacozy's way is as good and no better, and costs more.
+   with it, so the phase error grows as t²; with it as t. Nacozy's projection is as good, and costs more.
 2. **With RK4 a strong control costs orders.** The push acts in the stages, whose energies are off by h². At a fixed C
    that is still a smooth system, and RK4 has order 4; at h·C·K = 10 it falls to 2, and at 100 the state on the circle
-   is 80 times worse than without. Better project; or stay at h·C·K = 0.01, where the energy error is least.
+   is 80 times worse than without. Project instead, or stay at h·C·K = 0.01, where the energy error is least.
 3. **With Standard Heun: control, limited, h·C·K from 0.01 to 1.** State 3 to 190 times better than alone and 2 to 76
    times better than projected, although its energy is off by 1e-3 and that of the projection by 1e-15. The push in the
-   second stage takes away part of Heun's own lag, which a projection leaves. The smaller the energy error, the worse
+   second stage removes part of Heun's phase error, which a projection leaves. The smaller the energy error, the worse
    the state: energy is not accuracy.
 4. **False Euler and leapfrog: leave them alone.** Their energy error does not grow. Scaling or control took False
    Euler's angular momentum, kept to 3e-15, 4 % off and made the state 5 times worse on Kepler's ellipse; on the figure-
-   eight Nacozy's way ruined it (1.31 for 0.022), and scaling gained a factor of 2 there. At the same cost leapfrog is 2
+   eight Nacozy's projection ruined it (1.31 for 0.022), and scaling gained a factor of 2 there. At the same cost leapfrog is 2
    times better than False Euler on the figure-eight, without any control.
 5. **Standard Euler: control hides the error.** With the energy right to 1e-15 the figure-eight is lost within 10
    periods (1.8; at 1 the error is as large as the solution). On Kepler's ellipse, with a step so small that it
    survives, the period becomes right and the angular momentum is 12 % off.
 6. **Gain.** The printed form needs h·C·K < 1 at every moment, and K has no bound at encounters; the limited form stays
-   finite at any gain. There is no best gain for the state: where the least error is, two errors cancel at the moment
-   one looks. h·C·K = 0.01 at the start (0.1 for False Euler and Standard Euler in chaos) is where drift is gone and the
+   finite at any gain. There is no best gain for the state: where the error is least, two errors cancel at the end
+   of the run. h·C·K = 0.01 at the start (0.1 for False Euler and Standard Euler in chaos) is where drift is gone and the
    push does little else.
-7. **Take out the momentum first.** All these multiply the momentum of the whole too. Where a method loses energy at
+7. **Remove the momentum first.** Controls and projections multiply the total momentum, too. Where a method loses energy at
    encounters, as False Euler does here, the factors are above 1, and a momentum of 0.01 grows until the centre of mass
-   has the energy that the control puts in: it went 420 away, while the bodies stayed within 5 of it. With v −= Σmv/Σm
+   has the energy that the control puts in: it moved 420 away, while the bodies stayed within 5 of it. With v −= Σmv/Σm
    at the start it stays where it is.
-8. **In chaos no orbit is right.** Bounded is not true either: by small steps of RK4 bodies come out to 5.5 from the
-   centre of mass (median), under strong control of Standard Euler only to 2 or 3.
+8. **In chaos no orbit is right.** A bounded one need not be true either: by small steps of RK4 bodies reach 5.5 from
+   the centre of mass (median), by Standard Euler under strong control only 2 or 3.
 
 ## How to read the tables
 
-*limited* and *printed* are the forms of `EnergyControl`, with h·C·K at the start; *scaling* and *nacozy* the ways of
-`Projection`. All methods ask for rates equally often. State errors are relative to the largest true state; energy
+*limited* and *printed* are the forms of `EnergyControl`, with h·C·K at the start; *scaling* and *nacozy* the kinds of
+`Projection`. All methods make the same number of rate evaluations. State errors are relative to the largest true state; energy
 errors are the largest of the run. Nothing is timed, so the numbers are the same on every machine. They are written by
 `python -m benches.control_study`, with the data in `benches/control`; `sw.charts.control` makes and draws them."""
 
 RUNS = f"""h = 0.01, 100 000 steps, C = {", ".join(f"{gain:g}" for gain in GAINS)}. ● stays finite, · overflows. The motion is
-chaotic, so which run overflows hangs on the last bit of the start; beside Hoffmann's start stand {STARTS} that are
+chaotic, so the last bit of the start decides which run overflows; beside Hoffmann's start stand {STARTS} that are
 {APART:g} apart."""
 
 MANY = f"""{STARTS} starts that are {APART:g} apart, over 1000 units of time; medians of the largest |E − E₀| and of the largest
@@ -98,7 +98,7 @@ ORDERS = """Kepler's circle, e = 0, over three periods; state errors."""
 
 BEST = """Figure-eight, limited form. For each method: the gain with the least state error, and by how much the state error is
 smaller there, at h·C·K = 100, and by scaling, than without control. FE False Euler, SH Standard Heun. Number of periods and
-step move the best gain by orders of magnitude: it is where an error passes through zero at the moment one looks, and no
+step move the best gain by orders of magnitude: it is where an error passes through zero at the end of the run, and no
 property of the method."""
 
 

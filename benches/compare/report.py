@@ -10,21 +10,22 @@ Table = tuple[str, list[str], list[list[str]]]
 HEAD = ["contestant", "speed", "min … max", "error", "remarks"]
 
 READING = """\
-A call goes from the user's arrays to the final state. Shown is the median of {repeats} repeats, then the least and the
-most. The contestants take turns in every repeat, and each sample lasts at least {sample:.0f} ms. The columns with ÷
-say how many times as fast.
+A call goes from the user's arrays to the final state. A number is the median of {repeats} repeats; the least and the
+most follow. The contestants take turns in every repeat, and each sample lasts at least {sample:.0f} ms. The columns with ÷
+say how many times as fast it is as that contestant.
 
 - G steps/s: 10⁹ member-steps a second, members × steps ÷ time.
 - ns/step: time ÷ steps, of one member.
 - M system-steps/s: 10⁶ member-steps a second.
-- G pairs/s: 10⁹ directed pairs a second. N bodies have N(N − 1) in an evaluation, also for who computes each pair once.
-  Counted are the evaluations made: steps + 1 by C and numba, steps + 2 by stepwell, whose leapfrog ends each of
-  both half kicks apart, and steps by REBOUND.
+- G pairs/s: 10⁹ directed pairs a second. N bodies have N(N − 1) in an evaluation, also if each pair is computed once.
+  The number of evaluations is steps + 1 by C and numba, steps + 2 by stepwell, whose leapfrog makes both
+  half kicks separately, and steps by REBOUND.
 
-*Error* is the largest distance of a member's, or a body's, (v, y) from the truth at the end: the exact solution, or
-that of a better method with a fine step. Amplitudes are about 1. Who exceeds what the method explains is not timed.
-All contestants use the same method, so equal errors mean equal work and the speeds may be compared; who did a smaller
-share has the error of that share. REBOUND's leapfrog alone is another: drift-kick-drift in place of kick-drift-kick.
+*Error* is the largest distance of a member's, or a body's, (v, y) from the true one at the end: the exact solution,
+or that of a better method with a fine step. Amplitudes are about 1. A contestant whose error is larger than the method
+explains is not timed. All contestants use the same method, so equal errors mean equal work and the speeds may be
+compared; one that did a smaller share has the error of that share. Only REBOUND's leapfrog is another: drift-kick-drift in
+place of kick-drift-kick.
 
 *C* may contract to FMA, and with bodies also reorder and replace root and division by a close approximation (rsqrt);
 *numba* may contract and reorder. *C, exact* computes as stepwell does, whose results are the same to the last bit on
@@ -32,13 +33,13 @@ every machine. All of them are the best of several shapes, found before the timi
 says all. *stepwell* is `stepwell.integrate`, checks of the arguments included. Only ratios within this file mean
 anything: another machine, or another hour on a shared one, gives other speeds.
 
-W7 are equations that users write themselves. stepwell traces them anew in every call, which is timed; what others compile is
-not timed. *numba* there is the best of several shapes that may contract, or reorder, too; *numba, exact* the best that may
-not; *numba, plain* goes member after member with the functions of `math`, as most people write it. In their blocks the sine
-and the exponential are polynomials for results of usual size, to which stepwell is not confined. *diffrax* and *JAX* take
-some thousand members as one array, unless the name says all at once. *heyoka* and *SciPy* choose their own, longer steps:
-they get the coarsest tolerance at which they miss no more than is expected of the common method and step, and are shown as
-if they had made as many steps as the others.
+W7 are equations that users write themselves. stepwell traces them anew in every call, and that is timed; the compilation of
+others is not. *numba* there is the best of several shapes that may contract, or reorder, too; *numba, exact* the best that
+may not; *numba, plain* steps one member after another with the functions of `math`, as most people write it. The blocks of
+numba have polynomials for the sine and the exponential that hold for results of usual size only; stepwell's hold for all.
+*diffrax* and *JAX* take some thousand members as one array, unless the name says all at once. *heyoka* and *SciPy* choose
+their own, longer steps: they get the coarsest tolerance at which their error is no larger than that of the common method
+and step, and are shown as if they had made as many steps as the others.
 """
 
 

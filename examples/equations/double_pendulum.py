@@ -82,9 +82,7 @@ def main(folder: Path) -> None:
         xlim=(0, 120),
         ylim=(None, 0.15),
     )
-    axes.set_title(
-        "A double pendulum loses energy by the method, unless it is told not to"
-    )
+    axes.set_title("Runge-Kutta 4 drains a double pendulum; a projection prevents it")
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(folder / "double_pendulum.png")
     print(
