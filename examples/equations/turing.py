@@ -28,9 +28,9 @@ def spread(c):
 @sw.system(order=1, shape=(2, CELLS))
 def brusselator(t, y, *, a=A, b=B, dx=DX, dy=DY):
     u, w = y
-    made = u * u * w
+    growth = u * u * w
     return np.stack(
-        [a + made - (b + 1.0) * u + dx * spread(u), b * u - made + dy * spread(w)]
+        [a + growth - (b + 1.0) * u + dx * spread(u), b * u - growth + dy * spread(w)]
     )
 
 
