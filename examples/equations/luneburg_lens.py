@@ -27,7 +27,7 @@ def ray(t, v, y):
 
 @ray.invariant
 def speed(v, y):
-    """|ẏ|² − n², which is zero on a ray."""
+    """|dy/dt|² − n², which is zero on a ray."""
     return np.dot(v, v) - np.where(np.dot(y, y) < 1.0, 2.0 - np.dot(y, y), 1.0)
 
 
