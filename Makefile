@@ -3,26 +3,29 @@
 
 PYTHON ?= python3
 OUT    ?= out
-BIN    := .venv/bin
+# On Windows make is run from Git's shell, and programs end with .exe.
+BIN    := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
+EXE    := $(if $(filter Windows_NT,$(OS)),.exe)
 # The tools of development have the same versions everywhere; `make pins` brings them up to date.
 PINS   := .ci/constraints.txt
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --constraint $(PINS)
+UV     := $(BIN)/uv pip install --quiet --python .venv/oldest
 # Tests run compilers, which would look for the jobs of this make.
 PYTHON_TEST := env -u MAKEFLAGS -u MFLAGS $(BIN)/python -m pytest -q
 # On every core; a file stays on one, for its tests share what takes time to make. The order of files is that of tests/conftest.py.
 PYTEST := $(PYTHON_TEST) -n auto --dist loadfile --no-loadscope-reorder
 SOURCES := $(shell find rust python -type f \( -name "*.rs" -o -name "*.toml" -o -name "*.py" -o -name "*.pyi" -o -name py.typed \)) \
-           Cargo.toml Cargo.lock pyproject.toml README.md LICENSE
+           Cargo.toml Cargo.lock pyproject.toml README.md LICENSE THIRD-PARTY.txt
 
 # Files that build.rs finds, so that cargo does not tell rustfmt of them.
 LISTED := $(shell find rust/core/src/model/steppers rust/core/src/model/systems -name "*.rs")
 
-# What `make wheels` builds for. zig links for a glibc of 2014 (manylinux2014) on any machine, and for AArch64 as well.
-WHEELS := x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
+# Which wheels `make wheels` builds, by the names in .ci/build_wheels.py; all if none is named.
+WHEELS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-long test-wheels campaign wheel wheels release dev bench format pins clean
-.PHONY: hooks lint lint-rust lint-python check-rust check-python rust-build rust-test python-test python-beside
+.PHONY: help demo docs test test-long test-wheels test-oldest campaign wheel wheels release deny licences dev bench format pins clean
+.PHONY: hooks lint lint-rust lint-python check-rust check-python check-workflows rust-build rust-test python-test python-beside
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -41,19 +44,41 @@ test: ## set up, and run the tests: Rust, Python, examples, docs, formatting, li
 wheel: .venv/wheel ## build the release wheel into dist/
 	@ls -l dist/*.whl
 
-release: .venv/release ## build wheel and sdist into dist/, check both, install and try each in an environment of its own
-	rm -rf dist
-	$(BIN)/maturin build --release --quiet --out dist
-	$(BIN)/maturin sdist --out dist
-	$(BIN)/twine check --strict dist/*
-	@for file in dist/*; do $(BIN)/python tests/installed.py $$file || exit 1; done
-	@echo "ready: $(BIN)/twine upload dist/*"
+release: .venv/release .venv/wheels ## build all wheels and the sdist into dist/release/, check all, install and try what runs here
+	rm -rf dist/release
+	$(BIN)/maturin sdist --quiet --out dist/release
+	cp dist/wheels/*.whl dist/release
+	$(BIN)/twine check --strict dist/release/*
+	$(BIN)/python tests/wheels.py dist/release
+	$(BIN)/python tests/installed.py dist/release dist/release/*.tar.gz
+	@ls -l dist/release
+	@echo "ready: $(BIN)/twine upload dist/release/*"
 
-wheels: .venv/wheels ## build the release wheels for Linux on x86-64 and AArch64 into dist/wheels/
+wheels: .venv/wheels ## build the release wheels for Linux, macOS and Windows, on x86-64 and ARM, into dist/wheels/ (WHEELS="name ...": only these)
 	@ls -l dist/wheels/*.whl
 
-test-wheels: .venv/wheels ## build them, and run this machine's in a clean environment
-	$(PYTHON) tests/wheels.py dist/wheels
+test-wheels: .venv/wheels ## build them, check them, and try this machine's in a clean environment
+	$(BIN)/python tests/wheels.py dist/wheels
+	$(BIN)/python tests/installed.py dist/wheels
+
+# The extra sweep has none: of what it installs the oldest versions that go together need NumPy 2.
+OLDEST := chart,gym,progress,tables,zarr
+RUST   := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+test-oldest: .venv/uv .venv/wheel ## build the core with the oldest Rust, and run the tests with the oldest NumPy and other packages, of Cargo.toml and pyproject.toml
+	rustup toolchain install --profile minimal $(RUST)
+	cargo +$(RUST) check --workspace --locked
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python .venv/oldest
+	$(UV) --resolution lowest-direct "$$(ls dist/*.whl)[$(OLDEST)]"
+	$(BIN)/uv pip freeze --python .venv/oldest > .venv/oldest.txt
+	$(UV) --constraint $(PINS) --constraint .venv/oldest.txt pytest pytest-xdist hypothesis mpmath packaging
+	.venv/oldest/bin/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
+
+deny: ## check the licences and sources of the crates, and known faults in them, by deny.toml
+	@command -v cargo-deny > /dev/null || cargo install --locked --quiet cargo-deny
+	cargo deny --locked check $(DENY)
+
+licences: ## write the licences of the crates in a wheel into THIRD-PARTY.txt
+	$(PYTHON) .ci/licences.py
 
 dev: .venv/test ## install in place, for work on the code; run again after a change in rust/
 	$(BIN)/maturin develop --release --quiet
@@ -77,7 +102,7 @@ lint-rust: rust-build
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
 
 lint-python: .venv/test
-	@$(MAKE) --no-print-directory check-python
+	@$(MAKE) --no-print-directory check-python check-workflows
 	$(BIN)/python -m mypy.stubtest stepwell._core --concise
 
 # The part of `lint` that needs no build: it reads the sources, not what is installed. The hooks before a commit run it.
@@ -90,6 +115,11 @@ check-python:
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy --no-error-summary
 	PYTHONPATH=python $(BIN)/lint-imports --no-cache > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
+
+check-workflows:
+	$(BIN)/zizmor --offline --quiet .github
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.dependabot .github/dependabot.yml
 
 # The wheel comes first: both are built in one folder, and have the core in common.
 rust-build: .venv/wheel
@@ -130,7 +160,7 @@ format: .venv/test ## format Rust and Python
 	$(BIN)/ruff format --quiet .
 	$(BIN)/python docs/generate.py
 
-pins: .venv/bin/python ## bring the tools of development up to date in .ci/constraints.txt; `make test` then shows what they say
+pins: $(BIN)/python$(EXE) ## bring the tools of development up to date in .ci/constraints.txt; `make test` then shows what they say
 	$(BIN)/python .ci/pins.py
 
 clean: ## remove everything that was built
@@ -138,12 +168,12 @@ clean: ## remove everything that was built
 
 # ---- set-up; the files in .venv are stamps
 
-.venv/bin/python:
+$(BIN)/python$(EXE):
 	@command -v cargo >/dev/null || { echo "stepwell needs a Rust toolchain: https://rustup.rs"; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "stepwell needs Python 3.11 or later; set PYTHON="; exit 1; }
 	$(PYTHON) -m venv .venv
 
-.venv/maturin: .venv/bin/python $(PINS)
+.venv/maturin: $(BIN)/python$(EXE) $(PINS)
 	$(PIP) 'maturin>=1.13,<2'
 	@touch $@
 
@@ -156,16 +186,17 @@ clean: ## remove everything that was built
 	$(PIP) 'twine>=6'
 	@touch $@
 
+.venv/uv: .venv/maturin
+	$(PIP) 'uv>=0.5'
+	@touch $@
+
 .venv/zig: .venv/maturin
 	$(PIP) 'ziglang>=0.13'
 	@touch $@
 
-.venv/wheels: .venv/zig $(SOURCES)
-	@command -v rustup > /dev/null || { echo "the standard library of Rust for other CPUs comes by rustup: https://rustup.rs"; exit 1; }
-	rustup target add $(WHEELS)
-	rm -rf dist/wheels
-	for target in $(WHEELS); do PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --quiet --zig --target $$target --out dist/wheels || exit 1; done
-	@touch $@
+.venv/wheels: .venv/zig .ci/build_wheels.py .ci/zig-windows $(SOURCES)
+	$(BIN)/python .ci/build_wheels.py $(WHEELS)
+	@test -n "$(WHEELS)" || touch $@
 
 # The wheel with the extras that a target asks for. What these need is installed while the wheel is built, if make may do two things.
 .venv/demo .venv/demo.needs: EXTRA = chart

@@ -1,6 +1,7 @@
 """Installs a wheel or an sdist in an environment of its own, and tries what a new user would: ``python tests/installed.py FILE``.
 
-Nothing of this folder is used there, no extra is installed, and no file of the repository is in reach.
+Of a folder pip takes the wheel for this machine. Nothing of this folder is used there, no extra is installed, and no file of the
+repository is in reach.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from pathlib import Path
 
 #: What a new user does first; the numbers are those of the reference, so the core's machine code is tried, too.
 TRIAL = """
-import importlib.metadata, importlib.util, pathlib, sys
+import importlib.metadata, importlib.util, os, pathlib, sys
 import numpy as np
 import stepwell as sw
 
@@ -28,6 +29,10 @@ for method in sw.methods():
     fast = sw.integrate(sw.Oscillator(np.linspace(0.5, 2.0, 50)), method, **options)
     slow = sw.integrate(sw.Oscillator(np.linspace(0.5, 2.0, 50)), method, **options, backend="numpy")
     assert np.array_equal(fast.y, slow.y, equal_nan=True), method
+for kernels in ("interpret", *sw.isa_levels()[1:]):
+    os.environ["STEPWELL_KERNELS"] = kernels
+    again = sw.integrate(sw.Oscillator(np.linspace(0.5, 2.0, 50)), method, **options)
+    assert np.array_equal(again.y, slow.y, equal_nan=True), kernels
 assert sw.method("symplectic Euler").name == "false_euler"
 assert sw.advise("oscillator", methods=["leapfrog", "rk4"]).best is not None
 try:
@@ -49,10 +54,15 @@ COMMANDS = {
 
 
 def install(file: Path, folder: Path) -> Path:
-    """A new environment with that file installed; returns its programs' folder."""
+    """A new environment with that file installed, or what pip takes of a folder; returns its programs' folder."""
     venv.create(folder, with_pip=True)
     programs = folder / ("Scripts" if sys.platform == "win32" else "bin")
-    run([programs / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", file.resolve()], folder)
+    pip = [programs / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    if file.is_dir():
+        run([*pip, "--no-index", "--no-deps", "--only-binary", ":all:", "--find-links", file.resolve(), "stepwell"], folder)
+        run([*pip, "numpy"], folder)
+    else:
+        run([*pip, file.resolve()], folder)
     return programs
 
 

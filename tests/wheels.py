@@ -1,79 +1,98 @@
-"""Whether the wheels in a folder are what they should be: ``python tests/wheels.py dist/wheels``.
+"""Whether the wheels in a folder are what they should be: ``python tests/wheels.py dist/wheels``. They are read, not run.
 
-The one for this machine is installed into a fresh environment, with NumPy from the package index and nothing else, and is used.
-Of all it is checked that their library is for the machine that their name says.
+All that are released must be there, unless some are named: ``python tests/wheels.py dist/wheels linux-x86_64 ...``.
 """
 
 from __future__ import annotations
 
-import os
-import platform
-import subprocess
+import json
 import sys
-import tempfile
+import tomllib
 import zipfile
+from email import message_from_string
 from pathlib import Path
 
-#: The machine of an ELF file, the number of 16 bits at byte 18.
-ELF = {"x86_64": 62, "aarch64": 183}
+from support.binaries import read
 
-USE = """
-import os
-import numpy as np
-import stepwell as sw
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / ".ci"))
+from build_wheels import WHEELS, Wheel  # noqa: E402
 
-assert "site-packages" in sw.__file__, sw.__file__
-system = sw.Pendulum(np.linspace(0.5, 1.5, 200))
-state = dict(v=0.0, y=1.0, dt=0.01, steps=2000, threads=1)
-want = sw.integrate(system, "rk4", **state, backend="numpy")
-levels = ["interpret", *sw.isa_levels()[1:]]
-for kernels in levels:
-    os.environ["STEPWELL_KERNELS"] = kernels
-    run = sw.integrate(system, "rk4", **state)
-    assert np.array_equal(run.v, want.v) and np.array_equal(run.y, want.y), kernels
-print("the bits of the reference:", ", ".join(levels))
-"""
-
-
-def machine(wheel: Path) -> str:
-    """What the name of a wheel says it is for."""
-    return next(name for name in ELF if wheel.stem.endswith(name))
-
-
-def check_library(wheel: Path) -> None:
-    """Fails unless its library is for the machine of its name and can be imported as ``_core``."""
-    with zipfile.ZipFile(wheel) as files:
-        library = files.read("stepwell/_core.abi3.so")
-    number = int.from_bytes(library[18:20], "little")
-    assert library[:4] == b"\x7fELF", wheel
-    assert number == ELF[machine(wheel)], (wheel, number)
-    assert b"PyInit__core" in library, wheel
-    assert "manylinux2014" in wheel.name, f"{wheel.name} asks for a newer system than it should"
-    print(f"{wheel.name}: a library for {machine(wheel)}, {len(library) / 1e6:.1f} MB")
+VERSION = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]["version"]
+#: How long a wheel may be, in bytes: a tenth above the longest.
+LENGTH = 3_000_000
+#: The name of the compiled core. Where one serves several versions of Python, it says so, or nothing on Windows.
+CORES = {"linux": "_core.{}.so", "macos": "_core.abi3.so", "windows": "_core.pyd"}
+#: What a core may load: what every system has. musl is libc.so.
+NEEDS = {
+    "linux": {
+        "libc.so",
+        "libc.so.6",
+        "libm.so.6",
+        "libpthread.so.0",
+        "libdl.so.2",
+        "ld-linux-x86-64.so.2",
+        "ld-linux-aarch64.so.1",
+    },
+    "macos": {"/usr/lib/libSystem.B.dylib"},
+    "windows": {"python3.dll", "kernel32.dll", "ntdll.dll"},
+}
 
 
-def use(wheel: Path) -> None:
-    """Installs and uses it in an environment of its own."""
-    own = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "STEPWELL", "VIRTUAL_ENV"))}
-    with tempfile.TemporaryDirectory() as folder:
-        python = Path(folder, "clean", "bin", "python")
-        subprocess.run([sys.executable, "-m", "venv", python.parent.parent], check=True, env=own)
-        subprocess.run(
-            [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel.resolve()], check=True, env=own
-        )
-        subprocess.run([python, "-c", USE], check=True, env=own, cwd=folder)
-        subprocess.run([python.with_name("stepwell"), "--help"], check=True, env=own, cwd=folder, stdout=subprocess.DEVNULL)
+def system(wheel: Wheel) -> str:
+    """The operating system that it is for."""
+    return "macos" if "apple" in wheel.target else "windows" if "windows" in wheel.target else "linux"
+
+
+def core(wheel: Wheel) -> str:
+    """Where its compiled core is."""
+    machine, *_, libc = wheel.target.split("-")
+    own = f"cpython-{wheel.python.removesuffix('t')[-3:]}t-{machine}-linux-{libc}"
+    return "stepwell/" + CORES[system(wheel)].format(own if wheel.python.endswith("t") else "abi3")
+
+
+def check(file: Path, wheel: Wheel) -> None:
+    """Fails unless its name, its files and its core are those of that wheel."""
+    with zipfile.ZipFile(file) as files:
+        names = set(files.namelist())
+        notes = f"stepwell-{VERSION}.dist-info"
+        metadata = message_from_string(files.read(f"{notes}/METADATA").decode("utf-8"))
+        tags = message_from_string(files.read(f"{notes}/WHEEL").decode("utf-8")).get_all("Tag") or []
+        bill = json.loads(files.read(f"{notes}/sboms/stepwell-py.cyclonedx.json"))
+        library = read(files.read(core(wheel)))
+    assert set(tags) == {f"{wheel.python}-{platform}" for platform in wheel.platform.split(".")}, tags
+    assert metadata["Version"] == VERSION
+    assert set(metadata.get_all("License-File") or ()) == {"LICENSE", "THIRD-PARTY.txt"}
+    assert {f"{notes}/licenses/LICENSE", f"{notes}/licenses/THIRD-PARTY.txt", "stepwell/py.typed"} <= names
+    assert {"nalgebra", "pyo3"} <= {part["name"] for part in bill["components"]}
+    assert len([name for name in names if "_core." in name and not name.endswith(".pyi")]) == 1, names
+    assert library.system == system(wheel), library
+    assert library.machine == wheel.target.split("-")[0].replace("aarch64", "arm64"), library
+    assert library.exports == {"PyInit__core"}, library.exports
+    strangers = {name for name in library.needs - NEEDS[library.system] if not name.startswith("api-ms-win-")}
+    assert not strangers, strangers
+    if library.system == "windows":
+        assert "python3.dll" in library.needs, library.needs
+    if "manylinux2014" in wheel.platform:
+        assert library.minimum <= (2, 17), library.minimum
+    if "macosx" in wheel.platform:
+        assert library.minimum == tuple(map(int, wheel.platform.split("_")[1:3])), library.minimum
+    assert file.stat().st_size <= LENGTH, file.stat().st_size
 
 
 def main() -> None:
-    """Checks all, uses this machine's."""
-    wheels = sorted(Path(sys.argv[1]).glob("*.whl"))
-    here = [wheel for wheel in wheels if machine(wheel) == platform.machine()]
-    assert here, f"no wheel for {platform.machine()} in {sys.argv[1]}"
-    for wheel in wheels:
-        check_library(wheel)
-    for wheel in here:
-        use(wheel)
+    """Checks each."""
+    folder, *names = sys.argv[1:]
+    files = set(Path(folder).glob("*.whl"))
+    for wheel in (WHEELS[name] for name in names or WHEELS):
+        file = Path(folder, f"stepwell-{VERSION}{wheel.ending}")
+        if file not in files:
+            sys.exit(f"{file} is not there; {', '.join(sorted(each.name for each in files)) or 'nothing'} is")
+        check(file, wheel)
+        files.remove(file)
+        print(f"{file.name}: {file.stat().st_size / 1e3:.0f} kB, as it should be")
+    if files:
+        sys.exit(f"of no use: {', '.join(sorted(each.name for each in files))}")
 
 
 if __name__ == "__main__":
