@@ -46,7 +46,7 @@ wheel: .venv/wheel ## build the release wheel into dist/
 
 release: .venv/release .venv/wheels ## build all wheels and the sdist into dist/release/, check all, install and try what runs here
 	rm -rf dist/release
-	$(BIN)/maturin sdist --quiet --out dist/release
+	$(BIN)/maturin sdist --out dist/release
 	cp dist/wheels/*.whl dist/release
 	$(BIN)/twine check --strict dist/release/*
 	$(BIN)/python tests/wheels.py dist/release
