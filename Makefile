@@ -61,7 +61,7 @@ test-wheels: .venv/wheels ## build them, check them, and try this machine's in a
 	$(BIN)/python tests/wheels.py dist/wheels
 	$(BIN)/python tests/installed.py dist/wheels
 
-# The extra sweep has none: of what it installs the oldest versions that go together need NumPy 2.
+# Old packages use what newer ones below them call deprecated. The extra sweep is left out: of what it installs the oldest versions that go together need NumPy 2.
 OLDEST := chart,gym,progress,tables,zarr
 RUST   := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 test-oldest: .venv/uv .venv/wheel ## build the core with the oldest Rust, and run the tests with the oldest NumPy and other packages, of Cargo.toml and pyproject.toml
@@ -71,7 +71,7 @@ test-oldest: .venv/uv .venv/wheel ## build the core with the oldest Rust, and ru
 	$(UV) --resolution lowest-direct "$$(ls dist/*.whl)[$(OLDEST)]"
 	$(BIN)/uv pip freeze --python .venv/oldest > .venv/oldest.txt
 	$(UV) --constraint $(PINS) --constraint .venv/oldest.txt pytest pytest-xdist hypothesis mpmath packaging
-	.venv/oldest/bin/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
+	$(subst $(BIN)/python,.venv/oldest/bin/python,$(PYTEST)) -W ignore::DeprecationWarning
 
 deny: ## check the licences and sources of the crates, and known faults in them, by deny.toml
 	@command -v cargo-deny > /dev/null || cargo install --locked --quiet cargo-deny

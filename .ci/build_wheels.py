@@ -82,7 +82,10 @@ def main() -> None:
         sys.exit("the standard library of Rust for other machines comes by rustup: https://rustup.rs")
     wheels = [WHEELS[name] for name in sys.argv[1:] or WHEELS]
     subprocess.run(["rustup", "--quiet", "target", "add", *sorted({wheel.target for wheel in wheels})], check=True)
-    shutil.rmtree(FOLDER, ignore_errors=True)
+    # Of another version there may be some.
+    for old in FOLDER.glob("*.whl"):
+        if not sys.argv[1:] or any(old.name.endswith(wheel.ending) for wheel in wheels):
+            old.unlink()
     began = time.monotonic()
     for wheel in wheels:
         start = time.monotonic()

@@ -35,7 +35,7 @@ NEEDS = {
         "ld-linux-aarch64.so.1",
     },
     "macos": {"/usr/lib/libSystem.B.dylib"},
-    "windows": {"python3.dll", "kernel32.dll", "ntdll.dll"},
+    "windows": {"python3.dll", "kernel32.dll", "ntdll.dll", "bcryptprimitives.dll"},
 }
 
 
