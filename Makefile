@@ -24,7 +24,7 @@ LISTED := $(shell find rust/core/src/model/steppers rust/core/src/model/systems 
 WHEELS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-long test-wheels test-oldest campaign wheel wheels release deny licences dev bench format pins clean
+.PHONY: help demo docs test test-long test-wheels test-oldest test-aarch64 campaign wheel wheels release deny licences dev bench format pins clean
 .PHONY: hooks lint lint-rust lint-python check-rust check-python check-workflows rust-build rust-test python-test python-beside
 
 help: ## list the targets
@@ -79,6 +79,15 @@ deny: ## check the licences and sources of the crates, and known faults in them,
 
 licences: ## write the licences of the crates in a wheel into THIRD-PARTY.txt
 	$(PYTHON) .ci/licences.py
+
+# Recorded bits first: they cover every method, system and form. Debian's cross compiler links; an emulator runs the tests.
+EMULATED := recorded_bits kernels
+test-aarch64: .venv/test ## build a wheel for AArch64 and run tests of it under an emulator: Debian's qemu-user and gcc-aarch64-linux-gnu
+	rustup target add aarch64-unknown-linux-gnu
+	rm -rf dist/aarch64
+	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
+	    $(BIN)/maturin build --release --quiet --target aarch64-unknown-linux-gnu --compatibility off --out dist/aarch64
+	$(BIN)/python tests/aarch64.py .venv/aarch64 dist/aarch64/*.whl $(EMULATED:%=tests/test_%.py)
 
 dev: .venv/test ## install in place, for work on the code; run again after a change in rust/
 	$(BIN)/maturin develop --release --quiet

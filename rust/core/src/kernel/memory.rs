@@ -91,7 +91,7 @@ mod system {
 
     impl Drop for Executable {
         fn drop(&mut self) {
-            // SAFETY: mapped in `new`, and nobody borrows it any more. If it fails, the pages stay, which harms nobody.
+            // SAFETY: mapped in `new`, and no borrow of it is left. If it fails, the pages stay, which does no harm.
             unsafe { libc::munmap(self.start.cast(), self.length) };
         }
     }

@@ -53,6 +53,11 @@ fn read_back<T: Real>(file: &str) {
         let (one, vector) = if T::PRECISION == Precision::Double { ("d", "2d") } else { ("s", "4s") };
         for (name, operands) in &made {
             assert!(known.contains(name.as_str()), "seed {seed}: {name}");
+            let general = |number: u32| {
+                operands.split([',', ' ', '[', ']']).any(|each| each == format!("x{number}") || each == format!("w{number}"))
+            };
+            assert!(!general(18), "seed {seed}: {name} {operands}: x18 belongs to the system on macOS and on Windows");
+            assert!(!(19..30).any(general), "seed {seed}: {name} {operands}: belongs to the caller");
             let is_right = match (&name[..1], name.as_str()) {
                 ("f", _) => kind(operands) == if shape.width > 1 { vector } else { one },
                 (_, "ldr" | "str") => [one, "q", "x"].contains(&kind(operands)),
