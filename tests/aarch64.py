@@ -1,8 +1,8 @@
 """The tests of a wheel for AArch64, under an emulator: ``python tests/aarch64.py FOLDER WHEEL TESTS``.
 
-Everything is put into the folder: Python for AArch64, from Debian, without a change to this system and without root; NumPy and pytest
-for AArch64, from the package index; and the wheel. Programs that a test would start are not emulated, so that the tests are those
-that start none.
+Everything is put into the folder: Python for AArch64, from Debian, without a change to this system and without root; NumPy and
+pytest for AArch64, from the package index; and the wheel. Programs that a test would start are not emulated, so that the tests
+are those that start none.
 """
 
 from __future__ import annotations
@@ -16,6 +16,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 #: What the tests import.
 NEEDS = ("numpy", "pytest", "hypothesis")
+#: What must be under test.
+USED = """
+import platform, stepwell as sw
+print(platform.machine(), sw.__file__, *sw.isa_levels())
+assert sw.isa_levels() == ["interpret", "neon"]
+"""
 TAGS = ("manylinux2014_aarch64", "manylinux_2_28_aarch64", "linux_aarch64")
 
 
@@ -74,9 +80,10 @@ def main() -> int:
     say = "import sys; print('{}.{}'.format(*sys.version_info))"
     version = subprocess.run([*python, "-c", say], env=own, check=True, capture_output=True, text=True).stdout.strip()
     own["PYTHONPATH"] = str(install(place, Path(wheel), version))
-    ran = "import platform, stepwell as sw; print(platform.machine(), sw.__file__, *sw.isa_levels()); assert sw.isa_levels()[-1] == 'neon'"
-    subprocess.run([*python, "-c", ran], env=own, check=True)
-    return subprocess.run([*python, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests], env=own, cwd=ROOT, check=False).returncode
+    subprocess.run([*python, "-c", USED], env=own, check=True)
+    return subprocess.run(
+        [*python, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests], env=own, cwd=ROOT, check=False
+    ).returncode
 
 
 if __name__ == "__main__":
