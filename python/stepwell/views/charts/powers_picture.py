@@ -37,14 +37,14 @@ def draw(chart: Powers) -> Figure:
         error.plot(chart.steps, chart.steps * 2.0**-53, color=GREY, linewidth=0.9)
         middle = int(chart.steps[len(chart.steps) // 2])
         error.annotate("n·2⁻⁵³", (middle, middle * 2.0**-53), (-58, 4), textcoords="offset points", color=GREY)
-        time.legend(frameon=False, loc="upper left")
+        time.legend(frameon=False, loc="upper left", fontsize=12.5)
         put_title(figure, 0.012, 0.925, finding(chart), 20)
         what = f"{type(chart.system).__name__}, dt = {chart.dt:g}, one trajectory, kernels for {chart.isa}"
         figure.text(0.012, 0.865, textwrap.shorten(what, 140), size=13.5, color=GREY)
         note = (
             "Error: distance from the method's own state in exact arithmetic. Time: median, from the call in Python to its end."
         )
-        figure.text(0.012, 0.03, note, size=12, color=GREY)
+        figure.text(0.012, 0.03, note, size=12.5, color=GREY)
     return figure
 
 
