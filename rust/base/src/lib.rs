@@ -8,5 +8,7 @@ pub mod aligned;
 pub mod bodies;
 pub mod forces;
 pub mod functions;
+#[cfg(all(windows, target_env = "gnu"))]
+mod fused;
 pub mod isa;
 pub mod number;

@@ -81,3 +81,31 @@ mod symbols {
         holds(log, log, wide.chain([1.0, 0.5, 2.0, 1.0 + 1e-15, 1.0 - 1e-15, f64::MAX, f64::MIN_POSITIVE]));
     }
 }
+
+mod fused {
+    use std::hint::black_box;
+
+    /// Where it is no instruction of the CPU, too, whatever C library the program is linked with. Rounded twice, none of these is
+    /// right.
+    #[test]
+    fn multiply_add_is_rounded_once() {
+        let wanted = [
+            ([-1.940727735054662, -1.0510269395072387, -4.2300311273163946e-308], 2.0397571317913163),
+            ([-2.4219913019074057e161, 1.9069232203702824, 4.618551453142084e161], 1.078372695694632e146),
+            ([f64::MAX, 4.023768e6, f64::NEG_INFINITY], f64::NEG_INFINITY),
+            ([5e-324, -1.1302133916300054, 5e-324], -0.0),
+        ];
+        for (of, wanted) in wanted {
+            let [a, b, c] = of.map(black_box);
+            assert_eq!(a.mul_add(b, c).to_bits(), f64::to_bits(wanted), "{of:?}");
+        }
+        let wanted = [
+            ([8.881077e3f32, -8.877085e26, -8.8038376e-16], -7.883808e30),
+            ([1.526359e-26, -6.830714e29, 2.671443e-23], -1.0426122e4),
+        ];
+        for (of, wanted) in wanted {
+            let [a, b, c] = of.map(black_box);
+            assert_eq!(a.mul_add(b, c).to_bits(), f32::to_bits(wanted), "{of:?}");
+        }
+    }
+}

@@ -10,7 +10,8 @@ use crate::tape::real::Real;
 /// The rounding that Rust and C start with.
 const TO_NEAREST: u32 = 0x1F80;
 
-/// How kernels are called.
+/// How kernels are called. On x86-64 as Unix calls, on Windows, too: the code is the same everywhere, and the compiler saves what
+/// only Windows wants kept (xmm6 to xmm15, rsi, rdi) where it calls a kernel.
 #[cfg(target_arch = "x86_64")]
 type Function = extern "sysv64" fn(*mut Arguments);
 #[cfg(not(target_arch = "x86_64"))]

@@ -10,7 +10,7 @@ pub(crate) fn read(kernel: &Written, is_fused: bool) -> usize {
     let (code, frame, shape) = (kernel.code(), kernel.frame(), kernel.shape());
     let mut decoder = Decoder::with_ip(64, code, 0, DecoderOptions::NONE);
     let mut starts = Vec::new();
-    let mut branches = 0;
+    let (mut branches, mut pushes) = (0, 0);
     let bytes = shape.bytes as u64;
     let row = bytes * frame.lanes as u64;
     let block = bytes * (shape.width * shape.block_vectors) as u64;
@@ -21,6 +21,7 @@ pub(crate) fn read(kernel: &Written, is_fused: bool) -> usize {
         starts.push(i.ip());
         let is_single = bytes == 4;
         assert!(is_known(i.mnemonic(), is_single) || is_fused && is_multiply_add(i.mnemonic(), is_single), "{i}");
+        pushes += usize::from(i.mnemonic() == Mnemonic::Push);
         moves += usize::from(matches!(
             i.mnemonic(),
             Mnemonic::Vshufpd
@@ -79,7 +80,17 @@ pub(crate) fn read(kernel: &Written, is_fused: bool) -> usize {
         }
     }
     assert!(branches <= 2);
+    // One word of the stack, and no operand is there: no guard page of Windows is passed over, and nothing is below rsp.
+    assert_eq!(pushes, 1);
     moves
+}
+
+/// Which vector registers are in the code.
+#[cfg(windows)]
+pub(crate) fn vectors(kernel: &Written) -> Vec<usize> {
+    let decoder = Decoder::with_ip(64, kernel.code(), 0, DecoderOptions::NONE);
+    let registers = decoder.into_iter().flat_map(|i| [i.op0_register(), i.op1_register(), i.op2_register()]);
+    registers.filter(|register| register.is_vector_register()).map(|register| register.number()).collect()
 }
 
 fn writes(i: &Instruction) -> bool {
