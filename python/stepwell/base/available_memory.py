@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 
 
@@ -29,7 +30,9 @@ def _bounds() -> Iterator[tuple[float, str]]:
     try:
         yield 1024.0 * _fields("/proc/meminfo")["MemAvailable:"], "memory of this machine"
     except (OSError, KeyError):
-        if hasattr(os, "sysconf"):
+        if sys.platform == "win32":
+            yield _of_windows(), "memory of this machine"
+        elif hasattr(os, "sysconf"):
             yield float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES")), "memory of this machine"
     for folder, names in _control_groups():
         try:
@@ -43,6 +46,18 @@ def _bounds() -> Iterator[tuple[float, str]]:
         # The page cache of inactive files is released when memory is needed.
         used -= fields.get("total_inactive_file", fields.get("inactive_file", 0))
         yield float(most - used), "memory limit of the control group"
+
+
+def _of_windows() -> float:
+    """The bytes that are free, in memory and in what may still be promised: Windows promises no page that has no place."""
+    import ctypes
+
+    # MEMORYSTATUSEX: its own length and the load in per cent, 32 bits each; then seven numbers of 64 bits, of which the second is
+    # the free memory and the fourth what may still be promised.
+    status = (ctypes.c_uint64 * 8)(64)
+    if sys.platform == "win32":  # the types of other systems have no windll
+        ctypes.windll.kernel32.GlobalMemoryStatusEx(status)
+    return float(min(status[2], status[4]))
 
 
 def _control_groups() -> Iterator[tuple[str, tuple[str, str]]]:

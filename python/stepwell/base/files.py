@@ -10,6 +10,25 @@ from pathlib import Path
 from typing import TextIO
 from uuid import uuid4
 
+from ..errors import ArgumentError
+from .checks import short
+from .paths import PATH
+
+
+def put(beside: Path, place: Path, argument: str = "path") -> None:
+    """Move a complete file or folder to its place, instead of the old file.
+
+    Raises:
+        ArgumentError: if the system refuses. Windows does while any program has the old file open.
+    """
+    try:
+        os.replace(beside, place)
+    except PermissionError as error:
+        raise ArgumentError(
+            f"{argument}: {short(str(place), PATH)} cannot be replaced: {error.strerror}; close the program that has it open, or "
+            f"give another path"
+        ) from error
+
 
 @contextmanager
 def replaced(place: Path) -> Iterator[TextIO]:
@@ -29,7 +48,7 @@ def replaced(place: Path) -> Iterator[TextIO]:
             yield file
         if target.exists():
             shutil.copymode(target, beside)
-        os.replace(beside, target)
+        put(beside, target)
     except BaseException:
         beside.unlink(missing_ok=True)
         raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
 
 #: The most characters of a path in a message.
 PATH = 1000
+
+#: The most characters of the name of a file or folder on Windows.
+LONGEST_NAME = 255
 
 
 def file(argument: str, path: Any, endings: tuple[str, ...] = ()) -> Path:
@@ -28,6 +32,7 @@ def file(argument: str, path: Any, endings: tuple[str, ...] = ()) -> Path:
         known = f"{', '.join(others)} or {last}" if others else last
         raise ArgumentError(f"{argument}: expected a file ending in {known}, got {short(str(path), PATH)}")
     try:
+        _check_name(place)
         if place.is_dir():
             from errno import EISDIR  # an error alone needs it
 
@@ -55,6 +60,7 @@ def folder(argument: str, path: Any, names: Iterable[str] = ()) -> Path:
     try:
         if "\0" in str(place):
             raise ValueError("embedded null byte")
+        _check_name(place)
         there = next(each for each in (place.absolute(), *place.absolute().parents) if each.exists())
         with TemporaryFile(dir=there):
             pass
@@ -66,6 +72,17 @@ def folder(argument: str, path: Any, names: Iterable[str] = ()) -> Path:
             raise
         raise _unwritable(argument, "folder", path, error) from None
     return place
+
+
+def _check_name(place: Path) -> None:
+    """Raise if Windows would take what is before a colon for the name, and write where nobody looks, or find a name too long."""
+    if sys.platform != "win32":
+        return
+    for part in place.parts[bool(place.anchor) :]:
+        if ":" in part:
+            raise ValueError("a name has no colon on Windows")
+        if len(part) > LONGEST_NAME:
+            raise ValueError(f"a name has at most {LONGEST_NAME} characters on Windows")
 
 
 def _unwritable(argument: str, what: str, path: Any, error: Exception) -> ArgumentError:

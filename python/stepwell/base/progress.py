@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from html import escape
 from typing import Any
 
+from .streams import shows_escapes
+
 #: The least time between two updates of a notebook or of a line of text, in seconds.
 MIN_SECONDS_BETWEEN = 0.1
 
@@ -78,7 +80,7 @@ def _in_a_page(title: str) -> Iterator[Callable[[float], object]]:
 
 def _in_a_line(title: str) -> Iterator[Callable[[float], object]]:
     """A line of a terminal that is written over, and removed at the end."""
-    if not sys.stderr.isatty():
+    if not shows_escapes(sys.stderr):
         yield lambda share: None
         return
 

@@ -11,7 +11,7 @@ from uuid import uuid4
 import numpy as np
 
 from .. import _core
-from ..base import checks, paths
+from ..base import checks, files, paths
 from ..base.optional import imported
 from ..errors import ArgumentError, DTypeError, StepwellError
 from .parts import Arrays, Reader, Writer, is_whole
@@ -42,7 +42,7 @@ def save(run: Run, path: str | Path) -> None:
             with beside.open("xb") as file:
                 about = {ABOUT: np.array(text), FORM: np.array([VERSION]), "stepwell_version": np.array(_core.__version__)}
                 np.savez(file, **about, **writer.arrays)  # type: ignore[arg-type]  # NumPy's stubs mean one of its options
-            beside.replace(place)
+            files.put(beside, place)
         except BaseException:
             beside.unlink(missing_ok=True)
             raise
@@ -59,8 +59,8 @@ def save(run: Run, path: str | Path) -> None:
             stored[...] = array
         group.attrs.update({ABOUT: text, FORM: VERSION, "stepwell_version": _core.__version__})
         if replaced:
-            place.replace(old := place.with_name(f"{place.stem}.{uuid4().hex}.old"))
-        beside.replace(place)
+            files.put(place, old := place.with_name(f"{place.stem}.{uuid4().hex}.old"))
+        files.put(beside, place)
     except BaseException:
         shutil.rmtree(beside, ignore_errors=True)
         raise

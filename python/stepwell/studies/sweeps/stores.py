@@ -7,12 +7,13 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...base import checks, paths
+from ...base import checks, files, paths
 from ...base.arrays import Array, Shape
 from ...errors import ArgumentError, ShapeError, TooLargeError
 from .axes import Chunk
@@ -49,7 +50,7 @@ class Memory:
         """Store the results of a chunk."""
         if not self.arrays:
             self.about = self.layout.arrays(results)
-            numbers = sum(each.dtype.itemsize * float(np.prod(each.shape)) for each in self.about.values()) / 8.0
+            numbers = sum(each.dtype.itemsize * float(prod(each.shape)) for each in self.about.values()) / 8.0
             checks.fits("the results", numbers, (), "give store=, a folder on disk")
             self.arrays = {name: np.full(each.shape, each.fill, each.dtype) for name, each in self.about.items()}
         for name, values in along_dims(results, chunk).items():
@@ -186,7 +187,7 @@ class Zarr:
         counts = _counts(self.layout.grid.shape, self.chunk_shape)
         progress = group.create_group(PROGRESS)
         progress.create_array(HASHES, shape=counts, chunks=(1,) * len(counts), dtype="uint64", fill_value=0, compressors=None)
-        os.replace(beside, self.path)
+        files.put(beside, self.path, "store")
         self.group = self._zarr.open_group(self.path, mode="r+", use_consolidated=False)
 
     def _chunks(self) -> Iterator[dict[str, Array]]:
@@ -245,7 +246,7 @@ class NetCDF(Zarr):
             with opened(self.path, chunks={}) as dataset:
                 _room(self.file, dataset.nbytes)  # HDF5 may crash where a file cannot grow
                 dataset.drop_encoding().to_netcdf(part, engine="h5netcdf")
-            os.replace(part, self.file)
+            files.put(part, self.file, "store")
         if self.path.exists():
             shutil.rmtree(self.path)
         return xarray.open_dataset(self.file, engine="h5netcdf")

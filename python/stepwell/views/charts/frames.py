@@ -10,6 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from ...base.streams import reader_is_gone
 from ...errors import UnsupportedError
 from .style import Figure
 
@@ -158,11 +159,10 @@ def write_mp4(frames: Frames, path: Path, rate: float) -> None:
             for pixels in frames:
                 process.stdin.write(np.ascontiguousarray(pixels).data)
             process.stdin.close()
-        except BrokenPipeError:
-            pass  # ffmpeg says why
-        except BaseException:
-            process.kill()
-            raise
+        except BaseException as error:
+            if not (isinstance(error, OSError) and reader_is_gone(error)):  # then ffmpeg says why
+                process.kill()
+                raise
         message = process.stderr.read().decode(errors="replace").strip()
     if process.returncode != 0:
         raise UnsupportedError(f"animate: ffmpeg wrote no {path}: {message}")

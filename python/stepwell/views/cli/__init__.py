@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 
 from ... import __version__
-from ...base import checks
+from ...base import checks, streams
 from ...errors import StepwellError
 from . import show
 from .parser import Parser
@@ -41,6 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Without arguments it prints the list of commands.
     """
+    streams.write_utf8()
     parser = _parser()
     words = sys.argv[1:] if argv is None else list(argv)
     try:
@@ -52,10 +53,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         args = parser.parse_args(words)
         args.command(args)
         sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader closed the pipe. The rest of the output is discarded, or Python would fail to flush it at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (StepwellError, OSError) as error:
+        if isinstance(error, OSError) and streams.reader_is_gone(error):
+            # The rest of the output is discarded, or Python would fail to flush it at exit.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
         show.warn(f"stepwell: {error}")
         return FAILED
     except MemoryError as error:  # an allocation that no check foresaw

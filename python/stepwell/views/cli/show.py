@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
+from ...base.streams import shows_escapes
 from ...base.tables import json_text, write_csv, write_json
 from . import options
 from .table import BAD as BAD
@@ -43,7 +44,7 @@ def warn(message: str) -> None:
 
 def has_colours() -> bool:
     """Whether standard output is a terminal that shows colours, and the user wants them."""
-    return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb" and shows_escapes(sys.stdout)
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], notes: Sequence[str] = (), **layout: Any) -> None:
