@@ -23,8 +23,17 @@ LISTED := $(shell find rust/core/src/model/steppers rust/core/src/model/systems 
 # Which wheels `make wheels` builds, by the names in .ci/build_wheels.py; all if none is named.
 WHEELS ?=
 
+# Windows: the target of its builds, and a folder of their own, so that they wait for no other.
+WINDOWS := x86_64-pc-windows-gnu
+BUILT_FOR_WINDOWS := $(CURDIR)/target/windows
+IN_WINE := env -u STEPWELL_TESTS WINEPREFIX=$(CURDIR)/.venv/wine WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml= \
+           OPENBLAS_NUM_THREADS=1 CARGO_TARGET_DIR=$(BUILT_FOR_WINDOWS) CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUNNER=wine
+# What is tested by an interpreter for Windows: the bits, files, the console, Ctrl-C. How long writing a kernel takes is not: other
+# tests run meanwhile.
+TESTS_ON_WINDOWS := windows recorded_bits kernels fixed saved_runs output cli interrupt package
+
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-long test-wheels test-oldest test-aarch64 campaign wheel wheels release deny licences dev bench format pins clean
+.PHONY: help demo docs test test-long test-wheels test-oldest test-aarch64 test-windows campaign wheel wheels release deny licences dev bench format pins clean
 .PHONY: hooks lint lint-rust lint-python check-rust check-python check-workflows rust-build rust-test python-test python-beside
 
 help: ## list the targets
@@ -152,6 +161,10 @@ test-long: .venv/test ## run what `test` leaves out: every family of tests in fu
 	$(PYTEST) --long --durations=20
 	STEPWELL_EMULATED=12000 cargo test --release -p stepwell-core --test aarch64 --quiet
 
+test-windows: .venv/windows ## run the Rust tests, and the package's that concern the system, as Windows does: under Wine
+	$(IN_WINE) cargo test --release --workspace --quiet --target $(WINDOWS)
+	$(IN_WINE) $(BIN)/python tests/windows/piped.py .venv/for-windows/python.exe -m pytest -q -p no:cacheprovider -k "not in_time" $(TESTS_ON_WINDOWS:%=tests/test_%.py)
+
 # Each part is tried for a while, and says how often it was and what was found: docs/developing/reliability.md.
 CAMPAIGN_SECONDS ?= 600
 campaign: .venv/test ## look for faults: fuzzed calls for CAMPAIGN_SECONDS, random systems, memory, threads, processes
@@ -206,6 +219,18 @@ $(BIN)/python$(EXE):
 .venv/wheels: .venv/zig .ci/build_wheels.py .ci/zig-windows $(SOURCES)
 	$(BIN)/python .ci/build_wheels.py $(WHEELS)
 	@test -n "$(WHEELS)" || touch $@
+
+# Wine's folder, with a library that it lacks, and an interpreter with the package.
+.venv/windows: .venv/bin/python $(SOURCES) $(wildcard tests/windows/*)
+	@for tool in wine x86_64-w64-mingw32-gcc rustup; do command -v $$tool > /dev/null || \
+	  { echo "there is no $$tool here: Debian's packages are wine, wine64 and gcc-mingw-w64-x86-64-win32; rustup is of https://rustup.rs"; exit 1; }; done
+	rustup target add $(WINDOWS)
+	$(IN_WINE) wine wineboot --init < /dev/null 2> /dev/null
+	x86_64-w64-mingw32-gcc -O2 -shared tests/windows/random.c -ladvapi32 -o .venv/wine/drive_c/windows/system32/bcryptprimitives.dll
+	$(IN_WINE) PYO3_CROSS=1 cargo build --release --quiet --target $(WINDOWS) -p stepwell-py --features pyo3/extension-module
+	rm -rf .venv/for-windows
+	$(BIN)/python tests/windows/interpreter.py .venv/for-windows $(BUILT_FOR_WINDOWS)/$(WINDOWS)/release/_core.dll
+	@touch $@
 
 # The wheel with the extras that a target asks for. What these need is installed while the wheel is built, if make may do two things.
 .venv/demo .venv/demo.needs: EXTRA = chart
