@@ -14,7 +14,7 @@ HEAD = """Besides stepwell, whose licence is in LICENSE, the compiled core of a 
 library of Rust. Each licence is printed once, after the names and copyrights that it stands for. `make licences` writes this.
 """
 #: The order in which a crate's files are looked for: of several licences the shortest is taken.
-NAMES = ("LICENSE-MIT", "LICENSE-MIT.md", "LICENSE-MIT.txt", "LICENSE")
+NAMES = ("LICENSE-MIT", "LICENSE-MIT.md", "LICENSE-MIT.txt", "LICENSE", "LICENSE.txt")
 #: What no crate says: the standard library is MIT OR Apache-2.0, and zig's and LLVM's support for compiled code has no demands.
 RUST = ("The Rust standard library", "Copyright (c) The Rust Project Contributors")
 
