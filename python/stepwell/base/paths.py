@@ -75,7 +75,7 @@ def folder(argument: str, path: Any, names: Iterable[str] = ()) -> Path:
 
 
 def _check_name(place: Path) -> None:
-    """Raise if Windows would take what is before a colon for the name, and write where nobody looks, or find a name too long."""
+    """Raise where Windows would write into a hidden part of a file, whose name ends at a colon, or find a name too long."""
     if sys.platform != "win32":
         return
     for part in place.parts[bool(place.anchor) :]:

@@ -13,7 +13,7 @@ OBEYS_ESCAPES = 4
 
 
 def reader_is_gone(error: OSError) -> bool:
-    """Whether writing to a pipe failed because nobody reads it any more; Windows calls that an invalid argument."""
+    """Whether writing to a pipe failed because its reader has gone; Windows calls that an invalid argument."""
     return isinstance(error, BrokenPipeError) or (error.errno == errno.EINVAL and error.filename is None)
 
 
