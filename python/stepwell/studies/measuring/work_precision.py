@@ -66,8 +66,9 @@ def work_precision(
     """Run a scene by many methods with many steps and tolerances, and measure errors, stability and cost.
 
     Each point is a run over the scene's horizon. Its errors are the largest of the run, that at the end, the phase error at
-    the end and the energy error. Cost is counted in function (rate) evaluations per unit of simulated time. It is also measured,
-    for a single run and for a batch of equal members, on one thread. Everything but the times is repeatable to the bit.
+    the end and the energy error. Cost is counted in function (rate) evaluations per unit of simulated time, which leaves out
+    the linear algebra of implicit methods. It is also measured, for a single run and for a batch of equal members, on one
+    thread. Everything but the times is repeatable to the bit.
 
     A scene without an exact solution is compared with a run to a tight tolerance, as long as a less tight one agrees with it; the
     horizon ends there. A scene's control is omitted, since the true motion has none.

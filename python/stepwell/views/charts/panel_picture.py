@@ -10,7 +10,7 @@ from ...studies.measuring.data import StiffSteps, WorkPrecision
 from .cheapest_picture import DIGITS, draw_table
 from .labels import title as put_title
 from .panel import Panel
-from .picture import COUNTED, DIGITS_OF, ERRORS, draw_errors, family_of, name_curves, with_way
+from .picture import COUNTED, DIGITS_OF, ERRORS, draw_errors, family_of, has_implicit, name_curves, with_way
 from .style import DPI, GREY, Axes, Figure, page
 
 #: Subplots in a row; if each scene has two; and the most scenes that are all drawn by their curves.
@@ -62,6 +62,8 @@ def draw(panel: Panel, error: str) -> Figure:
         )
         figure.text(0.012, 1.0 - 0.72 / height, what if table else PALE_IS, size=12, color=GREY)
         foot = f"{' and '.join(ERRORS[kind] for kind in kinds)}, over {COUNTED}"
+        if any(map(has_implicit, panel.charts)):
+            foot += "; implicit methods without linear algebra"
         figure.text(0.012, 0.14 / height, textwrap.shorten(foot, 140), size=12, color=GREY)
     return figure
 

@@ -243,17 +243,23 @@ def _text(figure: Figure, chart: WorkPrecision, error: str, time: str, unnamed: 
     parts += [str(chart.stiff)] if chart.stiff else []
     parts += [f"Hoffmann (2002), {scene.section}"] if scene.section.startswith("§") else []
     figure.text(0.012, 0.908, textwrap.shorten("; ".join(parts), NOTE - 15), size=13, color=GREY)
-    what = f"one member of a batch of {chart.members}" if time == "batch" else "a single run"
+    counted = "Evaluations: without the linear algebra of implicit methods. " if has_implicit(chart) else ""
+    what = f"one trajectory of a batch of {chart.members}" if time == "batch" else "a single run"
     not_named = f" Not named: {', '.join(unnamed)}." if unnamed else ""
     notes = (
         f"In colour: cheapest for some error.{not_named} Error 1, no digit right: {scene.error}."
         + (" Grey: not known." if chart.floor else ""),
         "Above the panels: runs without a right digit, ○ bounded, × unstable; a method's own marker is where that begins.",
-        f"Time: {what}, one thread, {chart.isa}; median of {chart.repeats} runs, the bar at a curve's end spans them.",
+        f"{counted}Time: {what}, one thread, {chart.isa}; median of {chart.repeats} runs, bars span them.",
         *not_applicable(chart),
     )
     lines = [textwrap.shorten(note, NOTE, placeholder=" …") for note in notes]
     figure.text(0.012, 0.014, "\n".join(lines), size=11.0, color=GREY, linespacing=1.25)
+
+
+def has_implicit(chart: WorkPrecision) -> bool:
+    """Whether evaluations are less than the work of some method: it solves equations, too."""
+    return any(getattr(curve.method, "is_implicit", False) for curve in chart.curves)
 
 
 def not_applicable(chart: WorkPrecision) -> list[str]:
