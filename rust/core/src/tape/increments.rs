@@ -56,13 +56,14 @@ fn negated_sums(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let mut made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
     let mut place = Vec::<Id>::with_capacity(tape.ops().len());
     for op in tape.ops() {
-        let id = match op {
-            Op::Sub(a, b) if let Op::Neg(x) = tape.op(*a) => {
-                let (x, y) = (place[x as usize], place[*b as usize]);
-                let sum = made.keep(Op::Add(x.min(y), x.max(y)));
-                made.keep(Op::Neg(sum))
-            }
-            _ => made.keep(op.with(|id| place[id as usize])),
+        let id = if let Op::Sub(a, b) = op
+            && let Op::Neg(x) = tape.op(*a)
+        {
+            let (x, y) = (place[x as usize], place[*b as usize]);
+            let sum = made.keep(Op::Add(x.min(y), x.max(y)));
+            made.keep(Op::Neg(sum))
+        } else {
+            made.keep(op.with(|id| place[id as usize]))
         };
         place.push(id);
     }
