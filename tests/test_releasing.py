@@ -48,10 +48,10 @@ def test_the_version_is_the_same_everywhere() -> None:
 
 
 def test_the_versions_of_python_are_those_that_are_tested() -> None:
-    told = {name.rpartition(" ")[2] for name in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", name)}
+    classified = {name.rpartition(" ")[2] for name in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", name)}
     matrix = jobs(ROOT / ".github" / "workflows" / "test.yml")["test"]["strategy"]["matrix"]
-    assert {*matrix["python"], *(each["python"] for each in matrix["include"])} == told
-    assert min(told, key=lambda name: int(name[2:])) == PROJECT["requires-python"].removeprefix(">=")
+    assert {*matrix["python"], *(each["python"] for each in matrix["include"])} == classified
+    assert min(classified, key=lambda name: int(name[2:])) == PROJECT["requires-python"].removeprefix(">=")
 
 
 def test_licences_are_of_the_crates_in_a_wheel() -> None:
