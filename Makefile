@@ -89,14 +89,17 @@ deny: ## check the licences and sources of the crates, and known faults in them,
 licences: ## write the licences of the crates in a wheel into THIRD-PARTY.txt
 	$(PYTHON) .ci/licences.py
 
-# Recorded bits first: they cover every method, system and form. Debian's cross compiler links; an emulator runs the tests.
-EMULATED := recorded_bits kernels
-test-aarch64: .venv/test ## build a wheel for AArch64 and run tests of it under an emulator: Debian's qemu-user and gcc-aarch64-linux-gnu
+# Recorded bits cover every method, system and form; of the tests of kernels those that start no program and measure no time. The
+# folder of its builds is its own, so that they wait for no other.
+TESTS_ON_AARCH64 := tests/test_recorded_bits.py tests/test_kernels.py -k "recorded or threads or parent or border"
+test-aarch64: .venv/maturin ## run the package's tests of bits, threads and processes on AArch64: a wheel under an emulator
+	@for tool in qemu-aarch64 aarch64-linux-gnu-gcc rustup; do command -v $$tool > /dev/null || \
+	  { echo "there is no $$tool here: Debian's packages are qemu-user and gcc-aarch64-linux-gnu; rustup is of https://rustup.rs"; exit 1; }; done
 	rustup target add aarch64-unknown-linux-gnu
 	rm -rf dist/aarch64
-	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
-	    $(BIN)/maturin build --release --quiet --target aarch64-unknown-linux-gnu --compatibility off --out dist/aarch64
-	$(BIN)/python tests/aarch64.py .venv/aarch64 dist/aarch64/*.whl $(EMULATED:%=tests/test_%.py)
+	CARGO_TARGET_DIR=$(CURDIR)/target/aarch64 CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
+	  $(BIN)/maturin build --release --quiet --target aarch64-unknown-linux-gnu --compatibility off --out dist/aarch64
+	$(BIN)/python tests/aarch64.py .venv/aarch64 dist/aarch64/*.whl $(TESTS_ON_AARCH64)
 
 dev: .venv/test ## install in place, for work on the code; run again after a change in rust/
 	$(BIN)/maturin develop --release --quiet
