@@ -184,17 +184,17 @@ def test_bodies_that_meet_on_the_way_back_are_told() -> None:
 
 
 REFUSED: dict[str, tuple[Any, dict[str, Any], str]] = {
-    "friction": (sw.Oscillator(form="physical", friction=0.1), {"v": 0.0, "y": 1.0}, "friction that sticks forgets"),
-    "a bounce": (sw.Particles(floor=sw.Floor()), {"v": np.zeros((1, 2)), "y": np.ones((1, 2))}, "a bounce is found where a step"),
+    "friction": (sw.Oscillator(form="physical", friction=0.1), {"v": 0.0, "y": 1.0}, "friction that sticks has none"),
+    "a bounce": (sw.Particles(floor=sw.Floor()), {"v": np.zeros((1, 2)), "y": np.ones((1, 2))}, "cannot undo a bounce"),
     "a control": (
         sw.NBody([1.0, 1.0]),
         {"v": np.zeros((2, 2)), "y": np.array([[0.0, 0.0], [1.0, 0.0]]), "control": sw.EnergyControl(0.3)},
-        "drives back to its target as time goes on",
+        "would drive away from its target",
     ),
     "a norm": (
         sw.RigidBody([1.0, 2.0, 3.0]),
         {"v": np.ones(3), "y": np.array([1.0, 0.0, 0.0, 0.0]), "control": sw.NormControl(1.0)},
-        "drives back to its target as time goes on",
+        "would drive away from its target",
     ),
 }
 
@@ -202,10 +202,10 @@ REFUSED: dict[str, tuple[Any, dict[str, Any], str]] = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_has_no_past_says_why(name: str) -> None:
     system, start, why = REFUSED[name]
-    with pytest.raises(UnsupportedError, match=f"dt: below zero time runs back, and .*{why}"):
+    with pytest.raises(UnsupportedError, match=f"^dt: .*a negative step .*{why}"):
         sw.integrate(system, "rk4", dt=-0.1, steps=3, **start)
     arrays = {key: np.array(each) if key in ("v", "y") else each for key, each in start.items()}
-    with pytest.raises(UnsupportedError, match=f"dt: below zero time runs back, and .*{why}"):
+    with pytest.raises(UnsupportedError, match=f"^dt: .*a negative step .*{why}"):
         sw.World(system, "rk4", dt=-0.1, **arrays)
 
 

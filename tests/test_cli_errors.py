@@ -25,7 +25,7 @@ from support.commands import run_command
         (["run", "clover", "--method", "rk4", "--control", "x"], "--control: expected a gain and a form, such as 0.3:printed"),
         (["run", "clover", "--method", "rk4", "--control", "1:prnted"], "form: there is no 'prnted'; did you mean 'printed'?"),
         (["run", "clover", "--method", "rk4", "--control=-1"], "gain: expected numbers of zero or more"),
-        (["run", "clover", "--method", "verlet", "--control", "1"], "control: verlet goes on with y_prev in place of v"),
+        (["run", "clover", "--method", "verlet", "--control", "1"], "control: verlet carries y_prev in place of v"),
         (["run", "clover", "--method", "rk4", "-o", "run.gif", "--fps", "0"], "fps: expected numbers above zero"),
         (["chart", "oscillator", "clovr"], "did you mean 'clover'?"),
         (["chart", "oscillator", "--methods", "rk4,"], "method: there is no ''"),

@@ -301,7 +301,7 @@ def test_projections_keep_the_promises(bodies: int, way: str, method: str) -> No
 @pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.carry is not None])
 @pytest.mark.parametrize("control", [sw.EnergyControl(0.3), sw.Projection(), sw.Projection("nacozy")])
 def test_methods_that_go_on_without_a_velocity_are_refused(method: str, control: Any) -> None:
-    with pytest.raises(UnsupportedError, match=rf"control: {method} goes on with (y_prev|v_half) in place of v.*use pefrl"):
+    with pytest.raises(UnsupportedError, match=rf"control: {method} carries (y_prev|v_half) in place of v.*use pefrl"):
         sw.integrate(sw.NBody(), method, **START, dt=0.01, steps=1, control=control)
 
 

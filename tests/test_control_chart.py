@@ -70,7 +70,7 @@ def test_numbers_are_those_of_single_runs(chart: ControlSweep, kind: str) -> Non
 def test_what_cannot_be_controlled_is_told(chart: ControlSweep) -> None:
     assert chart.line("leapfrog", "none").state_error < 0.1
     assert set(chart.refused) == {("leapfrog", kind) for kind in KINDS[1:]}
-    assert "leapfrog goes on with v_half in place of v" in chart.refused["leapfrog", "limited"]
+    assert "leapfrog carries v_half in place of v" in chart.refused["leapfrog", "limited"]
     with pytest.raises(UnknownNameError, match="kind: there is no 'limited'"):
         chart.line("leapfrog", "limited")
 

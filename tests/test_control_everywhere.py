@@ -237,7 +237,7 @@ def test_a_control_that_begins_to_overshoot_is_told_of_when_it_does() -> None:
 
 def test_what_is_refused_names_what_to_do() -> None:
     system, start = bodies(3)
-    with pytest.raises(UnsupportedError, match="control: leapfrog goes on with v_half in place of v"):
+    with pytest.raises(UnsupportedError, match="control: leapfrog carries v_half in place of v"):
         sw.integrate(system, "leapfrog", **start, dt=0.1, steps=1, control=sw.Projection())
     with pytest.raises(UnsupportedError, match="pefrl needs a second-order system"):
         sw.integrate(own.pendulum(), "pefrl", v=0.0, y=1.0, dt=0.1, steps=1, control=sw.Control("energy", 1.0))

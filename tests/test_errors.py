@@ -123,7 +123,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: run(sw.Oscillator(x=0.5, a=sw.Sampled([1.0, 2.0], 0.1)), form="power"),
         E.UnsupportedError,
-        "form: many steps are one power only if the inputs go on by a rule, as constants and sinusoids do, but a changes from "
+        "form: many steps are one power only if the inputs follow a formula, as constants and sinusoids do, but a changes from "
         "sample to sample; use form='matrix' or 'direct'",
     ),
     (lambda: run(resume=1.0), E.DTypeError, "resume: expected a Run or a World that goes on, got 1.0"),
@@ -157,7 +157,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: run(sw.NBody(), "leapfrog", y=np.eye(3, 2), control=sw.Projection()),
         E.UnsupportedError,
-        "control: leapfrog goes on with v_half in place of v, so it cannot be combined with Projection",
+        "control: leapfrog carries v_half in place of v, so it cannot be combined with Projection",
     ),
     # numbers
     (lambda: run(dt=0.0), E.ArgumentError, "dt: expected a number other than zero in units of time, got 0"),

@@ -149,7 +149,7 @@ def test_messages_name_the_time_of_the_member() -> None:
         sw.integrate(late(), "rk4", v=0.0, y=np.ones(3), t0=np.zeros(2), dt=0.1, steps=3)
     with pytest.raises(ArgumentError, match="t0: expected finite numbers"):
         sw.integrate(late(), "rk4", v=0.0, y=1.0, t0=np.array([0.0, np.nan]), dt=0.1, steps=3)
-    with pytest.raises(UnsupportedError, match="t0: one for each member works with float64"):
+    with pytest.raises(UnsupportedError, match="t0: an array works with float64 only"):
         sw.integrate(late(), "rk4", v=0.0, y=1.0, t0=np.zeros(2), dt=0.1, steps=3, dtype="float32")
     free = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, t0=np.arange(2.0), dt=0.1, steps=3, dtype="float32")
     np.testing.assert_array_equal(free.t[0], np.arange(2.0) + 3 * float(np.float32(0.1)))

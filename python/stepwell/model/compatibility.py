@@ -31,7 +31,7 @@ def fits_together(system: System, method: Method) -> None:
         )
     if system.keeper is not None and method.carry is not None:
         raise UnsupportedError(
-            f"control: {method.name} goes on with {method.carry} in place of v, so it cannot be combined with {system.keeper!r}, "
+            f"control: {method.name} carries {method.carry} in place of v, so it cannot be combined with {system.keeper!r}, "
             f"which changes v between steps; use pefrl or false_euler"
         )
 
@@ -69,8 +69,7 @@ def fits_own_times(system: System, single: bool) -> None:
     """Raise if members of a system cannot have times of their own."""
     if single and system.has_time:
         raise UnsupportedError(
-            "t0: one for each member works with float64, for in float32 t0 + k·dt of each would be rounded twice; make a run for "
-            "each t0"
+            "t0: an array works with float64 only, since in float32 t0 + k·dt would be rounded twice; make a run for each t0"
         )
 
 
@@ -78,20 +77,17 @@ def goes_back(system: System, control: Any) -> None:
     """Raise if a system has no unique past, so that steps back in time have no meaning."""
     if system.stick_friction is not None:
         raise UnsupportedError(
-            f"dt: below zero time runs back, and friction that sticks forgets how fast it was: {system!r} at rest has many "
-            f"pasts; use dt above zero"
+            f"dt: a negative step needs a unique past, and friction that sticks has none: {system!r} at rest may have had any "
+            f"speed before; use dt above zero"
         )
     if any(surface.way != "spring" for surface in system.contacts):
         raise UnsupportedError(
-            f"dt: below zero time runs back, and a bounce is found where a step ends behind a surface, as late as time goes on; "
-            f'got {system!r}. Use way="spring"; or of a motion without friction and loss step −v with dt above zero'
+            f'dt: a negative step cannot undo a bounce, got {system!r}; use way="spring", or, if nothing is lost, step −v '
+            f"with dt above zero"
         )
     control = system.keeper if control is None else control
     if isinstance(control, (EnergyControl, Control, NormControl)):
-        raise UnsupportedError(
-            f"dt: below zero time runs back, and {control!r} drives back to its target as time goes on, so away from it as time "
-            f"goes back; use a projection"
-        )
+        raise UnsupportedError(f"dt: with a negative step {control!r} would drive away from its target; use a projection")
 
 
 def goes_on_by_a_rule(system: System) -> None:
@@ -99,7 +95,7 @@ def goes_on_by_a_rule(system: System) -> None:
     for name, each in system.given_inputs().items():
         if isinstance(each, Sampled) and not each.constant:
             raise UnsupportedError(
-                f"form: many steps are one power only if the inputs go on by a rule, as constants and sinusoids do, but {name} "
+                f"form: many steps are one power only if the inputs follow a formula, as constants and sinusoids do, but {name} "
                 f"changes from sample to sample; use form='matrix' or 'direct'"
             )
 
