@@ -8,7 +8,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExec
 from typing import Any
 
 from ...base import checks
-from ...base.interrupts import available
+from ...base.interrupts import POLL, available
 from ...errors import ArgumentError, DTypeError
 from .axes import Chunk, Grid
 from .portable import packed, sweep_chunk
@@ -80,7 +80,8 @@ class Engine:
                     under_way.add(submit(chunk))
                 if not under_way:
                     return
-                done, under_way = wait(under_way, return_when=FIRST_COMPLETED)
+                # On Windows Ctrl-C does not interrupt a wait: it is heard after one.
+                done, under_way = wait(under_way, timeout=POLL, return_when=FIRST_COMPLETED)
                 for each in done:
                     yield each.result()
         finally:
