@@ -1,6 +1,6 @@
 //! Kernels that are written at run time: every bit as the interpreter has it, nothing touched that is not theirs, pages given
 //! back.
-#![cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_os = "linux")))]
+#![cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
 
 #[cfg(target_arch = "x86_64")]
