@@ -172,7 +172,7 @@ def test_the_sine_is_the_same(phases: list[float]) -> None:
 
 
 def test_nothing_in_the_core_breaks_the_promise() -> None:
-    """The grep gate: no contraction, no library power or trigonometry, no reordered sum, unsafe in two files only."""
+    """The grep gate: no contraction, no library power or trigonometry, no reordered sum, unsafe in four files only."""
     forbidden = (
         "mul_add",
         "powi(",
@@ -197,7 +197,8 @@ def test_nothing_in_the_core_breaks_the_promise() -> None:
         # What a fused multiply-add is, is said in one place; only a tape that was fused has some.
         wrong = [word for word in forbidden if (word, path.name) != ("mul_add", "eval.rs")]
         breaches = [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) for word in wrong if word in line]
-        if path.name not in ("isa.rs", "pages.rs"):
+        # What a CPU can do is asked, code is written and run, and one name is a C library's.
+        if path.name not in ("isa.rs", "memory.rs", "pages.rs", "fused.rs"):
             breaches += [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) if "unsafe" in line]
         assert not breaches
 

@@ -1,4 +1,4 @@
-//! Run-time CPU dispatch. The project's `unsafe` code is here and in the core's `kernel/pages.rs`.
+//! Run-time CPU dispatch. The `unsafe` code of the project is here, in `fused`, and in `memory` and `pages` of the kernels.
 //!
 //! A wheel is built for the oldest CPU of its platform. Loops that are not written at run time, such as those of the interpreter,
 //! are therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA by itself or
