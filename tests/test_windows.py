@@ -112,11 +112,17 @@ def test_what_is_piped_is_utf8() -> None:
     assert "Φ" in done.stdout.decode("utf-16-le")  # who asks for something else gets it
 
 
-def test_a_pipe_whose_reader_has_gone() -> None:
+def test_an_invalid_argument_is_an_error_but_on_windows() -> None:
+    assert streams.reader_is_gone(OSError(errno.EINVAL, "Invalid argument")) == WINDOWS
+
+
+def test_a_pipe_whose_reader_has_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     assert streams.reader_is_gone(BrokenPipeError())
-    assert streams.reader_is_gone(OSError(errno.EINVAL, "Invalid argument"))
-    assert not streams.reader_is_gone(OSError(errno.EINVAL, "Invalid argument", "a file"))
-    assert not streams.reader_is_gone(OSError(errno.ENOSPC, "No space left on device"))
+    with monkeypatch.context() as there:
+        there.setattr(sys, "platform", "win32")
+        assert streams.reader_is_gone(OSError(errno.EINVAL, "Invalid argument"))
+        assert not streams.reader_is_gone(OSError(errno.EINVAL, "Invalid argument", "a file"))
+        assert not streams.reader_is_gone(OSError(errno.ENOSPC, "No space left on device"))
     words = [sys.executable, "-m", "stepwell", "methods"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None

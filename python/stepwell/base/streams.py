@@ -14,7 +14,8 @@ OBEYS_ESCAPES = 4
 
 def reader_is_gone(error: OSError) -> bool:
     """Whether writing to a pipe failed because its reader has gone; Windows calls that an invalid argument."""
-    return isinstance(error, BrokenPipeError) or (error.errno == errno.EINVAL and error.filename is None)
+    windows_says = sys.platform == "win32" and error.errno == errno.EINVAL and error.filename is None
+    return isinstance(error, BrokenPipeError) or windows_says
 
 
 def write_utf8() -> None:
