@@ -288,7 +288,8 @@ function start(given) {
   addEventListener("resize", show);
   systemIsDark.addEventListener("change", show);
   // A site that shows the page in a frame says by a message which theme its reader chose.
-  window.addEventListener("message", ({ data: { theme } = {} }) => {
+  window.addEventListener("message", ({ data }) => {
+    const theme = data?.theme;
     if (!["light", "dark", "auto"].includes(theme)) return;
     siteTheme = theme;
     show();

@@ -353,7 +353,8 @@ function listen() {
   window.addEventListener("hashchange", () => location.hash !== own && readLink());
   window.addEventListener("resize", () => (page.dirty = true));
   systemIsDark.addEventListener("change", showTheme);
-  window.addEventListener("message", ({ data: { theme } = {} }) => {
+  window.addEventListener("message", ({ data }) => {
+    const theme = data?.theme;
     if (!["light", "dark", "auto"].includes(theme)) return;
     siteTheme = theme;
     showTheme();
