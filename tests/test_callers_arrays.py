@@ -84,6 +84,7 @@ MAKERS: dict[Any, list[Callable[[], dict[str, Any]]]] = {
         },
         lambda: {"pairs": [(0, 1), (1, 2)], "layout": np.arange(6.0).reshape(3, 2), "fixed": [0]},
     ],
+    sw.TransferFunction: [lambda: {"num": ones(2), "den": ones(3), "x": sampled()}],
     own: [lambda: {"stiffness": ones(2), "weights": ones(2), "push": sampled()}],
 }
 CASES = [pytest.param(make, each, id=f"{make.__name__} {i}") for make, all_of in MAKERS.items() for i, each in enumerate(all_of)]

@@ -49,6 +49,10 @@ from .model.systems import Sampled as Sampled
 from .model.systems import Sinusoid as Sinusoid
 from .model.systems import Springs as Springs
 from .model.systems import System as System
+from .model.systems.transfer import TransferFunction as TransferFunction
+from .model.systems.transfer import feedback as feedback
+from .model.systems.transfer import parallel as parallel
+from .model.systems.transfer import series as series
 from .runs.events import Event as Event
 from .runs.integration import integrate as integrate
 from .runs.result import Run as Run

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from math import prod
+from numbers import Real
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Shape
 from ...base.reprs import counted
-from ...errors import ArgumentError, ShapeError
+from ...errors import ArgumentError, ShapeError, UnsupportedError
 from ...reference.product import times
 from ...reference.systems.linear import Linear as Reference
 from ..inputs import Input, Pulse, as_input
 from ..parameters import aligned
 from .base import System
+
+if TYPE_CHECKING:
+    from .realisation import Realisation
 
 #: The number of copies of A in memory during a run of many states: the argument, its rows, and the core's.
 COPIES_OF_A = 5
@@ -37,6 +42,9 @@ class LinearSystem(System):
             single input need not be in a sequence. None if all are zero.
         velocities: the states in the block v: their number, if they come first, or a sequence of their indices in the order of
             the block. The other states, in their order, are the block y. By default the first n // 2 are v.
+
+    ``a * b`` is the system in which the outputs of b are the inputs of a, ``a + b`` and ``a - b`` have common inputs and add or
+    subtract outputs; either may be a number, a gain. See ``series``, ``parallel`` and ``feedback``.
 
     Attributes:
         second_order: whether ẏ is v times a number, so that Verlet can step it if no row of v depends on v.
@@ -101,6 +109,86 @@ class LinearSystem(System):
             and not (self.B is not None and self.B[y].any())
         )
         self.velocity_term = "velocities in the rows of v" if self.A[v][:, v].any() else None
+
+    @classmethod
+    def of(cls, system: Any, *, x: Any = None, velocities: Any = None) -> LinearSystem:
+        """The linear system of an object of SciPy or python-control, or of another linear system of stepwell.
+
+        Args:
+            system: an object with A, B, C and D, with num and den, or with zeros, poles and gain, of continuous time; neither
+                library is imported. Of a stepwell system the outputs are the coordinates y.
+            x: the inputs, in place of the system's own.
+            velocities: the states in the block v, as for ``LinearSystem``; None for none, or for the system's own.
+
+        Raises:
+            ArgumentError: if it is no such object.
+            UnsupportedError: if it is sampled already, or not linear.
+
+        Example:
+            >>> from scipy.signal import lti
+            >>> sw.LinearSystem.of(lti([1.0], [1.0, 0.4, 1.0])).A
+            array([[-0.4, -1. ],
+                   [ 1. ,  0. ]])
+        """
+        if isinstance(system, LinearSystem) and x is None and velocities is None:
+            return system
+        part = part_of("system", system, of_states=True)
+        has = bool(part.inputs)
+        D = part.D if has and part.D.any() else None
+        velocities = part.velocities if velocities is None else velocities
+        inputs = (list(part.x) if has else None) if x is None else x
+        return LinearSystem(part.A, part.B if has else None, part.C, D, x=inputs, velocities=velocities)
+
+    def with_inputs(self, x: Any) -> LinearSystem:
+        """The system with other inputs x, as for ``LinearSystem``; None for none."""
+        return LinearSystem(self.A, self.B, self.C, self.D, x=x, velocities=self.velocities)
+
+    #: So that an array of NumPy times a system is a system with that gain, and not an array of systems.
+    __array_ufunc__ = None
+
+    def __mul__(self, before: Any) -> LinearSystem:
+        """The outputs of ``before``, or the inputs times a number, are the inputs of this system."""
+        from .realisation import of_gain, series  # only joined systems need it
+
+        own = realised(self)
+        if isinstance(before, LinearSystem):
+            return joined(series(realised(before), own))
+        if not is_gain(before):
+            return NotImplemented
+        gain = of_gain("gain", before, own.inputs, own.inputs)
+        return joined(series(gain._replace(x=own.x), own._replace(x=gain.x)))
+
+    def __rmul__(self, gain: Any) -> LinearSystem:
+        """The outputs times a number."""
+        if not is_gain(gain):
+            return NotImplemented
+        from .realisation import of_gain, series  # only joined systems need it
+
+        own = realised(self)
+        return joined(series(own, of_gain("gain", gain, own.outputs, own.outputs)))
+
+    def __add__(self, other: Any) -> LinearSystem:
+        """Common inputs, and the sum of the outputs."""
+        from .realisation import of_gain, parallel  # only joined systems need it
+
+        own = realised(self)
+        if isinstance(other, LinearSystem):
+            return joined(parallel(own, realised(other)))
+        return joined(parallel(own, of_gain("gain", other, own.outputs, own.inputs))) if is_gain(other) else NotImplemented
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> LinearSystem:
+        """Common inputs, and the difference of the outputs."""
+        return self + -1.0 * other if isinstance(other, LinearSystem) or is_gain(other) else NotImplemented
+
+    def __rsub__(self, other: Any) -> LinearSystem:
+        """A gain less this system."""
+        return -1.0 * self + other if is_gain(other) else NotImplemented
+
+    def __neg__(self) -> LinearSystem:
+        """The outputs with the other sign."""
+        return -1.0 * self
 
     def repr_arguments(self) -> list[str]:
         """Its arguments, for its repr."""
@@ -199,6 +287,86 @@ class LinearSystem(System):
             columns += [each.signal().at(t) for each in self.given_inputs().values()]
         z = times(_side_by_side(parts, batch), columns)
         return np.array(np.broadcast_to(z, (len(self.C), *batch)))
+
+
+def realised(system: LinearSystem, argument: str = "system", *, of_states: bool = False) -> Realisation:
+    """The matrices of a system, with zeros for D; without C, if that is allowed, the outputs are the states.
+
+    Raises:
+        ArgumentError: if it has no inputs or no outputs.
+    """
+    from .realisation import Realisation
+
+    n, C = len(system.A), system.C
+    if system.B is None or (C is None and not of_states):
+        missing = " and ".join(name for name, each in (("inputs (B)", system.B), ("outputs (C)", C)) if each is None)
+        raise ArgumentError(f"{argument}: expected a linear system with inputs and outputs, got {system!r} without {missing}")
+    C = np.eye(n).reshape(n, n, *(1,) * (system.A.ndim - 2)) if C is None else C
+    D = np.zeros((len(C), system.B.shape[1])) if system.D is None else system.D
+    return Realisation(system.A, system.B, C, D, system.velocities, system.x)
+
+
+def joined(part: Realisation, arguments: str = "system") -> LinearSystem:
+    """The system with these matrices.
+
+    Raises:
+        ArgumentError: if it has no states.
+    """
+    if not part.size:
+        raise ArgumentError(f"{arguments}: expected at least one linear system, got gains alone, which have no states")
+    D = part.D if part.D.any() else None
+    return LinearSystem(part.A, part.B, part.C, D, x=list(part.x), velocities=part.velocities)
+
+
+def is_gain(value: Any) -> bool:
+    """Whether a value may be a gain: a number, or an array of them."""
+    return (isinstance(value, Real) and not isinstance(value, bool)) or isinstance(value, (np.ndarray, np.generic))
+
+
+def part_of(argument: str, system: Any, *, of_states: bool = False) -> Realisation:
+    """The matrices of a linear system of stepwell, SciPy or python-control.
+
+    Raises:
+        ArgumentError: if it is none.
+        UnsupportedError: if it is sampled already, or not linear.
+    """
+    if isinstance(system, LinearSystem):
+        return realised(system, argument, of_states=of_states)
+    if isinstance(system, System):
+        return _of_rates(argument, system)
+    from .realisation import of_object  # only other libraries' objects need it
+
+    return of_object(argument, system)
+
+
+def _of_rates(argument: str, system: System) -> Realisation:
+    """The matrices of any linear system, from its reference: the rates of unit states and of unit inputs; its outputs are y."""
+    if not system.linear:
+        raise UnsupportedError(
+            f"{argument}: expected a linear one, got {system!r}; near a state it is LinearSystem(sw.jacobian(system, at).matrix)"
+        )
+    from .realisation import Realisation
+
+    n_v, n_y = prod(system.v_shape), prod(system.y_shape)
+    n, batch, names = n_v + n_y, system.batch, system.input_names
+
+    def rates(of: System, several: int, v: Array, y: Array) -> Array:
+        s = of.scaled(1.0, (several, *batch))
+        rows = [s.dv(0.0, v, y), s.dy(0.0, v, y)]
+        wide = [np.broadcast_to(row, (*shape, several, *batch)) for row, shape in zip(rows, shapes, strict=True)]
+        return np.concatenate([each.reshape(-1, several, *batch) for each in wide])
+
+    shapes = (system.v_shape, system.y_shape)
+    unit = np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(batch)), (n, n, *batch))
+    blocks = [each.reshape(*shape, n, *batch) for each, shape in zip((unit[:n_v], unit[n_v:]), shapes, strict=True)]
+    A = rates(system.without_inputs(), n, *blocks)
+    B = np.zeros((n, len(names), *batch))
+    for j, name in enumerate(names):
+        rest = [np.zeros((*shape, 1, *batch)) for shape in shapes]
+        B[:, j] = rates(system.with_pulse(name, np.ones(1), 1.0), 1, *rest)[:, 0]
+    C = np.eye(n)[n_v:].reshape(n_y, n, *(1,) * len(batch))
+    inputs = tuple(system.given_inputs().get(name) for name in names)
+    return Realisation(A, B, C, np.zeros((n_y, len(names))), tuple(range(n_v)), inputs)
 
 
 def _square(A: Any) -> Array:
