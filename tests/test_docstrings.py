@@ -31,7 +31,7 @@ def public() -> Iterator[tuple[str, Any]]:
         thing = getattr(sw, name)
         if is_ours(thing):
             yield name, thing
-    for module in (charts, stability, quaternion, sw.scenes):
+    for module in (charts, stability, quaternion, sw.orbits, sw.scenes):
         for name in getattr(module, "__all__", dir(module)):
             thing = getattr(module, name)
             own = "__all__" in vars(module) or getattr(thing, "__module__", "") == module.__name__

@@ -201,7 +201,7 @@ def documented(site: Path) -> set[str]:
 
 def test_every_public_name_is_in_the_reference_with_an_example(site: Path) -> None:
     known = documented(site)
-    for module in (sw, charts, sw.errors, stability, quaternion, sw.scenes):
+    for module in (sw, charts, sw.errors, stability, quaternion, sw.orbits, sw.scenes):
         for name in getattr(module, "__all__", None) or dir(module):
             thing = getattr(module, name)
             own = getattr(thing, "__module__", "").startswith(module.__name__) and not name.startswith("_")

@@ -3,6 +3,7 @@ from . import errors as errors
 from . import scenes as scenes
 from .analysis import derivatives as derivatives
 from .analysis import dynamics as dynamics
+from .analysis import orbits as orbits
 from .analysis import stability as stability
 from .analysis.consistency import consistent_start as consistent_start
 from .analysis.dynamics import equilibria as equilibria

@@ -346,6 +346,29 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "quaternion.from_axis_angle": (sw.quaternion.from_axis_angle, {"axis": [0.0, 1.0, 1.0], "angle": 0.5}),
     "quaternion.matrix": (sw.quaternion.matrix, {"q": [1.0, 0.0, 0.0, 0.5]}),
     "quaternion.product": (sw.quaternion.product, {"p": [1.0, 0.0, 0.0, 0.5], "q": np.ones((4, 2))}),
+    "orbits.system": (
+        sw.orbits.system,
+        {"masses": [1.0, 1e-3, 1e-3], "a": [1.0, 2.0], "e": 0.1, "inclination": [0.1, 0.2], "node": 0.3, "mean_anomaly": 0.5}
+        | {"argument_of_periapsis": 0.2, "around": [0, [0, 1]], "G": 1.0, "softening": 0.0, "dim": 3},
+    ),
+    "orbits.system by time": (
+        sw.orbits.system,
+        {"masses": [1.0, 1e-3], "period": 2.0, "longitude_of_periapsis": 0.2, "time_of_periapsis": 0.5, "t": 1.0},
+    ),
+    "orbits.system by angle": (sw.orbits.system, {"masses": [1.0, 1e-3], "periapsis": 1.0, "e": 1.0, "true_anomaly": 0.5}),
+    "orbits.system by longitude": (sw.orbits.system, {"masses": [1.0, 1e-3], "periapsis": 1.0, "mean_longitude": 0.5}),
+    "orbits.elements": (
+        sw.orbits.elements,
+        {"of": sw.NBody([1.0, 1.0], force="newton"), "v": [[0.0, 0.0], [0.0, 1.0]], "y": [[0.0, 0.0], [1.0, 0.0]]}
+        | {"t": 0.0, "around": "jacobi"},
+    ),
+    "orbits.state": (sw.orbits.state, {"mu": 1.0, "t": 0.5, "dim": 3, "a": 1.0, "eccentric_anomaly": 0.5, "e": 0.1}),
+    "orbits.state by longitude": (sw.orbits.state, {"mu": 1.0, "a": -1.0, "true_longitude": 0.5, "e": 1.1}),
+    "orbits.of_state": (sw.orbits.of_state, {"mu": 1.0, "v": [0.0, 1.0], "y": [1.0, 0.0], "t": 0.5}),
+    "orbits.jacobi": (sw.orbits.jacobi, {"masses": [1.0, 1.0], "block": [[0.0, 0.0], [1.0, 0.0]]}),
+    "orbits.inertial": (sw.orbits.inertial, {"masses": [1.0, 1.0], "block": [[0.0, 0.0], [1.0, 0.0]]}),
+    "orbits.eccentric_anomaly": (sw.orbits.eccentric_anomaly, {"mean_anomaly": 0.5, "e": 0.1}),
+    "orbits.gravity": (sw.orbits.gravity, {"length": "au", "mass": "solar", "time": "day"}),
     "scenes.dzhanibekov": (sw.scenes.dzhanibekov, {"inertia": (1.0, 2.0, 3.0), "tilt": 0.01, "spin": 1.0}),
     "scenes.cloth": (sw.scenes.cloth, {"n": 4, "shear": 0.5, "damping": 0.1}),
     "scenes.energy_control": (sw.scenes.energy_control, {"pair": "matching", "eps": 0.01, "form": "limited"}),
