@@ -4,7 +4,7 @@ Arrays are C-contiguous. Rows are arrays of two axes: what is counted, and the m
 Plans, pacings and their arrays are read by the names of their attributes, which stand in ``engine/``.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn, final
 
 import numpy as np
@@ -114,6 +114,22 @@ class World:
     def carry(self) -> NDArray[Any] | None: ...
     def carry_on(self, carry: NDArray[Any]) -> None:
         """Go on with this carry, by rows, which belongs to what is in the arrays now."""
+
+    def take(self, model: ModelSpec, plan: Plan) -> None:
+        """Go on with other parameters; arrays of parameters are not read any more."""
+
+    def watch(self, model: ModelSpec, arrays: Sequence[tuple[str, NDArray[Any], str, float, float]]) -> None:
+        """Read these arrays before each call of step: name, array, the name of its rows, what its numbers are above, at most."""
+
+    def read(self) -> None:
+        """Read them now."""
+
+    def restart(self, members: Sequence[int], carry: NDArray[Any] | None) -> None:
+        """Start these members again from their state in the arrays; all others go on with this carry, by rows."""
+
+    @property
+    def changes(self) -> int:
+        """How often parameters or members were set."""
 
     @property
     def t(self) -> float: ...

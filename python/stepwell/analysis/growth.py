@@ -266,6 +266,8 @@ def watched(
     def check() -> int:
         """Check the state, and return the number of steps until the next check, ``ENDLESS`` if there is none."""
         nonlocal every
+        if loop.changes:
+            return ENDLESS  # what was set may explain the growth
         grown = growth(system, method, dt, loop.step_number - first, t0, start, (v, y))
         if grown is not None:
             warn_of([grown.finding(v.shape[len(system.v_shape) :])], 3)

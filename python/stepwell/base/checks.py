@@ -400,6 +400,9 @@ def fits_single(name: str, numbers: Array | None) -> None:
         raise ArgumentError(f"{name}: expected numbers up to 3.4e38, the largest of float32, got {large.max():g}")
 
 
+#: What numbers of a kind are above: finite ones, those of zero or more, and those above zero.
+ANY, NOT_NEGATIVE, POSITIVE = -float("inf"), -5e-324, 0.0
+
 #: What is larger than this rounds to infinity in float32.
 LARGEST_SINGLE = float(np.finfo(np.float32).max)
 

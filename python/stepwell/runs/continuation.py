@@ -112,15 +112,20 @@ def _bits_of(system: System, batch: Shape, v: Array, y: Array, force: Array | No
     """All bits that identify a system with its control and a state of a batch."""
     yield system.kernel
     yield batch
-    for name, value in system.parameters(batch):
-        yield name
-        for part in value if isinstance(value, tuple) else (value,):
-            yield _bits(part) if isinstance(part, np.ndarray) else _word(system, part)
+    yield from bits_of_parameters(system, batch)
     for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))):
         whole = np.broadcast_to(block, (*np.shape(block)[:axes], *batch))
         yield np.asarray(whole, dtype=np.float64).tobytes()
     if force is not None:
         yield np.asarray(force, dtype=np.float64).tobytes()
+
+
+def bits_of_parameters(system: System, batch: Shape) -> Iterator[Any]:
+    """All bits that identify a system with its control."""
+    for name, value in system.parameters(batch):
+        yield name
+        for part in value if isinstance(value, tuple) else (value,):
+            yield _bits(part) if isinstance(part, np.ndarray) else _word(system, part)
 
 
 def _bits(rows: Array) -> bytes:

@@ -6,18 +6,22 @@ from collections.abc import Callable
 from math import prod
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import _core
-from ..base import registry
+from ..base import checks, registry
 from ..base.arrays import Array
 from ..base.reprs import MAX_LINE, counted, facts, shortened
-from ..errors import FixedError
+from ..errors import ArgumentError, FixedError, ShapeError, UnsupportedError
+from ..model import setting
 from ..model.controls import AnyControl
 from ..model.methods import Method
 from ..model.systems import System
-from . import engine
-from .continuation import Continuation
+from . import engine, float32
+from .continuation import Continuation, bits_of_parameters
 from .findings import warn_of
-from .options import Options
+from .live import LARGEST, PLAIN, Live, Parameters, members_at
+from .options import Options, controlled
 from .request import Request
 from .result import Run
 
@@ -29,7 +33,8 @@ class World:
     """A loop over the user's own arrays: everything is checked and prepared once, then ``step`` works in place.
 
     Args:
-        system: the system to step. Its parameters are copied: changing an array of parameters later has no effect.
+        system: the system to step. Its parameters are copied: changing an array of parameters later has no effect; ``set`` and
+            ``parameters`` change them.
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block, a writeable C-contiguous array of ``dtype`` and of shape (*block, *batch).
         y: coordinate block, likewise; it may share no memory with ``v``.
@@ -62,7 +67,9 @@ class World:
     first steps, and warns once if they grew a million times by steps that are beyond the stability limit. Arrays of another
     library are stepped in place, too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
 
-    System, method and step are fixed; ``World(system, method, resume=world)`` makes another world that continues from here.
+    Method, step and the operations of the system are fixed; ``World(system, method, resume=world)`` makes another world that
+    continues from here. The numbers of the system live: ``set`` and ``parameters`` change them between steps, and ``reset`` gives
+    members of a batch new states and parameters.
     ``copy.copy``, ``copy.deepcopy`` and ``pickle`` make an equal world with arrays of its own.
 
     Warns:
@@ -72,10 +79,12 @@ class World:
         >>> v, y = np.zeros(3), np.ones(3)
         >>> world = sw.World(sw.Oscillator(1.0), "leapfrog", v=v, y=y, dt=0.1)
         >>> world.step(10)
+        >>> world.set(omega=1.1)
+        >>> world.step(10)
         >>> finer = sw.World(world.system, "rk4", dt=0.01, v=v.copy(), y=y.copy(), t0=world.t)
     """
 
-    __slots__ = ("_core", "_events", "_frames", "_plan", "_start", "_system", "_v", "_y", "step")
+    __slots__ = ("_control", "_core", "_events", "_frames", "_live", "_plan", "_start", "_system", "_v", "_y", "step")
 
     def __init__(
         self,
@@ -107,6 +116,9 @@ class World:
         force = None if plan.force is None else plan.force.reshape(-1)
         self._core = loop = _core.World(engine.model(plan), plan, v.reshape(-1), y.reshape(-1), request.slot, force)
         self._frames = None
+        self._live: dict[str, Live] = {}
+        #: The control as it was given, without a target of its own: members that are reset aim at that of their new state.
+        self._control = control if getattr(control, "target", self) is None else None
         make: Callable[..., None] = loop.step
         if request.events is not None:
             from .events import frames  # only such worlds need it
@@ -135,8 +147,230 @@ class World:
 
     @property
     def system(self) -> System:
-        """The system with its control; its parameters are read-only copies, made with the world."""
+        """The system with its control and its parameters as they are now, which are read-only copies."""
+        changes = {name: each.array.copy() for name, each in self._live.items() if each.differs()}
+        if changes:
+            self._took(setting.with_parameters(self._system, changes))
         return self._system
+
+    @property
+    def parameters(self) -> Parameters:
+        """The parameters as arrays to write into, by name: each call of ``step`` takes what is in them.
+
+        An array has the shape (*own, *batch), or that of a number where all members have it in common; it is of float64. Writing
+        a number takes a tenth of a microsecond, and the next step sees it. A number that is not finite, or that the system would
+        refuse, is an error of the next call of ``step``, which then makes no step. Parameters that are not here, since something
+        is computed from them, are changed by ``set``.
+
+        Example:
+            >>> @sw.system
+            ... def wheel(t, v, y, *, torque=0.0, inertia=2.0):
+            ...     return torque / inertia
+            >>> v, y = np.zeros(1), np.zeros(1)
+            >>> world = sw.World(wheel(), "false_euler", v=v, y=y, dt=0.5)
+            >>> torque = world.parameters["torque"]
+            >>> torque[...] = 3.0
+            >>> world.step(2)
+            >>> v
+            array([1.5])
+        """
+        return Parameters(self)
+
+    def set(self, **parameters: Any) -> None:
+        """Give parameters other numbers, for the steps to come.
+
+        Args:
+            parameters: arguments of the system by name, and ``gain`` and ``target`` (``c``, ``k``) of its control. Numbers of the
+                shapes that the system takes; an input for an input of the same kind; ``floor`` as for the system.
+
+        Raises:
+            ArgumentError: if a name or a number is wrong; nothing was changed then.
+            UnsupportedError: if other operations would follow: of what was left out, or of another size or kind.
+
+        Nothing is traced anew unless an array for each member takes the place of a number for all, which takes about a
+        millisecond once. A method that carries something in place of v starts again from the state, as by
+        ``World(system, method, resume=world)``, whose bits the steps have. The target of a control stays what it was.
+
+        Example:
+            >>> v, y = np.zeros(1), np.zeros(1)
+            >>> world = sw.World(sw.Pendulum(a=0.0), "false_euler", v=v, y=y, dt=0.01)
+            >>> world.set(a=3.0)
+            >>> world.step()
+            >>> v
+            array([0.03])
+        """
+        live = self._live
+        for name, value in parameters.items():
+            each = live.get(name)
+            if each is None or type(value) not in PLAIN or not each.least < value <= each.most:
+                break
+        else:
+            for name, value in parameters.items():
+                live[name].array.fill(value)
+            return
+        self._set(parameters)
+
+    def _set(self, parameters: dict[str, Any]) -> None:
+        before = self.system
+        self._take(setting.with_parameters(before, parameters), parameters)
+        known = setting.direct(self._system, self._plan.batch)
+        for name in parameters:
+            if name in known:
+                self._live_array(name)  # so that the next time takes no more than writing it
+
+    def _take(self, system: System, names: Any) -> None:
+        """Go on with other parameters."""
+        plan = self._plan
+        batch = checks.batch_shape({"system": system.batch, "v and y": plan.batch})
+        if batch != plan.batch:
+            raise ShapeError(
+                f"{', '.join(names)}: their batch {system.batch} does not broadcast to that of v and y, {plan.batch}"
+            )
+        if plan.single:
+            float32.check_inputs(system, abs(plan.t0) + self.step_number * abs(plan.dt))
+        system.check_time(abs(plan.t0) + self.step_number * abs(plan.dt))
+        new = plan._replace(system=system.over_steps(plan.method, plan.t0, plan.dt))
+        setting.same_operations(plan.system.parameters(batch), new.system.parameters(batch), names)
+        carry = None
+        if plan.method.carry is not None:
+            one, other = (list(bits_of_parameters(each.system, batch)) for each in (plan, new))
+            carry = self._core.carry() if one == other else None  # the same numbers, written otherwise
+        self._core.take(engine.model(new), new)
+        if carry is not None:
+            self._core.restart([], carry)
+        for name, direct in setting.direct(system, batch).items():
+            if (each := self._live.get(name)) is not None and each.array.shape == direct.numbers.shape:
+                each.array[...] = direct.numbers
+            elif each is not None:
+                each.array.flags.writeable = False  # what is written into it would not be read
+                del self._live[name]
+        self._took(system)
+        if self._live:
+            self._watch()
+        if system.keeper is not None:
+            from .diagnostics import of_a_strong_control
+
+            warn_of(of_a_strong_control(system, self._v, self._y, plan.dt), 4)
+
+    def _took(self, system: System) -> None:
+        """Remember the parameters with which the core steps, or will."""
+        plan = self._plan
+        self._plan = plan._replace(system=system.over_steps(plan.method, plan.t0, plan.dt))
+        self._system = system
+        for each in self._live.values():
+            each.known[...] = each.array
+        if self._frames is not None:
+            self._frames.renew(self._plan)
+
+    def _live_array(self, name: str) -> Array:
+        """The array of a parameter, which is read before each call of ``step`` from now on."""
+        if (each := self._live.get(name)) is None:
+            system = self.system
+            if (direct := setting.direct(system, self._plan.batch).get(name)) is None:
+                setting.check_name(system, name)
+                raise UnsupportedError(f"parameters[{name!r}]: other numbers are computed from it; use world.set({name}=…)")
+            self._core.read()
+            most = checks.LARGEST_SINGLE if self._plan.single else LARGEST
+            each = self._live[name] = Live(np.array(direct.numbers), np.array(direct.numbers), direct.row, direct.least, most)
+            self._watch()
+        return each.array
+
+    def _watch(self) -> None:
+        """Let the core read the arrays of all parameters that live."""
+        arrays = [(name, each.array.reshape(-1), each.row, each.least, each.most) for name, each in self._live.items()]
+        self._core.watch(engine.model(self._plan), arrays)
+        if self._frames is not None:
+            self._frames.refresh = lambda: self.system
+
+    def reset(self, members: Any, /, *, v: Any = None, y: Any = None, **parameters: Any) -> None:
+        """Give members of the batch new states and parameters; all others go on as if nothing had happened, to the bit.
+
+        Args:
+            members: which: an index, a slice, a mask or an array of indices along the batch axes, or a tuple of these.
+            v: their velocities, shape (*block, *members), or (*block,) for all of them; as they are if None.
+            y: their coordinates, likewise.
+            parameters: their parameters by name, shape (*own, *members) or (*own,). A parameter that all members had in common
+                is one of each member from then on, which takes about a millisecond once.
+
+        Raises:
+            ArgumentError: if a name or a number is wrong; nothing was changed then.
+
+        The time and the step number are those of all members. What a method carries in place of v, and the target of a control
+        that was given none, start again from the new states. Bodies and particles do not see each other's members.
+
+        Example:
+            >>> v, y = np.zeros(4), np.ones(4)
+            >>> world = sw.World(sw.Pendulum(np.ones(4)), "leapfrog", v=v, y=y, dt=0.1)
+            >>> world.step(10)
+            >>> world.reset(y < 0.7, v=0.0, y=0.5, omega=2.0)
+            >>> world.reset(2, y=-1.0)
+            >>> y
+            array([ 0.5,  0.5, -1. ,  0.5])
+        """
+        plan = self._plan
+        batch = plan.batch
+        places = members_at(members, batch)
+        over, index = places.shape, places.reshape(-1)
+        if v is None and y is None and not parameters:
+            raise ArgumentError("v, y, parameters: expected some of them, got none; reset(members, v=…, y=…)")
+        self._core.read()  # what was written to arrays before counts as set for all members
+        system = self.system
+        blocks = [(self._v, "v", v, system.v_shape), (self._y, "y", y, system.y_shape)]
+        states = [
+            (array, setting.of_some(name, value, own, over))
+            for array, name, value, own in blocks
+            if value is not None and array.size
+        ]
+        if plan.single:
+            for name, (_, numbers) in zip("vy", states, strict=False):
+                checks.fits_single(name, numbers)
+        live: list[tuple[Array, Array]] = []
+        wider: dict[str, Any] = {}
+        for name, value in parameters.items():
+            setting.check_name(system, name)
+            each = self._live.get(name)
+            own_axes = 0 if each is None else each.array.ndim - len(batch)
+            if each is not None and own_axes >= 0 and each.array.shape[own_axes:] == batch:
+                numbers = setting.of_some(name, value, each.array.shape[:own_axes], over, each.least)
+                if plan.single:
+                    checks.fits_single(name, numbers)
+                live.append((each.array, numbers))
+                continue
+            whole = setting.of_each_member(system, name, batch)
+            own = whole.shape[: whole.ndim - len(batch)]
+            whole.reshape(*own, plan.members)[..., index] = setting.of_some(name, value, own, over)
+            wider[name] = whole
+        after = setting.with_parameters(system, wider) if wider else system
+        carry = self._core.carry() if plan.method.carry is not None else None
+        for array, numbers in [*states, *live]:
+            rows = array.reshape(*array.shape[: array.ndim - len(batch)], plan.members)
+            rows[..., index] = numbers
+        if wider:
+            self._take(setting.with_parameters(self.system, wider), wider)
+            known = setting.direct(after, batch)
+            for name in wider:
+                if name in known:
+                    self._live_array(name)
+        if self._control is not None:
+            self._aim(index)
+        self._core.read()
+        self._core.restart(index.tolist(), carry)
+
+    def _aim(self, index: Any) -> None:
+        """Let the control of members that were reset aim at their new state."""
+        system, batch = self.system, self._plan.batch
+        v, y = (np.asarray(each, np.float64) for each in (self._v, self._y))
+        fresh = controlled(system.uncontrolled, self._plan.method, self._control, v, y, self._plan.dt).keeper
+        values: dict[str, Any] = {}
+        for name in ("gain", "target"):
+            old, new = getattr(system.keeper, name, None), getattr(fresh, name, None)
+            if old is None or new is None or np.array_equal(old, new):
+                continue
+            both = [np.array(np.broadcast_to(each, batch)) for each in (old, new)]
+            both[0].reshape(-1)[index] = both[1].reshape(-1)[index]
+            values[name] = both[0]
+        if values:
+            self._take(setting.with_parameters(system, values), values)
 
     @property
     def method(self) -> Method:
@@ -150,14 +384,15 @@ class World:
 
     def _standing(self) -> Continuation:
         """The state from which another world goes on; arrays are copies."""
-        plan = self._plan
+        self._core.read()  # what a method carries does not hold with other parameters
+        system, plan = self.system, self._plan
         options: dict[str, Any] = {"t0": plan.t0, "start_step": self.step_number, "dt": plan.dt, "start": self._start}
-        options |= {"fused": plan.fused, "dtype": str(self._y.dtype), "control": self._system.keeper}
+        options |= {"fused": plan.fused, "dtype": str(self._y.dtype), "control": system.keeper}
         options["force"] = None if plan.force is None else plan.force.copy()
         carry = self._core.carry() if plan.method.carry is not None else None
         carry = None if carry is None else carry.reshape(self._v.shape)
         names = tuple(each.name for each in self._events or () if each.then)
-        return Continuation(self._system, plan.method, self._v.copy(), self._y.copy(), options, carry, changed_by=names)
+        return Continuation(system, plan.method, self._v.copy(), self._y.copy(), options, carry, changed_by=names)
 
     def __repr__(self) -> str:
         members = self._y.shape[len(self._system.y_shape) :]
@@ -176,13 +411,13 @@ class World:
         return facts("World", [*pairs, ("t", f"{self.t:g}"), ("shape of y", self._y.shape)])
 
     def __copy__(self) -> World:
-        return _again(self._standing(), self._events)
+        return _again(self._standing(), self._events, self._control)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> World:
         return self.__copy__()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _again, (self._standing(), self._events)
+        return _again, (self._standing(), self._events, self._control)
 
     @property
     def v(self) -> Array:
@@ -224,5 +459,7 @@ class World:
         return self._core.step_number
 
 
-def _again(standing: Continuation, events: Any) -> World:
-    return World(standing.system, standing.method, events=events, resume=standing)  # type: ignore[arg-type]  # a world's state
+def _again(standing: Continuation, events: Any, control: Any = None) -> World:
+    world = World(standing.system, standing.method, events=events, resume=standing)  # type: ignore[arg-type]  # a world's state
+    world._control = control
+    return world

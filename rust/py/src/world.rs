@@ -1,7 +1,7 @@
 //! The real-time loop over the user's own arrays.
 
 use std::sync::{
-    Mutex, TryLockError,
+    Arc, Mutex, TryLockError,
     atomic::{AtomicI64, Ordering::Relaxed},
 };
 
@@ -13,6 +13,7 @@ use pyo3::{
 };
 use stepwell_core::{
     isa::Level,
+    model::spec::{Row, Signature, Spec, Table},
     run::{fixed::Steppable, world},
     stage::{Clock, Machine},
     tape::real::Precision,
@@ -20,7 +21,7 @@ use stepwell_core::{
 
 use crate::{
     interruptible, listen,
-    model::{ModelSpec, argument_error, core_error, error_of, in_use},
+    model::{ModelSpec, argument_error, by_row, core_error, error_of, in_use},
 };
 
 /// How the arrays are reached.
@@ -81,6 +82,103 @@ impl<T: Of> ForceArray<T> {
     }
 }
 
+/// An array of a parameter, which the caller changes.
+struct LiveArray {
+    name: String,
+    buffer: PyBuffer<f64>,
+    /// Its numbers now, and as they were read last.
+    now: Vec<f64>,
+    last: Vec<f64>,
+    /// The number of its first row among those of all parameters, and how long its rows are.
+    place: usize,
+    width: usize,
+    /// What its numbers are above, and at most.
+    bounds: (f64, f64),
+}
+
+/// The parameters of a world that change between steps.
+struct Live {
+    signature: Arc<Signature>,
+    rows: Vec<Vec<f64>>,
+    tables: Vec<(f64, f64, Vec<Vec<f64>>)>,
+    arrays: Vec<LiveArray>,
+    /// Whether rows are not yet those of the world, since an array behind them was refused.
+    waits: bool,
+}
+
+impl Live {
+    /// Of these arrays: a name, the array, the rows that it is, and the bounds of its numbers.
+    fn new(py: Python<'_>, model: &ModelSpec, arrays: Vec<WatchedArray>) -> PyResult<Live> {
+        let copied = |rows: Vec<Row<'_>>| rows.iter().map(|row| row.0.to_vec()).collect::<Vec<_>>();
+        let (mut rows, mut tables, mut live) = (Vec::new(), Vec::new(), Vec::new());
+        for array in &model.rows(py)? {
+            rows.extend(copied(by_row(array)?));
+        }
+        for (start, interval, samples) in &model.tables(py)? {
+            tables.push((*start, *interval, copied(by_row(samples)?)));
+        }
+        for (name, array, row, least, most) in arrays {
+            let buffer = PyBuffer::get(array.bind(py))?;
+            let (numbers, rows_of_it) = (buffer.item_count(), model.signature.count(&row));
+            let Some(place) = model.signature.place(&row).filter(|_| rows_of_it > 0) else {
+                return Err(argument_error(format!("{name}: there is no such row")));
+            };
+            let mut last = vec![0.0; numbers];
+            buffer.copy_to_slice(py, &mut last)?;
+            let width = numbers / rows_of_it;
+            live.push(LiveArray { name, buffer, now: last.clone(), last, place, width, bounds: (least, most) });
+        }
+        Ok(Live { signature: Arc::clone(&model.signature), rows, tables, arrays: live, waits: false })
+    }
+
+    /// Gives the world what is in the arrays now, if it is not what was there before.
+    fn read<T: Of>(&mut self, py: Python<'_>, world: &mut world::World<T>, changes: &AtomicI64) -> PyResult<()> {
+        let Live { rows, arrays, waits, .. } = self;
+        for LiveArray { name, buffer, now, last, place, width, bounds } in arrays {
+            buffer.copy_to_slice(py, now)?;
+            if now.iter().zip(&*last).all(|(now, last)| now.to_bits() == last.to_bits()) {
+                continue;
+            }
+            let (least, most) = *bounds;
+            if let Some(wrong) = now.iter().find(|number| !(**number > least && **number <= most)) {
+                let bounds = match least {
+                    0.0 => " above zero",
+                    least if least.is_finite() => " of zero or more",
+                    _ => "",
+                };
+                return Err(argument_error(format!(
+                    "world.parameters[{name:?}]: expected finite numbers{bounds}, got {wrong}; no step was made"
+                )));
+            }
+            last.copy_from_slice(now);
+            for (row, numbers) in rows[*place..].iter_mut().zip(last.chunks_exact(*width)) {
+                row.copy_from_slice(numbers);
+            }
+            *waits = true;
+        }
+        if std::mem::take(&mut self.waits) {
+            changes.fetch_add(1, Relaxed);
+            world.renew(&Spec {
+                signature: Arc::clone(&self.signature),
+                rows: borrowed(&self.rows),
+                tables: self.tables.iter().map(|(start, interval, samples)| table(*start, *interval, samples)).collect(),
+            });
+        }
+        Ok(())
+    }
+}
+
+fn borrowed(rows: &[Vec<f64>]) -> Vec<Row<'_>> {
+    rows.iter().map(|row| Row(row)).collect()
+}
+
+fn table(start: f64, interval: f64, samples: &[Vec<f64>]) -> Table<'_> {
+    Table { samples: borrowed(samples), start, interval }
+}
+
+/// A name, its array, the parameter of which it is the rows, and the bounds of its numbers: above the first, at most the second.
+type WatchedArray = (String, Py<PyArray1<f64>>, String, f64, f64);
+
 /// Arrays of up to so many numbers are copied.
 const COPIED_NUMBERS: usize = 256;
 /// Other threads of Python go on meanwhile, unless a call is shorter than this part of the time between two checks: then to let
@@ -106,12 +204,15 @@ pub struct World {
     clock: Clock,
     /// The step number, for other threads to read while it is being stepped.
     step: AtomicI64,
+    /// How often parameters or members were set.
+    changes: AtomicI64,
 }
 
 struct Loop<T: Of> {
     world: world::World<T>,
     arrays: Arrays<T>,
     force: Option<ForceArray<T>>,
+    live: Option<Live>,
 }
 
 impl<T: Of> Loop<T> {
@@ -140,12 +241,15 @@ impl<T: Of> Loop<T> {
         } else {
             Arrays::Many { v, y }
         };
-        Ok(Loop { world, arrays, force })
+        Ok(Loop { world, arrays, force, live: None })
     }
 
     /// `n` steps; long calls let other threads run and check for Ctrl-C.
-    fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64) -> PyResult<()> {
-        let Loop { world, arrays, force } = self;
+    fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64, changes: &AtomicI64) -> PyResult<()> {
+        let Loop { world, arrays, force, live } = self;
+        if let Some(live) = live {
+            live.read(py, world, changes)?;
+        }
         if let Some(force) = force {
             force.read(py, world)?;
         }
@@ -196,8 +300,7 @@ impl World {
         force: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let WorldPlan { t0, dt, choice, first, members } = plan;
-        let (clock, machine) =
-            (Clock { t0, h: dt }, Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: 1 });
+        let (clock, machine) = (Clock { t0, h: dt }, machine()?);
         let rows = model.rows(py)?;
         let tables = model.tables(py)?;
         let precision = model.precision;
@@ -214,7 +317,7 @@ impl World {
             Precision::Double => over!(Double),
             Precision::Single => over!(Single),
         };
-        Ok(World { loop_: Mutex::new(made), clock, step: AtomicI64::new(first) })
+        Ok(World { loop_: Mutex::new(made), clock, step: AtomicI64::new(first), changes: AtomicI64::new(0) })
     }
 
     /// `n` steps, in place.
@@ -233,9 +336,78 @@ impl World {
             }
         };
         self.alone(|of| match of {
-            Loops::Double(of) => of.advance(py, n, &self.step),
-            Loops::Single(of) => of.advance(py, n, &self.step),
+            Loops::Double(of) => of.advance(py, n, &self.step, &self.changes),
+            Loops::Single(of) => of.advance(py, n, &self.step, &self.changes),
         })
+    }
+
+    /// Goes on with other parameters from the state that is in the arrays. Arrays of parameters are not read any more.
+    fn take(&self, py: Python<'_>, model: &ModelSpec, plan: WorldPlan) -> PyResult<()> {
+        let machine = machine()?;
+        let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+        let model = model.model(model.started(plan.choice), &rows, &tables)?;
+        let step = self.step.load(Relaxed);
+        self.alone(|loops| {
+            macro_rules! over {
+                ($own:ident) => {{
+                    $own.world = world::World::new(&model, self.clock, machine, plan.members, step).map_err(core_error)?;
+                    $own.live = None;
+                }};
+            }
+            match loops {
+                Loops::Double(own) => over!(own),
+                Loops::Single(own) => over!(own),
+            }
+            self.changes.fetch_add(1, Relaxed);
+            Ok(())
+        })
+    }
+
+    /// Reads these arrays of parameters before each call of `step`, in place of those before. The rest is as in the model.
+    fn watch(&self, py: Python<'_>, model: &ModelSpec, arrays: Vec<WatchedArray>) -> PyResult<()> {
+        let live = Live::new(py, model, arrays)?;
+        self.alone(|loops| {
+            match loops {
+                Loops::Double(own) => own.live = Some(live),
+                Loops::Single(own) => own.live = Some(live),
+            }
+            Ok(())
+        })
+    }
+
+    /// Reads the arrays of parameters now.
+    fn read(&self, py: Python<'_>) -> PyResult<()> {
+        fn of<T: Of>(py: Python<'_>, Loop { world, live, .. }: &mut Loop<T>, changes: &AtomicI64) -> PyResult<()> {
+            live.as_mut().map_or(Ok(()), |live| live.read(py, world, changes))
+        }
+        self.alone(|loops| match loops {
+            Loops::Double(own) => of(py, own, &self.changes),
+            Loops::Single(own) => of(py, own, &self.changes),
+        })
+    }
+
+    /// Starts these members again from their state in the arrays; all others go on with this carry, by rows.
+    fn restart(&self, py: Python<'_>, members: Vec<usize>, carry: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        fn of<T: Of>(py: Python<'_>, own: &mut Loop<T>, members: &[usize], carry: &Bound<'_, PyAny>) -> PyResult<()> {
+            let Loop { world, arrays, .. } = own;
+            let mut carry = carry.extract::<PyReadonlyArray1<'_, T>>()?.as_slice()?.to_vec();
+            arrays.with(py, |v, y| {
+                world.restart(members, &mut carry, v, y);
+                Ok(())
+            })
+        }
+        self.changes.fetch_add(1, Relaxed);
+        let Some(carry) = carry else { return Ok(()) };
+        self.alone(|loops| match loops {
+            Loops::Double(own) => of(py, own, &members, carry),
+            Loops::Single(own) => of(py, own, &members, carry),
+        })
+    }
+
+    /// How often parameters or members were set.
+    #[getter]
+    fn changes(&self) -> i64 {
+        self.changes.load(Relaxed)
     }
 
     /// The carry, by rows; None if the next step begins with v itself.
@@ -276,6 +448,11 @@ impl World {
     fn step_number(&self) -> i64 {
         self.step.load(Relaxed)
     }
+}
+
+/// What the loops of worlds may use.
+fn machine() -> PyResult<Machine> {
+    Ok(Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: 1 })
 }
 
 impl World {

@@ -181,6 +181,15 @@ class Aircraft(OwnSystem):
         """Itself: its size is fixed."""
         return self
 
+    def _fresh(self, arguments: dict[str, Any]) -> dict[str, Any]:
+        """All parameters, with these in place of some, checked as for a new aircraft."""
+        fresh = type(self)(self.form, controllers=self.controllers, **(self.parameters_given | arguments))
+        return dict(fresh.parameters_given)
+
+    def direct(self) -> dict[str, tuple[str, float]]:
+        """All parameters that are numbers; those of inertia are above zero."""
+        return super().direct() | {"inertia": ("inertia", checks.POSITIVE)}
+
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The parameters, commands and inputs, and the strength of a control of the quaternion's length."""
         return super().equation_parameters(batch) | (

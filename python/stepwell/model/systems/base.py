@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from math import inf
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
@@ -72,6 +73,8 @@ class System(Immutable, ValueEquality, ABC):
     batch: Shape = ()
     around: tuple[Part, ...] = ()
     constraint: ClassVar[str | None] = None
+    #: The arguments whose numbers reach the step as they are, and what each number is above.
+    unchanged: ClassVar[dict[str, float]] = {}
     kept: ConstraintControl | Projection | None = None
     _free: System | None = None
     #: The parameters of some members of a batch, if the system is for these members: see ``of_members``.
@@ -195,6 +198,30 @@ class System(Immutable, ValueEquality, ABC):
         if force is not None:
             parts.append((Force(len(self.v_shape)), {FORCE: force}))
         return parts
+
+    def arguments(self) -> dict[str, Any]:
+        """The arguments of which it was made, as they were checked; those that only help to find others are None."""
+        code = type(self).__init__.__code__
+        names = code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]
+        return {name: self.contacts or None if name == "floor" else getattr(self, name, None) for name in names}
+
+    def with_arguments(self, arguments: dict[str, Any]) -> Self:
+        """This system with other numbers, inputs or surfaces in place of some arguments."""
+        fresh = type(self)(**(self.uncontrolled.arguments() | arguments))
+        own = {} if self._free is None else {"_free": self._free.with_arguments(arguments)}
+        return changed(self, **joined(self, fresh, arguments), **own)
+
+    def operations(self) -> dict[str, Any]:
+        """The attributes that hold its operations, which other numbers do not change."""
+        return {}
+
+    def direct(self) -> dict[str, tuple[str, float]]:
+        """The arguments whose numbers reach the step as they are: the name in the core, and what each number is above."""
+        return {name: (name, least) for name, least in self.unchanged.items()}
+
+    def own_axes(self, name: str) -> int:
+        """How many axes of its own an argument has that does not reach the step as it is."""
+        return 0
 
     def surrounded(self, part: Part) -> Self:
         """This system with a further part around its equations, which replaces one of the same kind.
@@ -437,6 +464,17 @@ class System(Immutable, ValueEquality, ABC):
     def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> System:
         """This system with these samples as its only input."""
         raise KeyError(name)
+
+
+def joined(system: System, fresh: System, names: Iterable[str]) -> dict[str, Any]:
+    """The attributes that a system takes from a new one with other arguments of these names."""
+    kinds = {part.kind for part in fresh.around}
+    around = [*fresh.around, *(part for part in system.around if part.kind not in kinds)]
+    batches = {"system": fresh.batch, "control": () if system.keeper is None else system.keeper.batch}
+    changes = {name: getattr(fresh, name) for name in names if name != "floor"}
+    if around:
+        changes["around"] = tuple(sorted(around, key=lambda part: ORDER.index(part.kind)))
+    return changes | {"batch": checks.batch_shape(batches)}
 
 
 def wrapping_hint(function: FunctionType) -> str:

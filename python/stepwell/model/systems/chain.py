@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -36,6 +36,7 @@ class Chain(System):
     """
 
     kernel = "chain"
+    unchanged: ClassVar[dict[str, float]] = {"stiffness": checks.NOT_NEGATIVE, "mass": checks.POSITIVE}
     reference = Reference
     complex_step = True
     axes = "masses"

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import prod
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Shape
+from ...base.immutable import changed
 from ...base.reprs import counted
 from ...errors import ArgumentError, ShapeError, UnsupportedError
 from ...reference.product import times
@@ -225,6 +226,25 @@ class LinearSystem(System):
     def _columns(self) -> list[int]:
         """The columns of B whose inputs are not None; the others are zero and left out."""
         return [i for i, each in enumerate(self.x) if each is not None]
+
+    def arguments(self) -> dict[str, Any]:
+        """Its arguments; None if there are no inputs."""
+        return super().arguments() | {"x": self.x or None}
+
+    def with_arguments(self, arguments: dict[str, Any]) -> Self:
+        """This system with other matrices or inputs of the same structure."""
+        fresh, free = type(self)(**(self.uncontrolled.arguments() | arguments)), self.uncontrolled
+        if (fresh.second_order, fresh.velocity_term) != (free.second_order, free.velocity_term):
+            raise UnsupportedError(
+                f"{', '.join(arguments)}: expected matrices of the structure that is there: whether ẏ is v times a number, and "
+                f"whether v̇ depends on v; make another World that goes on from here, World(system, method, resume=world)"
+            )
+        matrices = {name: getattr(fresh, name) for name in "ABCD"}
+        return changed(super().with_arguments(arguments), **matrices)
+
+    def own_axes(self, name: str) -> int:
+        """Two of a matrix, one of a polynomial."""
+        return 1 if name in ("num", "den") else 2
 
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The matrix [A B] in the order of the blocks, the inputs, and whether it is that of an acceleration."""

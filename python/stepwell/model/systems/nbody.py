@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -53,6 +53,7 @@ class NBody(System):
     """
 
     kernel = "nbody"
+    unchanged: ClassVar[dict[str, float]] = {"softening": checks.NOT_NEGATIVE}
     reference = reference.NBody
     complex_step = True
     axes = "bodies, dim"

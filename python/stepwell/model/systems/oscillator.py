@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -52,6 +52,7 @@ class Oscillator(System):
     """
 
     kernel = "oscillator"
+    unchanged: ClassVar[dict[str, float]] = {"damping": checks.ANY, "drag": checks.NOT_NEGATIVE, "x": checks.ANY, "a": checks.ANY}
     reference = Reference
     complex_step = True
     linear = True
@@ -115,6 +116,13 @@ class Oscillator(System):
         if self.x is None and self.a is None:
             return {}
         return {name: each for name, each in (("x", self.x), ("a", self.a)) if each is not None}
+
+    def direct(self) -> dict[str, tuple[str, float]]:
+        """All but a friction that is divided by omega, and an omega that divides one."""
+        physical = self.form == "physical"
+        own = {"friction": ("friction.limit", checks.NOT_NEGATIVE)} if physical else {}
+        omega = {"omega": ("omega", checks.NOT_NEGATIVE if physical else checks.POSITIVE)}
+        return super().direct() | own | (omega if physical or self.friction is None else {})
 
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The form, the parameters and the inputs."""

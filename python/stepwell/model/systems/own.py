@@ -111,6 +111,41 @@ class OwnSystem(System):
         """How many axes of its own a parameter has."""
         return self.definition.own_axes[name]
 
+    def arguments(self) -> dict[str, Any]:
+        """Its parameters."""
+        return dict(self.parameters_given)
+
+    def operations(self) -> dict[str, Any]:
+        """Its operations, and the caches of them."""
+        caches = {name: vars(self).get(name) for name in ("_core", "_with_functions", "_digest")}
+        return caches | {"_single": self._single, "_bounds": {}, "_met": {}}
+
+    def with_arguments(self, arguments: dict[str, Any]) -> OwnSystem:
+        """This system with other numbers or inputs in place of some parameters."""
+        known = self._retraced()
+        fresh = known._fresh(arguments)
+        for name in arguments:
+            if known._kind_of(name, fresh[name]) != known._kind_of(name, known.parameters_given[name]):
+                raise UnsupportedError(
+                    f"{name}: expected a parameter of the kind and the axes of its own that the operations are for, got "
+                    f"{checks.short(fresh[name])}; make another World that goes on from here, World(system, method, resume=world)"
+                )
+        batches = {name: _batch_of(value, known.own_axes(name)) for name, value in fresh.items()}
+        batches |= {"control": () if known.keeper is None else known.keeper.batch}
+        batches |= {part.kind: part.batch for part in known.around}
+        own = {} if known._free is None else {"_free": known._free.with_arguments(arguments)}
+        return changed(known, **known.operations(), parameters_given=fresh, batch=checks.batch_shape(batches), **own)
+
+    def _fresh(self, arguments: dict[str, Any]) -> dict[str, Any]:
+        """All parameters, with these in place of some, checked."""
+        name, own = self.definition.name, self.definition.own_axes
+        checked = {each: _checked(f"{name}: {each}", value, own[each])[0] for each, value in arguments.items()}
+        return {each: checked.get(each, value) for each, value in self.parameters_given.items()}
+
+    def direct(self) -> dict[str, tuple[str, float]]:
+        """All parameters that are numbers."""
+        return {name: (name, checks.ANY) for name, value in self.parameters_given.items() if isinstance(value, np.ndarray)}
+
     # ---- shapes
 
     def for_state_shapes(self, *states: Any) -> OwnSystem:
@@ -458,6 +493,11 @@ class OwnSystem(System):
     def given_inputs(self) -> dict[str, Input]:
         """The inputs among the parameters, by name."""
         return {name: value for name, value in self.parameters_given.items() if isinstance(value, (Sinusoid, Sampled))}
+
+
+def _batch_of(value: Any, own: int) -> Shape:
+    """The batch shape of a checked parameter with ``own`` axes of its own."""
+    return value.shape[own:] if isinstance(value, np.ndarray) else getattr(value, "batch", ())
 
 
 def _checked(argument: str, value: Any, own: int) -> tuple[Any, Shape]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class Particles(System):
     """
 
     kernel = "particles"
+    unchanged: ClassVar[dict[str, float]] = {"drag": checks.NOT_NEGATIVE}
     reference = Reference
     complex_step = True
     axes = "points, dim"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -36,6 +36,7 @@ class Pendulum(System):
     """
 
     kernel = "pendulum"
+    unchanged: ClassVar[dict[str, float]] = {"omega": checks.POSITIVE, "damping": checks.ANY, "a": checks.ANY}
     reference = Reference
     complex_step = True
 

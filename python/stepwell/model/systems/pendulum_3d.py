@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -39,6 +39,7 @@ class Pendulum3D(RodSystem):
     """
 
     kernel = "pendulum_3d"
+    unchanged: ClassVar[dict[str, float]] = {"length": checks.POSITIVE, "gravity": checks.ANY}
     reference = Reference
     axes = "x, y and z"
     v_shape = y_shape = (3,)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -57,6 +57,7 @@ class RigidBody(System):
     """
 
     kernel = "rigid_body"
+    unchanged: ClassVar[dict[str, float]] = {"damping": checks.ANY, "weight": checks.ANY, "centre": checks.ANY}
     reference = reference.RigidBody
     complex_step = True
     constraint = "norm"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from operator import index
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -120,6 +120,7 @@ class Rods(RodSystem):
     """
 
     kernel = "rods"
+    unchanged: ClassVar[dict[str, float]] = {"masses": checks.POSITIVE, "lengths": checks.POSITIVE, "gravity": checks.ANY}
     reference = reference.Rods
     axes = "points, dim"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -63,6 +63,9 @@ class Springs(System):
     """
 
     kernel = "springs"
+    unchanged: ClassVar[dict[str, float]] = dict.fromkeys(("stiffness", "rest", "damping", "drag"), checks.NOT_NEGATIVE) | {
+        "masses": checks.POSITIVE
+    }
     reference = reference.Springs
     complex_step = True
     axes = "particles, dim"

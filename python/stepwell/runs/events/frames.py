@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,8 @@ class Frames(Collected):
             )
         super().__init__(plan, events)
         self._blocks, self._loop = (v, y), loop
+        #: Takes the parameters that were written to, if they live.
+        self.refresh: Callable[[], object] | None = None
         self._occurrences: dict[str, Occurrences] | None = None
         self._all = np.arange(plan.members)
         self._resets = Resets(self) if any(event.then for event in events) else None
@@ -54,9 +56,16 @@ class Frames(Collected):
         self._rests = np.zeros(plan.members, dtype=bool)
         self._left: tuple[list[Array], list[Array]] | None = None
 
+    def renew(self, plan: engine.Plan) -> None:
+        """Go on with other parameters."""
+        self.plan, self.members = plan, Members(plan)
+        self.trials = Trials(plan, self.members)
+
     def step(self, n: int = 1) -> None:
         """Make n steps in place. ``World.events`` returns their events."""
         n = checks.count("n", n, 0)
+        if self.refresh is not None:
+            self.refresh()
         self.clear()
         self._occurrences = None
         g = self._quantities(self._loop.step_number)

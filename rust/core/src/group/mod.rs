@@ -22,6 +22,11 @@ pub trait Group<T: Real = f64>: Send + Sync {
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
 
+    /// Takes other numbers for the same parameters of the members from `first`, which were prepared before.
+    fn renew(&mut self, spec: &Spec, first: usize, count: usize) {
+        self.prepare(spec, first, count);
+    }
+
     /// Takes the force from outside for the members from `first`, for the steps to come.
     fn set_force(&mut self, _force: &Force<T>, _first: usize, _count: usize) {}
 

@@ -71,6 +71,11 @@ impl Group for LargeGroup {
         self.blocks.rates.tally_mut().fill(0.0);
     }
 
+    fn renew(&mut self, spec: &Spec, first: usize, count: usize) {
+        self.prepared = false;
+        self.prepare(spec, first, count);
+    }
+
     fn set_force(&mut self, force: &Force, first: usize, count: usize) {
         self.blocks.rates.set_force(force, first, count);
     }

@@ -117,7 +117,7 @@ impl Signature {
     }
 
     /// The place of a parameter's first row among all.
-    pub(crate) fn place(&self, name: &str) -> Option<usize> {
+    pub fn place(&self, name: &str) -> Option<usize> {
         let at = self.rows.iter().position(|(known, _)| known == name)?;
         Some(self.rows[..at].iter().map(|(_, rows)| rows.len()).sum::<usize>())
     }

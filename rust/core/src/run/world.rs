@@ -10,7 +10,7 @@ use super::{
 use crate::{
     error::Error,
     group::Group,
-    model::around::force::NAME,
+    model::{around::force::NAME, spec::Spec},
     stage::{Clock, Force, Machine, Stop},
     tape::real::Real,
 };
@@ -142,6 +142,32 @@ impl<T: Steppable> World<T> {
             let force = Force { numbers: rows, members: self.members, place };
             self.shares.iter_mut().for_each(|share| share.group.set_force(&force, share.first, share.count));
         }
+    }
+
+    /// Takes other numbers for the same parameters. A method with a carry starts again from the state, as with another system.
+    pub fn renew(&mut self, spec: &Spec) {
+        for Share { group, first, count, .. } in &mut self.shares {
+            group.renew(spec, *first, *count);
+        }
+        self.is_written = false;
+    }
+
+    /// Starts these members again from their state in the arrays, and goes on with all others, whose carry was this before.
+    pub fn restart(&mut self, members: &[usize], carry: &mut [T], v: &[T], y: &[T]) {
+        if !self.carries || carry.len() != self.sizes.0 {
+            return;
+        }
+        let (all, k) = (self.members, self.step);
+        for share in &mut self.shares {
+            share.load(v, y, all);
+            share.group.start(k);
+            // What was started goes to the place of the velocities last written, which are copied below.
+            store(&mut self.written.0, all, (share.first, share.count), share.group.slots().0, share.group.lanes());
+        }
+        for (row, started) in carry.chunks_exact_mut(all).zip(self.written.0.chunks_exact(all)) {
+            members.iter().for_each(|member| row[*member] = started[*member]);
+        }
+        self.carry_on(carry, v, y);
     }
 
     /// Whether these arrays are not what the slots hold.

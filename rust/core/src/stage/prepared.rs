@@ -147,12 +147,36 @@ impl<T: Real> PreparedStage<T> {
 
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last.
     pub fn prepare(&mut self, stage: &Stage<T>, spec: &Spec, first: usize, count: usize) {
+        self.take_common(stage, spec);
         let lanes = self.lanes();
         for (raw, param) in self.raw.chunks_exact_mut(lanes).zip(&stage.split.params) {
             spec.rows[*param as usize].fill(first, count, raw);
         }
         self.find_rows();
         self.take_samples(stage, spec, |row, to| row.fill(first, count, to));
+    }
+
+    /// Computes again what follows from parameters that all members have in common, where these are not what they were.
+    fn take_common(&mut self, stage: &Stage<T>, spec: &Spec) {
+        let mut differs = false;
+        for (at, source) in stage.split.sources.iter().enumerate() {
+            let UniformSource::Param(i) = *source else { continue };
+            let Some(number) = spec.rows.get(i as usize).filter(|_| i != BUDGET).map(|row| row.at(0)) else { continue };
+            if T::of(number).pattern() != self.shared[at].pattern() {
+                (self.shared[at], differs) = (T::of(number), true);
+            }
+            if let Some(wide) = self.clock.as_mut().filter(|wide| wide.shared[at].to_bits() != number.to_bits()) {
+                (wide.shared[at], wide.pool_for, differs) = (number, None, true);
+            }
+        }
+        if differs {
+            let state = &mut self.uniforms;
+            let tile = &mut Tile { state, rows: &[], pool: &self.shared, steps: 1, per_step: &[], held: &[] };
+            self.compiled.run.run(tile, &mut self.scratch);
+            (self.pool_for, self.shared_pool_for, self.unrolled_pool_for) = (None, None, None);
+            // No table is left that is of any step.
+            self.tables.iter_mut().for_each(|(first, _)| *first = i64::MIN);
+        }
     }
 
     /// Takes the force for the members that were prepared.
@@ -170,6 +194,9 @@ impl<T: Real> PreparedStage<T> {
 
     /// Computes what is constant for each member from its parameters.
     fn find_rows(&mut self) {
+        if self.rows.is_empty() {
+            return;
+        }
         let (rows, shared) = (&mut self.rows, &self.shared);
         let tile = &mut Tile { state: rows, rows: &self.raw, pool: shared, steps: 1, per_step: &[], held: &[] };
         self.compiled.member.run(tile, &mut self.scratch);
@@ -298,7 +325,12 @@ impl<T: Real> PreparedStage<T> {
     fn steps(&mut self, steps: usize, per_step: &[u64], state: &mut [T]) {
         let (kernel, by) = self.compiled.runner.kernel(steps);
         if self.pool_for != Some(by) {
-            self.pool = Aligned::from(&kernel.pool(&self.uniforms));
+            let pool = kernel.pool(&self.uniforms);
+            if self.pool.len() == pool.len() {
+                self.pool.copy_from_slice(&pool);
+            } else {
+                self.pool = Aligned::from(&pool);
+            }
             self.pool_for = Some(by);
         }
         let tile = &mut Tile { state, rows: &self.rows, pool: &self.pool, steps, per_step, held: &self.held };
