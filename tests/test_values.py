@@ -214,6 +214,11 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]).paces,
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]).paces,
     ],
+    "DiscreteSystem": [
+        lambda: sw.discretise(sw.Oscillator(), 0.1),
+        lambda: sw.discretise(sw.Oscillator(), 0.2),
+        lambda: sw.discretise(sw.Oscillator(), 0.1, "rk4"),
+    ],
     "AdaptiveState": [
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]).controller_state,
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]).controller_state,

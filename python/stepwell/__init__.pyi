@@ -2,10 +2,15 @@
 from . import errors as errors
 from . import scenes as scenes
 from .analysis import derivatives as derivatives
+from .analysis import discrete as discrete
 from .analysis import dynamics as dynamics
 from .analysis import orbits as orbits
 from .analysis import stability as stability
 from .analysis.consistency import consistent_start as consistent_start
+from .analysis.discrete import DiscreteSystem as DiscreteSystem
+from .analysis.discrete import discretise as discretise
+from .analysis.discrete import frequency_response as frequency_response
+from .analysis.discrete import margins as margins
 from .analysis.dynamics import equilibria as equilibria
 from .analysis.dynamics import jacobian as jacobian
 from .analysis.dynamics import lyapunov as lyapunov

@@ -395,6 +395,17 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "analyse": (sw.analyse, {"system": sw.Oscillator(), "method": "rk4", "dt": 0.1, "at": None, "t": 0.0}),
     "analyse at": (sw.analyse, {"system": sw.Pendulum(), "method": "rk4", "dt": 0.1, "at": (0.0, 1.0), "t": 0.0}),
     "stability_limit": (sw.stability_limit, {"system": sw.Oscillator(), "method": "rk4", "at": None, "t": 0.0}),
+    "discretise": (
+        sw.discretise,
+        {"system": sw.TransferFunction(1.0, [1.0, 1.0]), "dt": 0.1, "how": "exact", "interpolation": "linear", "prewarp": None},
+    ),
+    "DiscreteSystem.run": (sw.discretise(sw.TransferFunction(1.0, [1.0, 1.0]), 0.1).run, {"x": [1.0, 2.0], "start": [0.5]}),
+    "DiscreteSystem.frequency_response": (
+        sw.discretise(sw.TransferFunction(1.0, [1.0, 1.0]), 0.1).frequency_response,
+        {"omega": [1.0, 2.0]},
+    ),
+    "frequency_response": (sw.frequency_response, {"system": sw.TransferFunction(1.0, [1.0, 1.0]), "omega": [1.0, 2.0]}),
+    "margins": (sw.margins, {"loop": sw.TransferFunction(9.0, [1.0, 3.0, 3.0, 1.0])}),
     "stability_limit at": (sw.stability_limit, {"system": sw.Pendulum(), "method": "rk4", "at": (0.0, 1.0), "t": 0.0}),
     "analyse v y": (sw.analyse, {"system": sw.Pendulum(), "method": "rk4", "dt": 0.1, "v": 0.0, "y": 1.0}),
     "stability_limit v y": (sw.stability_limit, {"system": sw.Pendulum(), "method": "rk4", "v": 0.0, "y": 1.0}),

@@ -16,6 +16,9 @@ Backend = Literal["rust", "numpy"]
 #: The values of an input between its samples.
 Interpolation = Literal["hold", "linear", "cubic"]
 
+#: How an input of a sampled system runs from one sample to the next.
+SampleInterpolation = Literal["hold", "linear"]
+
 #: What the velocity of an oscillator is.
 OscillatorForm = Literal["canonical", "physical"]
 

@@ -1,0 +1,10 @@
+"""Sampled systems (§4): a linear system from sample to sample, exactly or by a method, and its frequency response.
+
+``systems`` makes the matrices of a step, ``response`` computes frequency responses, ``margins`` those of
+a loop.
+"""
+
+from .margins import Margins, frequency_response, margins
+from .systems import DiscreteSystem, SampledRun, discretise
+
+__all__ = ["DiscreteSystem", "Margins", "SampledRun", "discretise", "frequency_response", "margins"]
