@@ -310,6 +310,10 @@ PICTURES = {
     "figures": lambda: sw.charts.figures().plot(),
     "figure of one that looks exact": lambda: sw.charts.figures(["rk4"]).plot(method="rk4"),
     "powers": lambda: sw.charts.powers(steps=[1, 10, 100]).plot(),
+    "bode": lambda: sw.charts.bode(sw.Oscillator(1.0, 0.1), dt=0.5).plot(),
+    "bode of samples": lambda: sw.charts.bode(
+        sw.TransferFunction(4.0, [1.0, 3.0, 3.0, 1.0]), ["standard_euler", "rk4"], dt=0.3, x="hold"
+    ).plot(),
     "friction": lambda: sw.charts.verlet_friction().plot(),
     "map": lambda: sw.charts.stability_map("merson").plot(),
     "loci": lambda: sw.charts.stability(COUNTED, phi=np.linspace(0.05, 3.0, 60)).plot(),

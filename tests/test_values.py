@@ -263,6 +263,14 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: charts.Peer("heyoka", charts.peers.ByHeyoka()),
     ],
     "Figures": [lambda: charts.figures(["rk4"]), lambda: charts.figures(["rk4"], phi=0.4), lambda: charts.figures(["verlet"])],
+    "Bode": [
+        lambda: charts.bode(sw.Oscillator(damping=0.1), ["rk4"], dt=0.1),
+        lambda: charts.bode(sw.Oscillator(damping=0.1), ["rk4"], dt=0.1, x="hold"),
+    ],
+    "MethodResponse": [
+        lambda: charts.bode(sw.Oscillator(damping=0.1), ["rk4"], dt=0.1).curves[0],
+        lambda: charts.bode(sw.Oscillator(damping=0.1), ["merson"], dt=0.1).curves[0],
+    ],
     "Stability": [lambda: charts.stability(["rk4"]), lambda: charts.stability(["verlet"])],
     "StabilityMap": [lambda: charts.stability_map("rk4"), lambda: charts.stability_map("merson")],
     "NormSweep": [lambda: charts.norm(["rk4"], gains=[0.1]), lambda: charts.norm(["rk4"], gains=[0.2])],

@@ -20,6 +20,7 @@ registry.register(
     animate_run="stepwell.views.charts.runs_animation:animate",
     draw_advice="stepwell.views.charts.advice_picture:draw",
     derivatives_of_rates="stepwell.analysis.derivatives.traced:of_rates",
+    draw_bode="stepwell.views.charts.bode_picture:draw",
     draw_control="stepwell.views.charts.control_picture:draw",
     draw_curves="stepwell.views.charts.zplane_picture:curves",
     draw_eigenvalues="stepwell.views.charts.roots_picture:draw",

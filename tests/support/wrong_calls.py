@@ -535,6 +535,10 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         {"method": "rk4", "system": None, "v": 0.0, "y": 1.0, "dt": 0.3, "steps": [1, 10], "progress": None},
     ),
     "charts.norm": (charts.norm, {"methods": ["rk4"], "phi": 0.1, "gains": [0.1, 0.2], "progress": None}),
+    "charts.bode": (
+        charts.bode,
+        {"system": sw.Oscillator(1.0, 0.1), "methods": ["rk4"], "dt": 0.1, "x": "hold", "omega": [0.1, 1.0], "of": (0, 0)},
+    ),
     "charts.verlet_friction": (charts.verlet_friction, {"dt": 0.05}),
     "charts.run_picture": (charts.run_picture, {"scene": KEPLER, "run": KEPLER.run("rk4", 0.1, steps=9, every=3)}),
     "charts.control": (

@@ -19,6 +19,9 @@ Interpolation = Literal["hold", "linear", "cubic"]
 #: How an input of a sampled system runs from one sample to the next.
 SampleInterpolation = Literal["hold", "linear"]
 
+#: How an input runs within a step whose frequency response is charted.
+InputBetween = Literal["sine", "hold", "linear"]
+
 #: What the velocity of an oscillator is.
 OscillatorForm = Literal["canonical", "physical"]
 

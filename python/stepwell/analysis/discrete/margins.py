@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, pi
 from typing import Any
@@ -116,7 +117,11 @@ def margins(loop: Any) -> Margins:
     low, high = (corners.min() / BEYOND, corners.max() * BEYOND) if corners.size else (1.0 / BEYOND, BEYOND)
     high = min(high, last)
     low = min(low, high / BEYOND)
-    omega = np.geomspace(low, high, max(2, round(IN_DECADE * np.log10(high / low))))
+    return of_response(of, np.geomspace(low, high, max(2, round(IN_DECADE * np.log10(high / low)))), last)
+
+
+def of_response(of: Callable[[Any], Any], omega: Array, last: float) -> Margins:
+    """The margins of a loop by its response, which is searched at these frequencies; samples end at the last one."""
     at = of(omega)
     ones = _crossings(of, omega, at, lambda z: np.abs(z) - 1.0)
     turns = [w for w in _crossings(of, omega, at, lambda z: z.imag) if of(w).real < 0.0]

@@ -4,6 +4,7 @@ from ...studies.measuring import peers
 from ...studies.measuring.data import Curve, Point, Timing, WorkPrecision
 from ...studies.measuring.peers import Peer, Solved
 from ...studies.measuring.work_precision import work_precision
+from .bode import Bode, MethodResponse, bode
 from .control import ControlSweep, control
 from .control_runs import Held
 from .figures import Figures, Samples, figures
@@ -16,11 +17,13 @@ from .verlet_friction import VerletFriction, verlet_friction
 from .zplane import Locus, Stability, stability
 
 __all__ = [
+    "Bode",
     "ControlSweep",
     "Curve",
     "Figures",
     "Held",
     "Locus",
+    "MethodResponse",
     "NormSweep",
     "Observation",
     "Panel",
@@ -36,6 +39,7 @@ __all__ = [
     "Timing",
     "VerletFriction",
     "WorkPrecision",
+    "bode",
     "control",
     "figures",
     "norm",
