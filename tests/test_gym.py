@@ -6,6 +6,7 @@ import doctest
 import inspect
 import sys
 import warnings
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -120,7 +121,7 @@ def test_the_world_is_stepped_in_float32(name: str) -> None:
     assert whole.world.y.dtype == np.float64
     assert (half.world.v != whole.world.v.astype(F)).any()
     assert [each.dtype for each in half.states] == [np.float64] * 2
-    assert whole.states[1] is whole.world.y
+    assert np.shares_memory(whole.states[1], whole.world.y)
 
 
 @each_type
@@ -168,6 +169,172 @@ def test_some_can_be_reset() -> None:
     assert (after[mask] != before[mask]).any(axis=1).all()
     with pytest.raises(ShapeError, match="reset_mask: expected 4 booleans"):
         envs.reset(options={"reset_mask": [1, 0]})
+
+
+# ---- one tape
+
+
+def on_arrays(name: str, *arguments: Any, **options: Any) -> Any:
+    """The same environments, whose rules are run on arrays."""
+    kind = getattr(sw.gym, f"{name}VectorEnv")
+    return type(name, (kind,), {"_fits": lambda self: False})(*arguments, **options)
+
+
+MODES = ["NextStep", "SameStep", "Disabled"]
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_step_of_one_tape_has_the_bits_of_rules_on_arrays(name: str, mode: str) -> None:
+    """Observations, rewards, ends, information, states and numbers of actions, with several steps an action as well."""
+    for substeps, members in ((1, 70), (3, 5)):
+        options: Any = {"substeps": substeps, "max_episode_steps": 12, "autoreset_mode": mode, "dt": 0.02}
+        one, other = getattr(sw.gym, f"{name}VectorEnv")(members, **options), on_arrays(name, members, **options)
+        assert one._play is not None
+        assert other._play is None
+        one.action_space.seed(1)
+        np.testing.assert_array_equal(one.reset(seed=3)[0], other.reset(seed=3)[0])
+        for k in range(40):
+            action = one.action_space.sample()
+            mine, theirs = one.step(action), other.step(action)
+            for a, b in zip(mine[:4], theirs[:4], strict=True):
+                np.testing.assert_array_equal(a, b)
+                assert a.dtype == b.dtype
+            assert mine[4].keys() == theirs[4].keys()
+            for each in mine[4]:
+                np.testing.assert_array_equal(mine[4][each], theirs[4][each])
+            np.testing.assert_array_equal(one.world.v, other.world.v)
+            np.testing.assert_array_equal(one.world.y[:2], other.world.y[:2])
+            np.testing.assert_array_equal(one._over != 0, other._over)
+            if k == 20:  # states that a user writes, and some that are reset
+                for each in (one, other):
+                    each.world.v[...] *= 0.5
+                mask = np.arange(members) % 3 == 0
+                again = [each.reset(options={"reset_mask": mask})[0] for each in (one, other)]
+                np.testing.assert_array_equal(*again)
+            np.testing.assert_array_equal(one.steps, other.steps)
+
+
+@pytest.mark.parametrize("method", ["leapfrog", "implicit_midpoint"])
+def test_methods_that_are_not_on_that_tape(method: str) -> None:
+    """Their rules are run on arrays; members that begin anew leave what others carry alone."""
+    envs = many("Pendulum", 6, method=method, dt=0.02)
+    assert envs._play is None
+    envs.reset(seed=1)
+    for _ in range(5):
+        envs.step(np.ones((6, 1), F))
+    before = envs.world.y[3:].copy()
+    envs.reset(options={"reset_mask": np.arange(6) < 3})
+    np.testing.assert_array_equal(envs.world.y[3:], before)
+    assert np.isfinite(envs.step(np.ones((6, 1), F))[0]).all()
+
+
+# ---- when an episode begins anew, and with which parameters
+
+
+def test_same_step() -> None:
+    """The call that ends an episode returns the first observation of the next one, and the last as information."""
+    envs, other = many("CartPole", 5, autoreset_mode="SameStep"), many("CartPole", 5, autoreset_mode=AutoresetMode.DISABLED)
+    assert envs.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    envs.reset(seed=2)
+    other.reset(seed=2)
+    ends = 0
+    for _ in range(60):
+        other.world.v[...], other.world.y[...] = envs.world.v, envs.world.y
+        action = np.array([1, 1, 0, 0, 1])
+        seen, rewards, terminated, truncated, info = envs.step(action)
+        last = other.step(action)
+        assert (rewards == 1.0).all()
+        np.testing.assert_array_equal(terminated, last[2])
+        ended = terminated | truncated
+        assert ("final_obs" in info) == ended.any()
+        if ended.any():
+            ends += 1
+            np.testing.assert_array_equal(info["_final_obs"], ended)
+            np.testing.assert_array_equal(info["final_obs"][ended], last[0][ended])
+            assert not info["final_obs"][~ended].any()
+            assert (np.abs(seen[ended]) <= 0.05).all()
+            assert (envs.steps[ended] == 0).all()
+        np.testing.assert_array_equal(seen[~ended], last[0][~ended])
+    assert ends > 3
+
+
+def test_disabled() -> None:
+    envs = many("CartPole", 3, autoreset_mode="Disabled", max_episode_steps=5)
+    envs.reset(seed=2)
+    for k in range(8):
+        _, rewards, _, truncated, _ = envs.step(np.array([1, 0, 1]))
+        assert (truncated == (k >= 4)).all()
+        assert (rewards == 1.0).all()
+    assert (envs.steps == 8).all()
+    envs.reset(options={"reset_mask": np.array([False, True, False])})
+    assert envs.steps.tolist() == [8, 0, 8]
+
+
+def test_a_training_loop_of_gymnasium_takes_each_mode() -> None:
+    """Its wrapper that counts returns knows what each mode does."""
+    from gymnasium.wrappers.vector import RecordEpisodeStatistics
+
+    for mode in MODES[:2]:
+        envs = RecordEpisodeStatistics(gymnasium.make_vec("stepwell/CartPole-v0", num_envs=4, autoreset_mode=mode))
+        envs.reset(seed=1)
+        lengths = []
+        for k in range(120):
+            *_, info = envs.step(np.full(4, (k // 2) % 2))
+            if "episode" in info:
+                lengths += info["episode"]["l"][info["_episode"]].tolist()
+        assert len(lengths) > 4
+        assert min(lengths) > 5
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_parameters_that_each_episode_draws(name: str) -> None:
+    """Uniform in the bounds, by seed; steps have the bits of a world with these parameters."""
+    parameters = {"CartPole": {"pole": (0.05, 0.2), "gravity": (9.0, 10.0)}, "Pendulum": {"omega": (3.0, 4.0)}}
+    ranges = parameters.get(name, {"lengths": (0.9, 1.1), "gravity": (9.0, 10.0)})
+    envs = many(name, 50, randomise=ranges, max_episode_steps=4)
+    assert envs._play is not None
+    drawn = []
+    envs.reset(seed=1)
+    for _ in range(9):
+        now = {each: np.array(envs.world.parameters[each]) for each in ranges}
+        drawn.append(now)
+        for each, (low, high) in ranges.items():
+            assert now[each].shape[-1] == 50
+            assert ((low <= now[each]) & (now[each] <= high)).all()
+            assert now[each].std() > 0.2 * (high - low) / np.sqrt(12.0)
+        v, y = envs.world.v.copy(), envs.world.y.copy()
+        over = envs._over != 0
+        plan = envs.world._plan
+        world = sw.World(
+            envs.world.system.uncontrolled, plan.method, v=v, y=y, dt=plan.dt, force=plan.force, control=envs.world.system.keeper
+        )
+        seen = envs.step(np.zeros(envs.action_space.shape, envs.action_space.dtype))[0]
+        if name == "CartPole":
+            world.y[2] = -10.0
+        world.step()
+        np.testing.assert_array_equal(envs.world.y[..., ~over], world.y[..., ~over])
+        assert np.isfinite(seen).all()
+    first = next(iter(ranges))
+    assert any((a[first] != b[first]).any() for a, b in pairwise(drawn))
+    other = many(name, 50, randomise=ranges, max_episode_steps=4)
+    other.reset(seed=1)
+    np.testing.assert_array_equal(other.world.parameters[first], drawn[0][first])
+
+
+def test_wrong_ranges() -> None:
+    for wrong, kind, text in (
+        ({"pole": (0.2, 0.1)}, ArgumentError, r"randomise\['pole'\]: expected bounds \(low, high\)"),
+        ({"pole": 0.2}, ShapeError, r"randomise\['pole'\]: expected bounds"),
+        ({"polo": (0.1, 0.2)}, UnknownNameError, "did you mean 'pole'"),
+        ([("pole", 1)], DTypeError, "randomise: expected names with their bounds"),
+    ):
+        with pytest.raises(kind, match=text):
+            many("CartPole", 3, randomise=wrong)
+    with pytest.raises(ArgumentError, match="omega: expected numbers above zero"):
+        many("Pendulum", 3, randomise={"omega": (-1.0, 1.0)})
+    with pytest.raises(UnknownNameError, match="autoreset_mode: there is no"):
+        many("Pendulum", 3, autoreset_mode="next")
 
 
 # ---- known truths
@@ -259,8 +426,8 @@ def test_the_motor_of_the_double_rod_does_its_work(torque: float) -> None:
     for _ in range(4001):
         v, y = envs.world.v[..., 0], envs.world.y[..., 0]
         energy.append(0.5 * (v**2).sum() + 9.8 * y[:, 1].sum())
-        _, turning = envs._rods()
-        now = torque * np.array([-turning[0, 0], turning[1, 0]])
+        turning = sw.gym.DoubleRodVectorEnv.look(v, y)[4:]
+        now = torque * np.array([-turning[0], turning[1]])
         if rate is not None:
             of_each += 0.5 * (rate + now) * (0.5 / 4000)
         rate = now
@@ -298,7 +465,9 @@ def test_shorter_steps_come_nearer_to_the_truth() -> None:
     assert 0 < abs(end(16) - finest) < abs(end(1) - finest) / 1000
 
 
-@pytest.mark.parametrize("name", [name for name in sw.gym.__all__ if name.endswith("VectorEnv") and name != "WorldVectorEnv"])
+@pytest.mark.parametrize(
+    "name", [name for name in sw.gym.__all__ if name.endswith("VectorEnv") and name not in ("WorldVectorEnv", "TracedVectorEnv")]
+)
 def test_examples_print_what_they_say(name: str) -> None:
     example = doctest.DocTestParser().get_doctest(inspect.getdoc(getattr(sw.gym, name)) or "", {}, name, None, None)
     assert example.examples

@@ -115,6 +115,13 @@ class World:
     def carry_on(self, carry: NDArray[Any]) -> None:
         """Go on with this carry, by rows, which belongs to what is in the arrays now."""
 
+    def play(self, rows: tuple[int, int], seen: NDArray[Any], rewards: NDArray[Any], truths: NDArray[Any]) -> None:
+        """One step of episodes, whose rows of y behind those that go on and those that are read go into the arrays.
+
+        The numbers of rows are those that go on, and these with the actions, which are read only. Behind them are a reward, two
+        truths and what is seen.
+        """
+
     def take(self, model: ModelSpec, plan: Plan) -> None:
         """Go on with other parameters; arrays of parameters are not read any more."""
 

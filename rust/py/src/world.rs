@@ -5,7 +5,7 @@ use std::sync::{
     atomic::{AtomicI64, Ordering::Relaxed},
 };
 
-use numpy::{Element, IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
+use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use pyo3::{
     buffer::{Element as PyElement, PyBuffer},
     prelude::*,
@@ -276,6 +276,70 @@ impl<T: Of> Loop<T> {
     }
 }
 
+/// What a step of episodes makes: observations by members, rewards, and whether members ended and were cut off.
+struct Made<'a> {
+    seen: &'a mut [f32],
+    rewards: &'a mut [f64],
+    truths: &'a mut [bool],
+}
+
+impl<T: Of> Loop<T> {
+    /// One step, of which only the first rows of y go on.
+    fn play(&mut self, py: Python<'_>, [kept, read]: [usize; 2], made: Made<'_>, changes: &AtomicI64) -> PyResult<()> {
+        let Loop { world, arrays, force, live } = self;
+        if let Some(live) = live {
+            live.read(py, world, changes)?;
+        }
+        if let Some(force) = force {
+            force.read(py, world)?;
+        }
+        let Made { seen, rewards, truths } = made;
+        let (members, numbers) = (rewards.len(), seen.len() / rewards.len().max(1));
+        let fits = kept <= read && world.sizes() == (0, (read + MADE + numbers) * members) && truths.len() == 2 * members;
+        if !fits {
+            return Err(argument_error("rows, observations and rewards must be of one number of members".to_owned()));
+        }
+        let (ended, cut) = truths.split_at_mut(members);
+        arrays.with(py, |_, y| {
+            world.play([kept, read], y, |behind, first, count, lanes| {
+                let row = |i: usize| &behind[i * lanes..][..count];
+                let flag = |to: &mut bool, number: &T| *to = number.wide() != 0.0;
+                rewards[first..][..count].iter_mut().zip(row(0)).for_each(|(to, number)| *to = number.wide());
+                ended[first..][..count].iter_mut().zip(row(1)).for_each(|(to, number)| flag(to, number));
+                cut[first..][..count].iter_mut().zip(row(2)).for_each(|(to, number)| flag(to, number));
+                let seen = &mut seen[first * numbers..][..count * numbers];
+                let behind = &behind[MADE * lanes..];
+                match numbers {
+                    1 => by_member::<T, 1>(seen, behind, lanes),
+                    2 => by_member::<T, 2>(seen, behind, lanes),
+                    3 => by_member::<T, 3>(seen, behind, lanes),
+                    4 => by_member::<T, 4>(seen, behind, lanes),
+                    6 => by_member::<T, 6>(seen, behind, lanes),
+                    _ => {
+                        for (i, row) in behind.chunks_exact(lanes).take(numbers).enumerate() {
+                            let own = seen.iter_mut().skip(i).step_by(numbers);
+                            own.zip(row).for_each(|(to, number)| *to = number.wide() as f32);
+                        }
+                    }
+                }
+            });
+            Ok(())
+        })
+    }
+}
+
+/// The rows before what is seen: the reward and two truths.
+const MADE: usize = 3;
+
+/// Rows of N numbers, by member: where N is known, each member is written at once.
+fn by_member<T: Of, const N: usize>(seen: &mut [f32], rows: &[T], lanes: usize) {
+    let members = seen.as_chunks_mut::<N>().0;
+    let rows: [&[T]; N] = std::array::from_fn(|i| &rows[i * lanes..][..members.len()]);
+    for (m, member) in members.iter_mut().enumerate() {
+        *member = std::array::from_fn(|i| rows[i][m].wide() as f32);
+    }
+}
+
 /// What is read of a plan: see `Plan` in `runs/engine/plan.py`.
 #[derive(FromPyObject)]
 struct WorldPlan {
@@ -339,6 +403,27 @@ impl World {
             Loops::Double(of) => of.advance(py, n, &self.step, &self.changes),
             Loops::Single(of) => of.advance(py, n, &self.step, &self.changes),
         })
+    }
+
+    /// One step of episodes: the first rows of y go on, as many as the first number says, and those up to the second are read
+    /// only. The rows behind these are a reward, two truths and what is seen, which are written to the arrays instead.
+    fn play(
+        &self,
+        py: Python<'_>,
+        rows: [usize; 2],
+        seen: &Bound<'_, PyArray2<f32>>,
+        rewards: &Bound<'_, PyArray1<f64>>,
+        truths: &Bound<'_, PyArray2<bool>>,
+    ) -> PyResult<()> {
+        let (mut seen, mut rewards) = (seen.try_readwrite().map_err(in_use)?, rewards.try_readwrite().map_err(in_use)?);
+        let mut truths = truths.try_readwrite().map_err(in_use)?;
+        let made = Made { seen: seen.as_slice_mut()?, rewards: rewards.as_slice_mut()?, truths: truths.as_slice_mut()? };
+        self.alone(|loops| match loops {
+            Loops::Double(own) => own.play(py, rows, made, &self.changes),
+            Loops::Single(own) => own.play(py, rows, made, &self.changes),
+        })?;
+        self.step.fetch_add(1, Relaxed);
+        Ok(())
     }
 
     /// Goes on with other parameters from the state that is in the arrays. Arrays of parameters are not read any more.

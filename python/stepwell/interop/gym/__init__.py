@@ -17,6 +17,7 @@ from .base import WorldEnv, WorldVectorEnv  # noqa: E402  # the line above raise
 from .cart_pole import CartPoleEnv, CartPoleVectorEnv, cart_pole  # noqa: E402
 from .double_rod import DoubleRodEnv, DoubleRodVectorEnv  # noqa: E402
 from .pendulum import PendulumEnv, PendulumVectorEnv  # noqa: E402
+from .traced import TracedVectorEnv  # noqa: E402
 
 __all__ = [
     "CartPoleEnv",
@@ -25,6 +26,7 @@ __all__ = [
     "DoubleRodVectorEnv",
     "PendulumEnv",
     "PendulumVectorEnv",
+    "TracedVectorEnv",
     "WorldEnv",
     "WorldVectorEnv",
     "cart_pole",

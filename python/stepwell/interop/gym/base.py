@@ -12,20 +12,49 @@ from gymnasium.vector.utils import batch_space
 
 from ...base import checks
 from ...base.arrays import Array
-from ...errors import ArgumentError, ShapeError, UnsupportedError
+from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
+from ...model import setting
 from ...model.methods import Method
 from ...runs.world import World
 
 Observations = np.ndarray[Any, np.dtype[np.float32]]
 Truths = np.ndarray[Any, np.dtype[np.bool_]]
+#: No environments.
+NONE = np.empty(0, np.intp)
+
+
+def _mode(value: Any) -> AutoresetMode:
+    """The argument ``autoreset_mode``."""
+    if isinstance(value, AutoresetMode):
+        return value
+    return AutoresetMode(checks.known("autoreset_mode", value, [each.value for each in AutoresetMode]))
+
+
+def _checked(world: World, randomise: Any) -> dict[str, tuple[Any, Any]]:
+    """The bounds of parameters that episodes draw anew. The parameters become ones of each member."""
+    if not isinstance(randomise, dict):
+        raise DTypeError(f"randomise: expected names with their bounds, got {checks.short(randomise)}")
+    bounds = {}
+    for name, pair in randomise.items():
+        if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+            raise ShapeError(f"randomise[{name!r}]: expected bounds (low, high), got {checks.short(pair)}")
+        world.parameters[name]  # or an error that says why it cannot be drawn
+        own = setting.of_each_member(world.system, name, world.y.shape[-1:]).shape[:-1]
+        low, high = (checks.numbers(f"randomise[{name!r}]", each) for each in pair)
+        if (low > high).any() or any(each.ndim and each.shape != own for each in (low, high)):
+            raise ArgumentError(f"randomise[{name!r}]: expected bounds (low, high) of shape {own}, got {checks.short(pair)}")
+        ends = [np.broadcast_to(np.broadcast_to(each, own)[..., np.newaxis], (*own, 1)) for each in (low, high)]
+        for each in reversed(ends):  # the system checks both; what is between is right, too
+            world.set(**{name: np.repeat(each, world.y.shape[-1], axis=-1)})
+        bounds[name] = ends[0], ends[1]
+    return bounds
 
 
 class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are not needed to check this
     """Environments that are stepped together, as the members of one ``World``.
 
-    An environment whose episode ended begins anew at the next call of ``step``, which ignores the action for it
-    (``AutoresetMode.NEXT_STEP``). A subclass is a kind of environment: it has the spaces of one environment, makes the world,
-    draws states, applies actions, and computes observations and rewards; see docs/howto/interop.md.
+    A subclass is a kind of environment: it has the spaces of one environment, makes the world, draws states, applies actions, and
+    computes observations and rewards; see docs/howto/interop.md.
 
     Args:
         num_envs: the number of environments.
@@ -34,8 +63,14 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         substeps: the number of steps for each action.
         max_episode_steps: the number of actions after which an episode is truncated; None for never.
         render_mode: None; there are no pictures.
-        dtype: ``"float64"`` or ``"float32"``, the precision of the world. Observations and rewards are computed from the states
-            in float64; observations are always returned in float32.
+        dtype: ``"float64"`` or ``"float32"``, the precision of the world, and of what is computed from its states.
+            Observations are always returned in float32.
+        autoreset_mode: when an environment whose episode ended begins anew: Gymnasium's ``AutoresetMode`` or its value. At the
+            next call of ``step``, which ignores the action for it (``NEXT_STEP``); within the call that ends it, which returns
+            the last observation as ``info["final_obs"]`` (``SAME_STEP``); or by ``reset`` alone, until when the motion goes on
+            (``DISABLED``).
+        randomise: parameters of the system that each episode draws anew, by name with the bounds of a uniform distribution, such
+            as ``{"pole": (0.05, 0.2)}``.
 
     Attributes:
         world: the ``World``; its arrays are the states.
@@ -64,6 +99,8 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         max_episode_steps: int | None,
         render_mode: None = None,
         dtype: Any = "float64",
+        autoreset_mode: Any = AutoresetMode.NEXT_STEP,
+        randomise: dict[str, tuple[Any, Any]] | None = None,
     ) -> None:
         if render_mode is not None:
             raise ArgumentError(f"render_mode: expected None, for there are no pictures, got {checks.short(render_mode)}")
@@ -84,8 +121,20 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
                 f"dtype: {type(self).__name__} makes a world of {self.world.y.dtype}, and {self.dtype} was asked for; let its "
                 f"make_world make arrays of self.dtype, and World(…, dtype=self.dtype)"
             )
+        self.autoreset_mode = _mode(autoreset_mode)
+        self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}  # type: ignore[misc]  # Gymnasium reads it
+        self._randomised = {} if randomise is None else _checked(self.world, randomise)
         self.steps = np.zeros(self.num_envs, dtype=np.int64)
         self._begun, self._over = False, np.zeros(self.num_envs, dtype=np.bool_)
+        self.prepare()
+
+    def prepare(self) -> None:
+        """Called last when an environment is made, once its world is there."""
+
+    @property
+    def begins_at_next_step(self) -> bool:
+        """Whether an environment whose episode ended begins anew at the next call of ``step``."""
+        return self.autoreset_mode is AutoresetMode.NEXT_STEP
 
     @property
     def states(self) -> tuple[Array, Array]:
@@ -116,6 +165,9 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
     def judge(self, actions: Any) -> tuple[Array, Truths]:
         """The rewards of the states after a step (ignored with ``rewards_before``), and whether each state ends its episode."""
 
+    def begin_action(self, actions: Any) -> None:
+        """Called before the steps of an action, for what ``judge`` needs of the states before them."""
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observations, dict[str, Any]]:
         """Begin new episodes; see Gymnasium. ``options={"reset_mask": mask}`` does so for some environments only."""
         super().reset(seed=seed)
@@ -123,9 +175,9 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         which = np.ones(self.num_envs, dtype=np.bool_) if mask is None else checks.as_array("reset_mask", mask)
         if which.shape != (self.num_envs,) or which.dtype != np.bool_:
             raise ShapeError(f"reset_mask: expected {self.num_envs} booleans, got {which.dtype} of shape {which.shape}")
-        self._begin(which)
+        self._begin(np.flatnonzero(which))
         self._begun = True
-        return self._seen(), {}
+        return self.seen(), {}
 
     def step(self, actions: Any) -> tuple[Observations, Array, Truths, Truths, dict[str, Any]]:
         """Apply the actions, and make ``substeps`` steps; see Gymnasium."""
@@ -134,6 +186,18 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         actions = checks.as_array("actions", actions)
         if actions.shape != self.action_space.shape or actions.dtype.kind not in "biuf":
             raise ShapeError(f"actions: expected shape {self.action_space.shape}, got {actions.dtype} of shape {actions.shape}")
+        over = (self._over != 0).nonzero()[0] if self.begins_at_next_step else NONE
+        seen, rewards, terminated, truncated = self.advance(actions, over)
+        if self.autoreset_mode is not AutoresetMode.SAME_STEP or not len(ended := np.flatnonzero(terminated | truncated)):
+            return seen, rewards, terminated, truncated, {}
+        last, which = np.zeros_like(seen), np.zeros(self.num_envs, np.bool_)
+        last[ended], which[ended] = seen[ended], True
+        self._begin(ended)
+        return self.seen(), rewards, terminated, truncated, {"final_obs": last, "_final_obs": which}
+
+    def advance(self, actions: Any, over: Any) -> tuple[Observations, Array, Truths, Truths]:
+        """Apply the actions, make the steps, and judge; members whose episode is over begin anew instead."""
+        self.begin_action(actions)
         before = self.rewards_before(actions)
         for _ in range(self.substeps):
             self.act(actions)
@@ -143,21 +207,37 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         rewards = rewards if before is None else before
         late = 2**62 if self.max_episode_steps is None else self.max_episode_steps
         truncated: Truths = self.steps >= late
-        if self._over.any():
-            self._begin(over := self._over.copy())
+        if len(over):
+            self._begin(over)
             rewards[over] = 0.0
             terminated[over] = truncated[over] = False
-        self._over = terminated | truncated
-        return self._seen(), rewards, terminated, truncated, {}
+        self._over[...] = terminated | truncated
+        return self.seen(), rewards, terminated, truncated
 
-    def _begin(self, which: Truths) -> None:
-        v, y = self.draw(int(which.sum()))
-        self.world.v[..., which] = v
-        self.world.y[..., which] = y
-        self.steps[which] = 0
-        self._over[which] = False
+    def _begin(self, places: Any) -> None:
+        """Begin new episodes of the environments at these places."""
+        self._put(places)
+        self._restart(places)
 
-    def _seen(self) -> Observations:
+    def _put(self, places: Any) -> None:
+        """Draw states and parameters."""
+        world = self.world
+        v, y = self.draw(len(places))
+        for name, (low, high) in self._randomised.items():
+            array = world.parameters[name]
+            array[..., places] = self.np_random.uniform(low, high, (*array.shape[:-1], len(places)))
+        if world.method.carry is not None or world._control is not None:
+            world.reset(places, v=v, y=y)
+        else:
+            world.v[..., places] = v
+            world.y[..., places] = y
+
+    def _restart(self, places: Any) -> None:
+        self.steps[places] = 0
+        self._over[places] = False
+
+    def seen(self) -> Observations:
+        """What is seen of the states, in float32."""
         # Rounding to float32 may pass a bound by one unit of its last place.
         space = self.one_observation
         return np.clip(self.observe().astype(np.float32, copy=False), space.low, space.high)
@@ -176,7 +256,7 @@ class WorldEnv(gymnasium.Env):  # type: ignore[misc]
 
     def __init__(self, **options: Any) -> None:
         # Gymnasium's wrapper limits the length of an episode.
-        self.many = self.vector(1, **{"max_episode_steps": None} | options)
+        self.many = self.vector(1, **{"max_episode_steps": None, "autoreset_mode": AutoresetMode.DISABLED} | options)
         self.observation_space, self.action_space = self.many.single_observation_space, self.many.single_action_space
         self.render_mode = None
 
@@ -189,6 +269,5 @@ class WorldEnv(gymnasium.Env):  # type: ignore[misc]
 
     def step(self, action: Any) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Apply the action; see Gymnasium. After the end of an episode the motion goes on until ``reset``."""
-        self.many._over[:] = False
         observations, rewards, terminated, truncated, information = self.many.step(checks.as_array("action", action)[np.newaxis])
         return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), information

@@ -11,7 +11,8 @@ from ...base.arrays import Array
 from ...model.equations import system
 from ...model.methods import Method
 from ...runs.world import World
-from .base import Truths, WorldEnv, WorldVectorEnv
+from .base import WorldEnv, WorldVectorEnv
+from .traced import TracedVectorEnv
 
 #: The push of an action, in newtons.
 PUSH = 10.0
@@ -41,7 +42,7 @@ def cart_pole(
     return [pull - moment * bending * cosine / whole, bending], [speed, turning, 0.0]
 
 
-class CartPoleVectorEnv(WorldVectorEnv):
+class CartPoleVectorEnv(TracedVectorEnv):
     """Carts that balance poles. Task, numbers and rewards are those of ``CartPole-v1``.
 
     An observation has the position and velocity of the cart, and the angle and angular velocity of the pole; the actions are 0
@@ -73,11 +74,10 @@ class CartPoleVectorEnv(WorldVectorEnv):
         dt: float = 0.02,
         substeps: int = 1,
         max_episode_steps: int | None = episode_steps,
-        render_mode: None = None,
-        dtype: Any = "float64",
+        **options: Any,
     ) -> None:
         settings: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
-        super().__init__(num_envs, **settings, render_mode=render_mode, dtype=dtype)
+        super().__init__(num_envs, **settings, **options)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Carts with poles."""
@@ -87,21 +87,24 @@ class CartPoleVectorEnv(WorldVectorEnv):
     def draw(self, count: int) -> tuple[Array, Array]:
         """Near rest."""
         drawn = self.np_random.uniform(-NEAR_REST, NEAR_REST, (4, count))
-        return drawn[[1, 3]], np.stack([drawn[0], drawn[2], np.zeros(count)])
+        y = np.zeros((3, count))
+        y[:2] = drawn[::2]
+        return drawn[1::2], y
 
-    def act(self, actions: Any) -> None:
-        """Push the carts."""
-        self.world.y[2] = np.where(actions > 0, PUSH, -PUSH)
+    @staticmethod
+    def push(v: Any, y: Any, action: Any) -> tuple[Any, Any, Any]:
+        """Push to the left or to the right."""
+        return v, [y[0], y[1], PUSH * (2.0 * action - 1.0)], None
 
-    def observe(self) -> Array:
-        """Place, velocity, angle, angular velocity."""
-        v, y = self.world.v, self.world.y
-        return np.stack([y[0], v[0], y[1], v[1]], axis=-1)
+    @staticmethod
+    def look(v: Any, y: Any) -> Any:
+        """Position and velocity of the cart, angle and angular velocity of the pole."""
+        return [y[0], v[0], y[1], v[1]]
 
-    def judge(self, actions: Any) -> tuple[Array, Truths]:
-        """One for each step."""
-        place, angle = np.abs(self.states[1][:2])
-        return np.ones(self.num_envs), (place > END) | (angle > TILT)
+    @staticmethod
+    def score(v: Any, y: Any, action: Any, before: tuple[Any, Any]) -> tuple[Any, Any]:
+        """1 for each step, until the cart is off or the pole has fallen."""
+        return 1.0, (np.abs(y[0]) > END) | (np.abs(y[1]) > TILT)
 
 
 class CartPoleEnv(WorldEnv):

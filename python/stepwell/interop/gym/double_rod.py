@@ -13,7 +13,8 @@ from ...model.methods import Method
 from ...model.systems import Rods
 from ...reference.functions import cos, sin
 from ...runs.world import World
-from .base import Truths, WorldEnv, WorldVectorEnv
+from .base import WorldEnv, WorldVectorEnv
+from .traced import TracedVectorEnv
 
 #: Gravity, in SI units; masses and lengths of the rods are 1.
 GRAVITY = 9.8
@@ -25,7 +26,7 @@ GOAL = 1.0
 NEAR_REST = 0.1
 
 
-class DoubleRodVectorEnv(WorldVectorEnv):
+class DoubleRodVectorEnv(TracedVectorEnv):
     """Double pendulums with a motor at the joint between the rods, which is to lift the tip. The task is that of ``Acrobot-v1``.
 
     Each rod has its mass at its lower end. An observation has the cosines and sines of the angles of both rods from straight
@@ -54,11 +55,10 @@ class DoubleRodVectorEnv(WorldVectorEnv):
         dt: float = 0.05,
         substeps: int = 1,
         max_episode_steps: int | None = episode_steps,
-        render_mode: None = None,
-        dtype: Any = "float64",
+        **options: Any,
     ) -> None:
         settings: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
-        super().__init__(num_envs, **settings, render_mode=render_mode, dtype=dtype)
+        super().__init__(num_envs, **settings, **options)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Two rods that hang from an anchor."""
@@ -77,32 +77,38 @@ class DoubleRodVectorEnv(WorldVectorEnv):
         across = np.stack([cos(angles), sin(angles)], axis=1) * turning[:, np.newaxis]
         return np.stack([across[0], across[0] + across[1]]), np.stack([along[0], along[0] + along[1]])
 
-    def _rods(self) -> tuple[Array, Array]:
-        """Where the rods point, and how fast they turn."""
-        v, y = self.states
-        along, across = np.stack([y[0], y[1] - y[0]]), np.stack([v[0], v[1] - v[0]])
-        square = along[:, 0] * along[:, 0] + along[:, 1] * along[:, 1]
-        turning = (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]) / square
-        return along / np.sqrt(square)[:, np.newaxis], turning
-
-    def act(self, actions: Any) -> None:
+    @staticmethod
+    def push(v: Any, y: Any, action: Any) -> tuple[Any, Any, Any]:
         """Turn the rods against each other."""
-        along, _ = self._rods()
-        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-        torque = np.clip(actions[:, 0].astype(np.float64), -MAX_TORQUE, MAX_TORQUE)
+        (first, second), _ = _rods(v, y)
+        torque = np.minimum(np.maximum(action[0], -MAX_TORQUE), MAX_TORQUE)
         # A torque on a rod of length 1 is a pair of forces at its ends, across it. One end of the first rod is the anchor.
-        self._force[1] = torque * across[1]
-        self._force[0] = -torque * across[1] - torque * across[0]
+        on_tip = [torque * -second[1], torque * second[0]]
+        on_joint = [-on_tip[0] - torque * -first[1], -on_tip[1] - torque * first[0]]
+        return v, y, [on_joint, on_tip]
 
-    def observe(self) -> Array:
+    @staticmethod
+    def look(v: Any, y: Any) -> Any:
         """Cosines and sines of the angles, and angular velocities."""
-        along, turning = self._rods()
-        return np.stack([-along[0, 1], along[0, 0], -along[1, 1], along[1, 0], *turning], axis=-1)
+        (first, second), turning = _rods(v, y)
+        return [-first[1], first[0], -second[1], second[0], *turning]
 
-    def judge(self, actions: Any) -> tuple[Array, Truths]:
+    @staticmethod
+    def score(v: Any, y: Any, action: Any, before: tuple[Any, Any]) -> tuple[Any, Any]:
         """Whether the tip is up."""
-        up = self.world.y[1, 1] > GOAL
+        up = y[1][1] > GOAL
         return np.where(up, 0.0, -1.0), up
+
+
+def _rods(v: Any, y: Any) -> tuple[Any, Any]:
+    """Where the rods point, and how fast they turn."""
+    directions, turning = [], []
+    for along, across in ((y[0], v[0]), ([y[1][0] - y[0][0], y[1][1] - y[0][1]], [v[1][0] - v[0][0], v[1][1] - v[0][1]])):
+        square = along[0] * along[0] + along[1] * along[1]
+        length = np.sqrt(square)
+        directions.append([along[0] / length, along[1] / length])
+        turning.append((along[0] * across[1] - along[1] * across[0]) / square)
+    return directions, turning
 
 
 class DoubleRodEnv(WorldEnv):

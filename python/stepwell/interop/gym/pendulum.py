@@ -10,9 +10,9 @@ from gymnasium.spaces import Box
 from ...base.arrays import Array
 from ...model.methods import Method
 from ...model.systems import Pendulum
-from ...reference.functions import cos, sin
 from ...runs.world import World
-from .base import Truths, WorldEnv, WorldVectorEnv
+from .base import WorldEnv, WorldVectorEnv
+from .traced import TracedVectorEnv
 
 #: Gravity, mass and length of the rod in Gymnasium's environment of this name, in SI units.
 GRAVITY, MASS, LENGTH = 10.0, 1.0, 1.0
@@ -20,7 +20,7 @@ GRAVITY, MASS, LENGTH = 10.0, 1.0, 1.0
 MAX_TORQUE, MAX_SPEED = 2.0, 8.0
 
 
-class PendulumVectorEnv(WorldVectorEnv):
+class PendulumVectorEnv(TracedVectorEnv):
     """Pendulums: a rod on a hinge, with a motor too weak to lift it at once. Task and rewards are those of ``Pendulum-v1``.
 
     An observation has the cosine and sine of the angle from upright, and the angular velocity; the action is a torque of −2 to 2.
@@ -48,11 +48,10 @@ class PendulumVectorEnv(WorldVectorEnv):
         dt: float = 0.05,
         substeps: int = 1,
         max_episode_steps: int | None = episode_steps,
-        render_mode: None = None,
-        dtype: Any = "float64",
+        **options: Any,
     ) -> None:
         settings: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
-        super().__init__(num_envs, **settings, render_mode=render_mode, dtype=dtype)
+        super().__init__(num_envs, **settings, **options)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Rods on hinges."""
@@ -65,31 +64,35 @@ class PendulumVectorEnv(WorldVectorEnv):
         above, speed = self.np_random.uniform(-np.pi, np.pi, count), self.np_random.uniform(-1.0, 1.0, count)
         return speed, above + np.pi
 
-    def _torque(self, actions: Any) -> Array:
-        torque: Array = np.clip(actions[:, 0].astype(np.float64), -MAX_TORQUE, MAX_TORQUE)
-        return torque
+    @staticmethod
+    def push(v: Any, y: Any, action: Any) -> tuple[Any, Any, Any]:
+        """Turn the motor."""
+        return v, y, _torque(action) * (3.0 / (MASS * LENGTH * LENGTH))
 
-    def act(self, actions: Any) -> None:
-        """Turn the motors."""
-        self._force[...] = self._torque(actions) * (3.0 / (MASS * LENGTH * LENGTH))
+    @staticmethod
+    def settle(v: Any, y: Any) -> tuple[Any, Any]:
+        """The angular velocity is bounded."""
+        return np.minimum(np.maximum(v, -MAX_SPEED), MAX_SPEED), y
 
-    def observe(self) -> Array:
+    @staticmethod
+    def look(v: Any, y: Any) -> Any:
         """Cosine and sine of the angle from upright, angular velocity."""
-        v, y = self.states  # y is the angle from below
-        return np.stack([-cos(y), -sin(y), v], axis=-1)
+        return [-np.cos(y), -np.sin(y), v]  # y is the angle from below
 
-    def rewards_before(self, actions: Any) -> Array:
-        """Minus the squares of the angle from upright, the angular velocity and the torque, weighted."""
-        speed, y = self.states
-        turns = np.floor(y / (2.0 * np.pi))
-        above = y - 2.0 * np.pi * turns - np.pi
-        torque = self._torque(actions)
-        return -(above * above + 0.1 * (speed * speed) + 0.001 * (torque * torque))
+    @staticmethod
+    def score(v: Any, y: Any, action: Any, before: tuple[Any, Any]) -> tuple[Any, Any]:
+        """Minus the squares of the angle from upright, the angular velocity and the torque, weighted; before the steps.
 
-    def judge(self, actions: Any) -> tuple[Array, Truths]:
-        """No episode ends before its time."""
-        np.clip(self.world.v, -MAX_SPEED, MAX_SPEED, out=self.world.v)
-        return np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=np.bool_)
+        No episode ends before its time.
+        """
+        speed, angle = before
+        above = angle - 2.0 * np.pi * np.floor(angle / (2.0 * np.pi)) - np.pi
+        torque = _torque(action)
+        return -(above * above + 0.1 * (speed * speed) + 0.001 * (torque * torque)), False
+
+
+def _torque(action: Any) -> Any:
+    return np.minimum(np.maximum(action[0], -MAX_TORQUE), MAX_TORQUE)
 
 
 class PendulumEnv(WorldEnv):

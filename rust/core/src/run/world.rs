@@ -220,6 +220,20 @@ impl<T: Steppable> World<T> {
         self.step = until;
     }
 
+    /// One step. Of the rows of y the first `kept` go on, and those up to `read` are read only. `give` takes what is behind
+    /// these, with the number of the first member, that of members, and how long rows are.
+    pub fn play(&mut self, [kept, read]: [usize; 2], y: &mut [T], mut give: impl FnMut(&[T], usize, usize, usize)) {
+        let members = self.members;
+        for share in &mut self.shares {
+            share.load(&[], &y[..read * members], members);
+            share.group.advance(self.step, 1);
+            share.store(&mut [], &mut y[..kept * members], members);
+            let lanes = share.group.lanes();
+            give(&share.group.slots().1[read * lanes..], share.first, share.count, lanes);
+        }
+        self.step += 1;
+    }
+
     /// As `step`, by another thread. The monitor is called on this one. When it returns false, the world stays at the last
     /// complete step or, where its velocities would take long to compute, at the one before.
     pub fn step_in_background(
