@@ -15,6 +15,9 @@ from .systems import Sampled, System
 
 def fits_together(system: System, method: Method) -> None:
     """Raise if the method cannot step the system."""
+    if method.is_exact:
+        _has_exact_steps(system)
+        return
     if system.mass_matrix is not None and not method.is_implicit:
         raise UnsupportedError(
             f"method: {method.name} needs the rate of every number of the state, and the algebraic equations of {system!r} give "
@@ -34,6 +37,52 @@ def fits_together(system: System, method: Method) -> None:
             f"control: {method.name} carries {method.carry} in place of v, so it cannot be combined with {system.keeper!r}, "
             f"which changes v between steps; use pefrl or false_euler"
         )
+
+
+def _has_exact_steps(system: System) -> None:
+    """Raise if the exact solution of a system over a step is no product with a matrix."""
+    if not system.linear:
+        raise UnsupportedError(
+            f"method: exact steps linear systems, whose solution over a step is the exponential of a matrix; {system!r} is not "
+            f"linear: take another method, or near a state LinearSystem(sw.jacobian(system, at=…).matrix)"
+        )
+    for name, each in system.given_inputs().items():
+        if isinstance(each, Sampled) and each.interpolation == "cubic" and not each.constant:
+            raise UnsupportedError(
+                f"{name}: exact knows the solution for inputs that are constant, sinusoidal, held or on straight lines; give "
+                f'interpolation="linear", with more samples, or take another method'
+            )
+
+
+def samples_meet_steps(system: System, method: Method, t0: Any, dt: float) -> None:
+    """Raise if a sample of an input of the exact method begins within a step, which then has no one matrix."""
+    if not method.is_exact:
+        return
+    for name, each in system.given_inputs().items():
+        if not isinstance(each, Sampled) or each.constant:
+            continue
+        steps, since = each.interval / abs(dt), (each.start - np.asarray(t0)) / dt
+        if max(abs(steps - round(steps)), float(np.abs(since - np.round(since)).max())) > OFF_STEPS or round(steps) < 1:
+            raise UnsupportedError(
+                f"{name}: with exact a sample begins with a step, and here some begin within one (interval {each.interval:g}, "
+                f"start {each.start:g}, dt {dt:g}); take dt so that it divides the interval and the start, or another method"
+            )
+
+
+#: By this share of a step a sample may be off its begin: rounding of times that are sums of thousands of steps.
+OFF_STEPS = 1e-6
+
+
+def not_with_exact(method: Method, **options: Any) -> None:
+    """Raise if an option would change a system so that its solution is no longer known."""
+    reasons = {
+        "force": "give the linear system an input",
+        "control": "it makes the equations nonlinear",
+        "events": "a located event ends a shorter step, and the matrix is of steps of one length",
+    }
+    for name, option in options.items():
+        if method.is_exact and option is not None:
+            raise UnsupportedError(f"{name}: does not go with exact: {reasons[name]}")
 
 
 def not_of_a_step(control: Any) -> None:

@@ -13,7 +13,7 @@ from ..base import checks
 from ..base.arrays import Array, Blocks, Scaled
 from ..base.immutable import Immutable
 from ..base.reprs import facts
-from ..errors import ArgumentError
+from ..errors import ArgumentError, UnsupportedError
 
 
 class Steps(Protocol):
@@ -59,6 +59,8 @@ class Method(Immutable):
     family: str
     #: Whether its steps sum the Taylor series of the solution. With a tolerance it then chooses the order that costs least.
     has_series: bool
+    #: Whether a step is the exact solution of a linear system, by the exponential of its matrix.
+    is_exact: bool
     #: Whether a step solves equations, of any number of unknowns, with derivatives of the rates.
     is_implicit: bool
     #: The undamped oscillator is stable for Φ = ω₀·dt below this limit; 0 means never.
@@ -84,6 +86,7 @@ class Method(Immutable):
         for key, value in record.items():
             setattr(self, key, tuple(value) if isinstance(value, list) else value)
         self.has_series = self.family == "Taylor"
+        self.is_exact = self.family == "exact"
         self.__doc__ = self._text()
 
     @property
@@ -102,7 +105,7 @@ class Method(Immutable):
     @property
     def takes_derivatives_by_time(self) -> bool:
         """Whether a step takes the derivatives of rates by the time, and with them those of inputs."""
-        return self.has_series or any(name == "v by time" for name, _, _ in _core.program(self.name)[0])
+        return self.has_series or (not self.is_exact and any(name == "v by time" for name, _, _ in _core.program(self.name)[0]))
 
     @property
     def is_always_stable(self) -> bool:
@@ -112,6 +115,8 @@ class Method(Immutable):
     @property
     def steps(self) -> Steps:
         """The NumPy reference: the module in ``stepwell.reference.steppers`` that is the method's specification."""
+        if self.is_exact:
+            raise UnsupportedError(NO_OPERATIONS)
         return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))
 
     def start_choice(self, start: str | None) -> int:
@@ -144,6 +149,8 @@ class Method(Immutable):
         return f"<method {self.name}: {self.title}, order {self.order}, {self._costs()} per step>"
 
     def _costs(self) -> str:
+        if self.is_exact:
+            return "one product with a matrix"
         if self.has_series:
             return f"{self.evaluations} function evaluations (of a linear system)"
         return f"{self.evaluations} function evaluation{'s' * (self.evaluations != 1)}"
@@ -184,8 +191,40 @@ def _catalogue() -> dict[str, Method]:
     return {m.name: m for m in by_section}
 
 
+#: Why the exact step is not where others are.
+NO_OPERATIONS = (
+    "method: exact makes no operations of rates: its matrices are exponentials, of linear systems alone; take another method here"
+)
+
+#: The exact step of linear systems. It is not among ``methods()``, all of which step any system.
+EXACT = Method(
+    {
+        "name": "exact",
+        "title": "Exact",
+        "other_names": ("matrix exponential", "zero-order hold"),
+        "false_friends": (),
+        "order": math.inf,
+        "evaluations": 0,
+        "attempt_evaluations": 0,
+        "family": "exact",
+        "is_implicit": False,
+        "limit": math.inf,
+        "nodes": (0.0,),
+        "needs_acceleration": False,
+        "carry": None,
+        "starts": (),
+        "error_order": None,
+        "section": "§4",
+        "reference": "C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential of a matrix, SIAM Rev. 45 (2003) 3",
+        "about": "The solution itself at each step, for linear systems whose inputs are constant, sinusoidal, held or on "
+        "straight lines from step to step: the transition matrix is the exponential of the system's matrix, computed with twice "
+        "the digits.",
+    }
+)
+
+
 def methods() -> tuple[Method, ...]:
-    """Every method, in the order of Hoffmann (2002).
+    """Every method that steps any system, in the order of Hoffmann (2002); for linear systems there is ``exact`` as well.
 
     Example:
         >>> [method.name for method in sw.methods() if "Fehlberg" in method.title]
@@ -214,7 +253,20 @@ def choice(methods: Any) -> list[Method]:
     chosen = list(_catalogue().values()) if methods is None else checks.several("methods", methods, "names")
     if not chosen:
         raise ArgumentError("methods: expected at least one, got none")
-    return list(dict.fromkeys(map(method, chosen)))
+    return list(dict.fromkeys(map(of_operations, chosen)))
+
+
+def of_operations(name: str | Method) -> Method:
+    """The method of that name, where its step must consist of operations.
+
+    Raises:
+        UnsupportedError: if it is "exact".
+        UnknownNameError: if there is no such method.
+    """
+    chosen = method(name)
+    if chosen.is_exact:
+        raise UnsupportedError(NO_OPERATIONS)
+    return chosen
 
 
 def method(name: str | Method) -> Method:
@@ -222,7 +274,7 @@ def method(name: str | Method) -> Method:
 
     Args:
         name: its name or another name in its record, in any spelling: ``"false_euler"``, ``"symplectic Euler"`` or
-            ``"Euler-Cromer"``.
+            ``"Euler-Cromer"``; or ``"exact"``.
 
     Returns:
         The ``Method``, with its record.
@@ -239,6 +291,8 @@ def method(name: str | Method) -> Method:
         return name
     if type(name) is str and (known := _catalogue().get(name)) is not None:
         return known
+    if isinstance(name, str) and name == EXACT.name:
+        return EXACT
     if isinstance(name, str):
         from .method_names import resolved  # not at the top: importing stepwell must be fast
 

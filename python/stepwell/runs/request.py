@@ -21,11 +21,12 @@ from ..model.compatibility import (
     forced,
     goes_back,
     goes_on_by_a_rule,
+    not_with_exact,
+    samples_meet_steps,
     velocities,
 )
 from ..model.controls import a_control
-from ..model.methods import Method
-from ..model.methods import method as find_method
+from ..model.methods import Method, of_operations
 from ..model.systems import System
 from ..model.systems.base import TINY, a_system
 from ..reference.acceptance import Acceptance
@@ -144,6 +145,9 @@ class Request(NamedTuple):
             missing = " and ".join(name for name, value in (("dt", dt), ("steps", steps)) if value is None)
             raise ArgumentError(f"{missing}: needed for fixed steps, got None; for adaptive steps give tolerance= and at=")
         form = checks.known("form", form, FORMS)
+        if method.is_exact and form == "direct":
+            form = "matrix"  # which its steps are
+            not_with_exact(method, force=force, events=events, control=control)
         backend = checks.known("backend", backend, BACKENDS)
         if form != "direct":
             check_matrix_form(system, method, form, force)
@@ -214,6 +218,7 @@ class Request(NamedTuple):
         if before is None:
             check_algebraic(system, y, t0)
         system = system.stepped_by(method)
+        samples_meet_steps(system, method, t0, dt)
         stepped = system.over_steps(method, checks.once_of(t0) if isinstance(t0, np.ndarray) else t0, dt)
         carried = False
         if before is not None and before.carry is not None and (carried := before.holds(system, batch, v, y)):
@@ -433,6 +438,8 @@ class Request(NamedTuple):
         if single:
             float32.check_inputs(stepped, abs(t0) + first * abs(dt))
         stepped.check_time(abs(t0) + first * abs(dt))
+        not_with_exact(method, force=force, events=events, control=control)
+        samples_meet_steps(stepped, method, t0, dt)
         if before is None and first == 0:
             check_algebraic(stepped, y, t0)
         seen = stepped.over_steps(method, t0, dt)
@@ -446,7 +453,7 @@ class Request(NamedTuple):
 
         Without a start the state is v = 0 and y = 1, 2, 3, … ``batch`` is the batch if the arguments do not have it.
         """
-        method, system = find_method(method), a_system(system)
+        method, system = of_operations(method), a_system(system)
         states = () if options.v is None and options.y is None else (options.v, options.y)
         system = system.for_state_shapes(*(0.0 if each is None else each for each in states))
         fits_together(system, method)

@@ -174,7 +174,16 @@ class World:
             >>> v
             array([1.5])
         """
+        self._has_parameters()
         return Parameters(self)
+
+    def _has_parameters(self) -> None:
+        """Raise if steps do not read parameters any more."""
+        if self._plan.method.is_exact:
+            raise UnsupportedError(
+                "parameters: exact steps by matrices that were computed from them; make another world that goes on from here, "
+                "World(system, method, resume=world)"
+            )
 
     def set(self, **parameters: Any) -> None:
         """Give parameters other numbers, for the steps to come.
@@ -200,6 +209,8 @@ class World:
             array([0.03])
         """
         live = self._live
+        if not live:
+            self._has_parameters()
         for name, value in parameters.items():
             each = live.get(name)
             if each is None or type(value) not in PLAIN or not each.least < value <= each.most:
@@ -313,6 +324,8 @@ class World:
         over, index = places.shape, places.reshape(-1)
         if v is None and y is None and not parameters:
             raise ArgumentError("v, y, parameters: expected some of them, got none; reset(members, v=…, y=…)")
+        if parameters:
+            self._has_parameters()
         self._core.read()  # what was written to arrays before counts as set for all members
         system = self.system
         blocks = [(self._v, "v", v, system.v_shape), (self._y, "y", y, system.y_shape)]

@@ -272,7 +272,7 @@ def discretise(
 def _way(how: Any) -> tuple[str, Method | None]:
     """The way and, if it is one, the method."""
     if isinstance(how, Method):
-        return how.name, how
+        return how.name, None if how.is_exact else how
     if isinstance(how, str) and (how == "exact" or how in WAYS):
         return WAYS.get(how, "exact"), None
     try:

@@ -22,7 +22,7 @@ from ...base.reprs import cell, counted, facts, share
 from ...errors import ArgumentError, DivergenceWarning, ShapeError, UnsupportedError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ...reference.bits import NOT_SIGN, and_bits, less, sqrt, where

@@ -15,7 +15,7 @@ from ...base.reprs import MAX_LINE, brief, shortened, table
 from ...errors import ArgumentError, ShapeError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ..stability import eigen, exact, maps, parts

@@ -19,7 +19,7 @@ from ...base.reprs import cell, facts
 from ...errors import ArgumentError, DTypeError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import LinearSystem, Oscillator, System
 from ...runs.result import Run
 from . import eigen, maps

@@ -88,7 +88,7 @@ class Analysis(ValueEquality):
         if n <= 2:
             z, exact = eigen.eigenvalues(P), eigen.eigenvalues(A)
             if n == 2:
-                if system.linear:
+                if system.linear and not method.is_exact:
                     with np.errstate(invalid="ignore"):
                         close = np.maximum(np.abs(z[0] - z[1]), np.abs(np.abs(z[0]) - 1.0)) < eigen.NEARLY_DOUBLE
                     self._in_more_digits(close & (z[0] != z[1]), A, z)
@@ -101,7 +101,7 @@ class Analysis(ValueEquality):
             spectrum = eigen.eigen(P, eigen.slot_units(finish, true.units))
             exact = eigen.matched(spectrum.values, eigen.product("ij...,jk...->ik...", finish, spectrum.own), true)
             z, tolerances, single_vector = eigen.settled(spectrum)
-            if system.linear and n <= MAX_ROWS:
+            if system.linear and n <= MAX_ROWS and not method.is_exact:
                 doubtful = (spectrum.tolerance() > eigen.REFINE_ABOVE).any(axis=0) & np.isfinite(z).all(axis=0)
                 for index, values, own in self._in_more_digits(doubtful, A, z):
                     at: Any = (slice(None), *index)

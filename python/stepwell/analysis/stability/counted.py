@@ -9,7 +9,7 @@ from ... import _core
 from ...errors import ShapeError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import Oscillator, System
 from ...model.systems.base import a_system
 from ...runs.engine import Plan, evaluations

@@ -11,7 +11,7 @@ import numpy as np
 from ...base.reprs import table
 from ...errors import UnsupportedError
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import LinearSystem
 from .expansion import NEGLIGIBLE, SUPERSCRIPTS, polynomials
 from .numbers import Polynomial, Rational

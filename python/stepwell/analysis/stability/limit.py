@@ -103,6 +103,9 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
 
 def limit_of(system: System, method: Method, v: Array | None = None, y: Array | None = None, t: float = 0.0) -> Any:
     """``stability_limit`` for checked arguments, without a warning where the limit is not decided."""
+    if method.is_exact:
+        # Its steps stay bounded where the motion does; so do those of this method at every step, and nowhere else.
+        method = find_method("implicit_midpoint")
     members = system.batch if v is None or y is None else maps.together(system, np.asarray(1.0), v, y)
     if v is None or y is None or system.linear:
         _fit(sum(maps.size(system)), members)

@@ -14,9 +14,10 @@ import numpy as np
 from ...base import checks
 from ...base.arrays import Array, Blocks, Shape
 from ...model.methods import Method
+from ...model.parameters import aligned
 from ...model.systems import System
 from ...runs import engine
-from ...runs.engine import linear
+from ...runs.engine import exact, linear
 from ..derivatives import traced
 
 #: The step ε of derivatives by the complex step, f'(x) = Im f(x + iε)/ε. Its square is below the smallest number, so they have no
@@ -35,6 +36,8 @@ def transition(system: System, method: Method, dt: Array) -> Array:
     For one step length the core computes it; for several, the reference does so at once, with the same bits.
     """
     free = system.without_inputs()
+    if method.is_exact:
+        return exact.transition(free, dt)
     if dt.ndim == 0:
         return linear.transition(engine.Plan(free, method, free.batch, float(dt)))
     members = np.broadcast_shapes(dt.shape, free.batch)
@@ -46,6 +49,9 @@ def transition(system: System, method: Method, dt: Array) -> Array:
 def response(system: System, method: Method, dt: Array, members: Shape) -> Array:
     """Q of a linear system, of shape (n, inputs, *members): the state after a step from rest, with an input held at 1."""
     n = sum(size(system))
+    if method.is_exact:
+        held = aligned(exact.response(system, dt), 2, members)
+        return np.array(np.broadcast_to(held, (*held.shape[:2], *members)))
     q = np.zeros((n, len(system.input_names), *members))
     for j, name in enumerate(system.input_names):
         constant = system.with_pulse(name, np.ones(1), 1.0)

@@ -22,7 +22,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...model.compatibility import fits_together
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.parameters import aligned
 from ...model.systems import LinearSystem, Springs
 from .limit import stability_limit

@@ -353,13 +353,13 @@ def part_of(argument: str, system: Any, *, of_states: bool = False) -> Realisati
     if isinstance(system, LinearSystem):
         return realised(system, argument, of_states=of_states)
     if isinstance(system, System):
-        return _of_rates(argument, system)
+        return of_rates(argument, system)
     from .realisation import of_object  # only other libraries' objects need it
 
     return of_object(argument, system)
 
 
-def _of_rates(argument: str, system: System) -> Realisation:
+def of_rates(argument: str, system: System) -> Realisation:
     """The matrices of any linear system, from its reference: the rates of unit states and of unit inputs; its outputs are y."""
     if not system.linear:
         raise UnsupportedError(

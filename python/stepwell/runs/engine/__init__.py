@@ -53,8 +53,8 @@ from .adaptive import (
     room_for_waypoints,
 )
 from .direct import to_slot
-from .forms import advance
-from .plan import Arrays, Outcome, Plan, Watched, model, pushes
+from .forms import advance, model
+from .plan import Arrays, Outcome, Plan, Watched, pushes
 
 __all__ = [
     "ABSOLUTE",

@@ -12,9 +12,10 @@ import numpy as np
 from ... import _core
 from ...base import checks
 from ...base.arrays import Array, Blocks, Whole
-from ...model.parameters import flat
+from ...model.parameters import aligned, flat
 from ...model.systems import Sampled
 from ...reference import run as reference
+from . import exact
 from .direct import Looped, advance_direct, finished, looped, run_by_core, to_slot, to_velocity
 from .plan import BEGINS, Outcome, Plan
 
@@ -41,6 +42,10 @@ def transition(plan: Plan) -> Array:
     """
     n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
     n = n_v + n_y
+    if plan.method.is_exact:
+        whole = exact.transition(plan.system, plan.dt)
+        whole = np.array(np.broadcast_to(aligned(whole, 2, plan.batch), (n, n, *plan.batch)))
+        return _rounded(plan, "the transition matrix", whole)
     free = plan._replace(system=plan.system.without_inputs(), single=False)
     at_once = max(1, NUMBERS_AT_ONCE // (n * n * prod(plan.batch))) if plan.system.batch else n
     matrix: Array = np.empty((n, n, *plan.batch))
@@ -63,6 +68,8 @@ def _rounded(plan: Plan, name: str, matrix: Array) -> Array:
 
 def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
     """Q of shape (nodes, inputs, n, *batch), from one step from rest with a unit pulse of one input at one node."""
+    if plan.method.is_exact:
+        return _rounded(plan, "what inputs add in a step", exact.pulses(plan))
     grid = _grid(plan.method.nodes)
     n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
     inputs = list(inputs)
@@ -109,32 +116,39 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
     """A step by a transition matrix, P of shape (n, n, *batch), Q of shape (nodes·inputs, n, *batch), as the core takes it."""
     n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
     q = Q.reshape(prod(Q.shape[: Q.ndim - 1 - len(plan.batch)]), n_v + n_y, *plan.batch)
-    inputs = [each.signal() for each in plan.system.given_inputs().values()]
+    inputs = [each.signal() for each in exact.inputs_of(plan)]
     carries = int(plan.method.carry is not None)
     linear_map: dict[str, Any] = {"n": n_v + n_y, "n_v": n_v, "carries": carries, "p": P, "q": q, "inputs": inputs}
     if isinstance(plan.t0, np.ndarray) and inputs:
         linear_map[BEGINS] = plan.t0
     parameters = flat(linear_map, plan.batch)
-    nodes = list(plan.method.nodes)
+    nodes = list(exact.nodes_of(plan))
     return _core.ModelSpec("matrix", plan.method.name, parameters, matrix=(nodes, n_v), fused=plan.fused, single=plan.single)
 
 
 def _matrix_step(plan: Plan, P: Array, Q: Array) -> Callable[[float, Array], Array]:
     """A step by a transition matrix by the reference, from a time and the rows of a state to the next rows."""
-    inputs, carries = [each.signal() for each in plan.system.given_inputs().values()], plan.method.carry is not None
+    inputs, carries = [each.signal() for each in exact.inputs_of(plan)], plan.method.carry is not None
+    nodes = exact.nodes_of(plan)
     if not plan.single:
-        return reference.linear_step(P, Q, inputs, plan.method.nodes, plan.dt, carries, fused=plan.fused)
+        return reference.linear_step(P, Q, inputs, nodes, plan.dt, carries, fused=plan.fused)
     from ...reference.tape import single  # only such runs need it
     from ...reference.traced import Tracer
 
     tape = _core.Tape(single=True)
     tracer = Tracer(plan.system, tape)
-    symbols = tracer.matrix(plan.method.nodes, len(P), inputs, carries)
+    symbols = tracer.matrix(nodes, len(P), inputs, carries)
     numbers = [*P.reshape(-1, *plan.batch), *Q.reshape(-1, *plan.batch), *tracer.numbers]
     lines = single.Steps(tape, symbols, dict(enumerate(numbers)), False, tracer.tables, tracer.times)
     if plan.fused:
         lines.fuse_products_of(len(numbers) - len(tracer.numbers))
     return lambda t, s: np.stack(np.broadcast_arrays(*lines(list(s), t, plan.dt)))
+
+
+def exact_model(plan: Plan) -> Any:
+    """The exact step of a plan, as the core takes it."""
+    p, q = transition(plan), pulses(plan, plan.system.given_inputs())
+    return matrix_model(plan, p, q.reshape(q.shape[0] * q.shape[1], *q.shape[2:]))
 
 
 def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
@@ -225,22 +239,22 @@ def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Ou
         return np.broadcast_to(array, plan.batch).reshape(-1)
 
     _fits(plan, NUMBERS_OF_AN_ELEMENT + NUMBERS_OF_A_POWER)
-    signals = plan.system.given_inputs()
     inputs = [
         Constant(wide(each.values[0]))
         if isinstance(each, Sampled)
         else Sine(wide(each.amplitude), wide(each.omega), wide(each.phase))
-        for each in signals.values()
+        for each in exact.inputs_of(plan)
     ]
     members, n_v = plan.members, prod(plan.system.v_shape)
     slot = v if carried else to_slot(plan, v, y)
     s = np.concatenate([slot.reshape(n_v, members), y.reshape(prod(plan.system.y_shape), members)])
-    p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in (transition(plan), pulses(plan, signals)))
+    matrices = transition(plan), pulses(plan, plan.system.given_inputs())
+    p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in matrices)
 
     drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt, fused=plan.fused)
     saved, saves = (np.empty((plan.save_count, *v.shape)), np.empty((plan.save_count, *y.shape))), plan.saves
     with np.errstate(all="ignore"):
-        step = power.one_step(p, q, inputs, plan.method.nodes, drive)
+        step = power.one_step(p, q, inputs, exact.nodes_of(plan), drive)
         states = power.run(step, drive, s, before.reshape(-1), t0=wide(plan.t0), first=plan.first, saves=map(int, saves))
         for i, s in enumerate(states):
             saved[0][i], saved[1][i] = s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)

@@ -17,8 +17,8 @@ from ...errors import ArgumentError, UnsupportedError
 from ...model.compatibility import not_of_a_step
 from ...model.controls import AnyControl, a_control
 from ...model.methods import Method
-from ...model.methods import method as find_method
 from ...model.methods import methods as every_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ...runs import engine, float32

@@ -14,7 +14,7 @@ from ...base.arrays import Shape
 from ...errors import ArgumentError, ShapeError, UnsupportedError
 from ...model.controls import AnyControl
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ...runs import float32

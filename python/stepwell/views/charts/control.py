@@ -16,7 +16,7 @@ from ...base.tables import Table, stacked
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...model import controls
 from ...model.methods import Method, choice
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import NBody, System
 from ...scenes import Scene
 from ...scenes import scene as find_scene

@@ -18,7 +18,7 @@ from ...base.pictures import drawn
 from ...base.tables import Table, stacked
 from ...errors import ArgumentError
 from ...model.methods import Method, _section, choice
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import Oscillator
 from ...runs.integration import integrate
 from .zplane import within

@@ -18,7 +18,7 @@ from ...base.tables import Table
 from ...errors import ArgumentError, ShapeError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import Oscillator
 from ...runs.integration import step
 from ...runs.options import Options

@@ -23,7 +23,7 @@ from ...base.tables import Table, stacked
 from ...errors import ArgumentError, ShapeError, UnsupportedError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...model.systems import Oscillator, System
 from ...model.systems.base import a_system
 from ...runs.integration import integrate

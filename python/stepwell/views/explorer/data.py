@@ -16,7 +16,7 @@ from ...base.arrays import Array
 from ...errors import StepwellError, UnsupportedError
 from ...model.controls import AnyControl
 from ...model.methods import Method
-from ...model.methods import method as find_method
+from ...model.methods import of_operations as find_method
 from ...runs.integration import quietly
 from ...runs.options import Options
 from ...runs.request import Request

@@ -1,0 +1,205 @@
+"""The exact step of linear systems: equal bits by core and reference, the true solution for every input, and what is refused."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.errors import ArgumentError, UnsupportedError
+
+
+def driven(x: Any, *, batch: bool = False) -> sw.LinearSystem:
+    """Two damped oscillators that touch, with two inputs, and the velocities among the coordinates."""
+    A = np.array([[0.0, 1.0, 0.0, 0.0], [-4.0, -0.3, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [1.0, 0.0, -9.0, -0.2]])
+    whole = A[..., np.newaxis] * np.array([0.5, 1.0, 1.5]) if batch else A
+    B = np.array([[0.0, 0.0], [1.0, 0.5], [0.0, 0.0], [0.0, 1.0]])
+    return sw.LinearSystem(whole, B, x=[x, -0.7], velocities=[1, 3])
+
+
+DT = 0.25
+
+INPUTS: dict[str, Any] = {
+    "constant": 0.4,
+    "sinusoid": sw.Sinusoid(1.0, 3.0, 0.4),
+    "sinusoids of each member": sw.Sinusoid(np.array([1.0, 0.5, 2.0]), np.array([0.0, 3.0, 40.0]), 0.4),
+    "held": sw.Sampled([0.0, 1.0, -0.5, 2.0], 2 * DT, start=DT),
+    "held, of each member": sw.Sampled(np.arange(12.0).reshape(4, 3), DT),
+    "lines": sw.Sampled([0.0, 1.0, -0.5, 2.0, 0.3], DT, start=-DT, interpolation="linear"),
+    "none": None,
+}
+
+
+@pytest.mark.parametrize("options", [{}, {"fused": True}, {"dtype": "float32"}, {"dtype": "float32", "fused": True}], ids=str)
+@pytest.mark.parametrize("name", INPUTS)
+def test_core_and_reference_have_equal_bits(name: str, options: Any) -> None:
+    system = driven(INPUTS[name], batch=True)
+    start = {"v": np.array([0.3, -0.2]), "y": np.array([1.0, 0.5])}
+    runs = [
+        sw.integrate(system, "exact", **start, dt=DT, steps=30, every=7, t0=DT, backend=backend, **options)
+        for backend in ("rust", "numpy")
+    ]
+    for block in ("v", "y"):
+        assert np.array_equal(getattr(runs[0], block), getattr(runs[1], block)), block
+
+
+@pytest.mark.parametrize("name", INPUTS)
+def test_it_is_the_solution(name: str) -> None:
+    """Beside DOP853 to 1e-13, whose own error is some 1e-12 over these 8 units of time."""
+    system, start = driven(INPUTS[name]) if "each" not in name else driven(INPUTS[name], batch=True), [0.3, -0.2]
+    run = sw.integrate(system, "exact", v=start, y=[1.0, 0.5], dt=DT, steps=32, every=8)
+    true = sw.integrate(system, "dop853", v=start, y=[1.0, 0.5], tolerance=1e-13, at=run.t, max_step=DT)
+    assert run.v == pytest.approx(true.v, abs=2e-11)
+    assert run.y == pytest.approx(true.y, abs=2e-11)
+
+
+def test_a_step_may_be_as_long_as_it_likes() -> None:
+    """One of 100 and a thousand of 0.1 end at the same state: the method has no order, and no limit."""
+    system = sw.Oscillator(2.0, 0.01, x=sw.Sinusoid(1.0, 1.7))
+    one = sw.integrate(system, "exact", v=0.0, y=1.0, dt=100.0, steps=1)
+    many = sw.integrate(system, "exact", v=0.0, y=1.0, dt=0.1, steps=1000)
+    assert one.y[-1] == pytest.approx(many.y[-1], abs=1e-12)
+    undamped = sw.integrate(sw.Oscillator(1.0), "exact", v=0.0, y=1.0, dt=0.5, steps=100_000)
+    assert float(np.hypot(undamped.v[-1], undamped.y[-1])) == pytest.approx(1.0, abs=1e-11)  # 1e5 steps of 1e-16
+
+
+@pytest.mark.parametrize("name", ["sinusoid", "held", "lines", "constant"])
+def test_it_goes_back_in_time(name: str) -> None:
+    system = driven(INPUTS[name])
+    there = sw.integrate(system, "exact", v=[0.3, -0.2], y=[1.0, 0.5], dt=DT, steps=8)
+    back = sw.integrate(system, "exact", v=there.v[-1], y=there.y[-1], dt=-DT, steps=8, t0=8 * DT)
+    assert back.y[-1] == pytest.approx([1.0, 0.5], abs=1e-12)
+    assert back.v[-1] == pytest.approx([0.3, -0.2], abs=1e-12)
+
+
+def test_forms_and_pieces() -> None:
+    system, start = sw.Oscillator([1.0, 2.0], 0.1, x=sw.Sinusoid(1.0, 1.7), a=0.3), {"v": 0.2, "y": 1.0}
+    direct = sw.integrate(system, "exact", **start, dt=0.3, steps=50)
+    assert np.array_equal(sw.integrate(system, "exact", **start, dt=0.3, steps=50, form="matrix").y, direct.y)
+    assert sw.integrate(system, "exact", **start, dt=0.3, steps=50, form="power").y == pytest.approx(direct.y, abs=1e-13)
+    half = sw.integrate(system, "exact", **start, dt=0.3, steps=20)
+    assert np.array_equal(sw.integrate(system, "exact", dt=0.3, steps=30, resume=half).y, direct.y)
+    each = sw.integrate(system, "exact", **start, dt=0.3, steps=50, t0=np.array([0.0, 1.0]))
+    assert np.array_equal(each.y[..., 0], direct.y[..., 0])
+    assert np.array_equal(each.y[..., 1], sw.integrate(system, "exact", **start, dt=0.3, steps=50, t0=1.0).y[..., 1])
+    for k, omega in enumerate((1.0, 2.0)):
+        alone = sw.Oscillator(omega, 0.1, x=sw.Sinusoid(1.0, 1.7), a=0.3)
+        assert sw.integrate(alone, "exact", **start, dt=0.3, steps=50).y[-1] == direct.y[-1, k]
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_a_world(dtype: Any) -> None:
+    system = sw.Oscillator(np.array([1.0, 2.0]), 0.1, x=sw.Sinusoid(1.0, 1.7))
+    v, y = np.full(2, 0.2, dtype), np.ones(2, dtype)
+    run = sw.integrate(system, "exact", v=v.copy(), y=y.copy(), dt=0.3, steps=50, dtype=dtype)
+    world = sw.World(system, "exact", v=v, y=y, dt=0.3, dtype=dtype)
+    world.step(20)
+    other = pickle.loads(pickle.dumps(world))
+    for each in (world, copy.deepcopy(other)):
+        each.step(30)
+        assert np.array_equal(each.y, run.y[-1])
+        assert np.array_equal(each.v, run.v[-1])
+    world.reset(0, v=0.2, y=1.0)
+    assert y[0] == 1.0
+    for call in (lambda: world.set(damping=0.2), lambda: world.parameters, lambda: world.reset(0, omega=2.0)):
+        with pytest.raises(UnsupportedError, match="parameters: exact steps by matrices that were computed from them"):
+            call()
+
+
+def test_the_analysis_has_the_truth() -> None:
+    """e^(λ·dt) at every step: no damping, no frequency that is off, and no limit."""
+    dt = np.array([0.1, 1.0, 1.5])
+    step = sw.analyse(sw.Oscillator(2.0, 0.1), "exact", dt=dt)
+    rate = 2.0 * (-0.1 + 1j * np.sqrt(0.99))
+    assert step.eigenvalues[0] == pytest.approx(np.exp(rate * dt), rel=1e-14)
+    assert step.frequency_ratio == pytest.approx(1.0, rel=1e-14)
+    free = sw.analyse(sw.Oscillator(2.0), "exact", dt=0.5)
+    assert (free.kind, free.q) == ("harmonic", pytest.approx(1.0, abs=1e-15))
+    one = sw.analyse(driven(None), "exact", dt=0.3)
+    near = sw.analyse(driven(None), "dop853", dt=0.3)
+    assert np.abs(one.P - near.P).max() < 1e-6  # ten times its own error
+    assert np.abs(one.Q - near.Q).max() < 1e-6
+    held = sw.discretise(sw.Oscillator(2.0, 0.1), 0.1, sw.method("exact"))
+    assert np.array_equal(held.P, sw.analyse(sw.Oscillator(2.0, 0.1), "exact", dt=0.1).P)
+
+
+def test_the_limit_is_that_of_the_system() -> None:
+    assert sw.stability_limit(sw.Oscillator([1.0, 5.0], 0.1), "exact").tolist() == [np.inf, np.inf]
+    assert sw.stability_limit(sw.Oscillator(1.0), "exact") == np.inf
+    assert sw.stability_limit(sw.LinearSystem([[0.1]]), "exact") == 0.0
+
+
+def test_other_ways_to_run_it(tmp_path: Path) -> None:
+    run = sw.integrate(sw.Oscillator(damping=0.1), "exact", v=0.0, y=1.0, dt=0.3, steps=5)
+    run.save(tmp_path / "run.npz")
+    assert sw.load(tmp_path / "run.npz").method is sw.method("exact")
+    assert copy.deepcopy(sw.method("exact")) is sw.method("exact")
+    scene = sw.scenes.oscillator() if hasattr(sw.scenes, "oscillator") else sw.scenes.scene("oscillator")
+    exact = scene.run("exact", 0.1)
+    assert float(np.max(scene.state_error(exact))) < 1e-11
+
+
+def test_a_sweep() -> None:
+    pytest.importorskip("xarray")
+    swept = sw.sweep(sw.Oscillator, {"omega": [1.0, 2.0]}, "exact", v=0.0, y=1.0, dt=0.3, steps=7)
+    run = sw.integrate(sw.Oscillator([1.0, 2.0]), "exact", v=0.0, y=1.0, dt=0.3, steps=7)
+    assert np.array_equal(swept["y_last"].values.ravel(), run.y[-1])
+
+
+OSCILLATOR = sw.Oscillator(1.0)
+START: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 3}
+
+REFUSED: list[tuple[Any, str]] = [
+    (lambda: sw.integrate(sw.Pendulum(), "exact", **START), "method: exact steps linear systems"),
+    (lambda: sw.integrate(sw.Oscillator(friction=0.1), "exact", **START), "method: exact steps linear systems"),
+    (
+        lambda: sw.integrate(sw.Oscillator(x=sw.Sampled([0.0, 1.0, 2.0], 0.25)), "exact", **START),
+        "x: with exact a sample begins with a step",
+    ),
+    (
+        lambda: sw.integrate(sw.Oscillator(a=sw.Sampled([0.0, 1.0, 2.0], 0.05)), "exact", **START),
+        "a: with exact a sample begins with a step",
+    ),
+    (
+        lambda: sw.World(
+            sw.Oscillator(x=sw.Sampled([0.0, 1.0], 0.1, start=0.03)), "exact", v=np.zeros(()), y=np.ones(()), dt=0.1
+        ),
+        "x: with exact a sample begins with a step",
+    ),
+    (
+        lambda: sw.integrate(sw.Oscillator(x=sw.Sampled([0.0, 1.0, 4.0], 0.1, interpolation="cubic")), "exact", **START),
+        "x: exact knows the solution for inputs that are constant, sinusoidal, held or on straight lines",
+    ),
+    (lambda: sw.integrate(OSCILLATOR, "exact", **START, force=1.0), "force: does not go with exact"),
+    (lambda: sw.integrate(OSCILLATOR, "exact", **START, control=sw.EnergyControl(1.0)), "control: does not go with exact"),
+    (lambda: sw.integrate(OSCILLATOR, "exact", **START, events=lambda t, v, y: y), "events: does not go with exact"),
+    (lambda: sw.integrate(OSCILLATOR, "exact", v=0.0, y=1.0, tolerance=1e-6, at=[1.0]), "tolerance: exact does not estimate"),
+    (lambda: sw.explain(OSCILLATOR, "exact"), "method: exact makes no operations"),
+    (lambda: sw.export(OSCILLATOR, "exact", "c"), "method: exact makes no operations"),
+    (lambda: sw.lyapunov(OSCILLATOR, "exact", v=0.0, y=1.0, dt=0.1, steps=10), "method: exact makes no operations"),
+    (lambda: sw.charts.stability(["exact"]), "method: exact makes no operations"),
+    (lambda: sw.charts.work_precision("oscillator", ["exact"]), "method: exact makes no operations"),
+    (lambda: sw.charts.stability_map("exact"), "method: exact makes no operations"),
+    (lambda: sw.charts.powers("exact"), "method: exact makes no operations"),
+    (lambda: sw.stability.function("exact"), "method: exact makes no operations"),
+    (lambda: sw.stability.operations("exact"), "method: exact makes no operations"),
+    (lambda: sw.stability.series("exact"), "method: exact makes no operations"),
+    (lambda: sw.criteria(["exact"]), "method: exact makes no operations"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), REFUSED)
+def test_what_is_refused(call: Any, message: str) -> None:
+    with pytest.raises((UnsupportedError, ArgumentError)) as caught:
+        call()
+    assert str(caught.value).startswith(message)
+
+
+def test_it_is_not_among_the_methods_of_all_systems() -> None:
+    assert "exact" not in [each.name for each in sw.methods()]
+    assert sw.method("exact").order == np.inf
+    assert "matrix exponential" in str(sw.method("exact").__doc__)
