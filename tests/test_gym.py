@@ -43,7 +43,7 @@ def test_gymnasiums_checker_has_nothing_to_say(name: str, dtype: str) -> None:
         warnings.simplefilter("error")
         # It recommends actions of −1 to 1, which those of the task are not.
         warnings.filterwarnings("ignore", ".*For Box action spaces, we recommend using a symmetric and normalized space.*")
-        check_env(one(name, dtype=dtype).unwrapped, skip_render_check=True)
+        check_env(one(name, dtype=dtype, render_mode="rgb_array").unwrapped)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -337,6 +337,58 @@ def test_wrong_ranges() -> None:
         many("Pendulum", 3, autoreset_mode="next")
 
 
+# ---- pictures
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_pictures(name: str) -> None:
+    """A frame of each environment shows its state: what moves is drawn where it is, in its colour."""
+    from stepwell.interop.gym import pictures
+
+    envs = many(name, 3, render_mode="rgb_array")
+    envs.reset(seed=1)
+    envs.world.y[..., 1] = envs.world.y[..., 0] + (0.3 if name == "CartPole" else 0.8)
+    frames = envs.render()
+    assert len(frames) == 3
+    assert all(frame.shape == (400, 600, 3) and frame.dtype == np.uint8 for frame in frames)
+    assert (frames[0] != frames[1]).any()
+    np.testing.assert_array_equal(frames[0], envs.render()[0])
+    moving = np.array([int(pictures.MOVING[i : i + 2], 16) for i in (1, 3, 5)])
+    left, right, bottom, top = envs.view
+    for member, frame in enumerate(frames):
+        line = next(each for each in reversed(envs.sketch(member)) if each.colour == pictures.MOVING)
+        (x1, y1), (x2, y2) = line.points
+        # The scale is the same along both axes; the view is in the middle.
+        scale = min(600 / (right - left), 400 / (top - bottom))
+        x = 300 + (0.5 * (x1 + x2) - 0.5 * (left + right)) * scale
+        y = 200 - (0.5 * (y1 + y2) - 0.5 * (bottom + top)) * scale
+        np.testing.assert_allclose(frame[round(y), round(x)], moving, atol=2)
+    assert pictures.tiled(frames).shape == (800, 1200, 3)
+    single = one(name, render_mode="rgb_array")
+    single.reset(seed=1)
+    assert single.render().shape == (400, 600, 3)
+    assert single.unwrapped.metadata["render_fps"] == round(1.0 / single.unwrapped.many.world.dt)
+
+
+def test_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is shown after each step, and closed once; without a screen it is there, too."""
+    import matplotlib
+
+    monkeypatch.setattr(matplotlib, "rcParams", matplotlib.rcParams)
+    matplotlib.use("agg")
+    import matplotlib.pyplot as plt
+
+    shown: list[Any] = []
+    monkeypatch.setattr(plt, "pause", shown.append)
+    envs = many("CartPole", 20, render_mode="human")
+    envs.reset(seed=1)
+    assert envs.step(np.zeros(20, int))[0].shape == (20, 4)
+    assert envs.render() is None
+    assert shown == [0.02] * 3
+    envs.close()
+    assert not plt.get_fignums()
+
+
 # ---- known truths
 
 
@@ -489,8 +541,8 @@ def test_wrong_calls() -> None:
         sw.gym.PendulumVectorEnv(method="rk5")
     with pytest.raises(UnsupportedError, match="leapfrog needs a second-order system"):
         sw.gym.CartPoleVectorEnv(method="leapfrog")
-    with pytest.raises(ArgumentError, match="render_mode: expected None"):
-        sw.gym.PendulumVectorEnv(render_mode="human")  # type: ignore[arg-type]
+    with pytest.raises(UnknownNameError, match="render_mode: there is no 'ansi'"):
+        sw.gym.PendulumVectorEnv(render_mode="ansi")
     envs = sw.gym.CartPoleVectorEnv(3)
     with pytest.raises(ArgumentError, match=r"step: expected after reset\(\)"):
         envs.step(np.zeros(3, dtype=int))
@@ -526,6 +578,8 @@ class Stone(stepwell.interop.gym.WorldVectorEnv):  # type: ignore[misc]
 def test_a_world_of_another_type_is_refused() -> None:
     arguments: dict[str, Any] = {"method": "leapfrog", "dt": 0.1, "substeps": 1, "max_episode_steps": 5}
     assert Stone(2, **arguments).world.y.dtype == np.float64
+    with pytest.raises(UnsupportedError, match="Stone has no pictures"):
+        Stone(2, **arguments, render_mode="rgb_array")
     with pytest.raises(UnsupportedError, match="dtype: Stone makes a world of float64, and float32 was asked for"):
         Stone(2, **arguments, dtype="float32")
     with pytest.raises(DTypeError, match="dtype: expected 'float64' or 'float32', got 'float16'"):

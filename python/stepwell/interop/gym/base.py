@@ -16,6 +16,7 @@ from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...model import setting
 from ...model.methods import Method
 from ...runs.world import World
+from .pictures import MOST_TILES, Camera, Frame, Line, Window, tiled
 
 Observations = np.ndarray[Any, np.dtype[np.float32]]
 Truths = np.ndarray[Any, np.dtype[np.bool_]]
@@ -62,7 +63,8 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         dt: the step of the method, in seconds.
         substeps: the number of steps for each action.
         max_episode_steps: the number of actions after which an episode is truncated; None for never.
-        render_mode: None; there are no pictures.
+        render_mode: ``"rgb_array"``, so that ``render`` returns a frame of each environment; ``"human"``, so that a window shows
+            the first 16 after each step; or None.
         dtype: ``"float64"`` or ``"float32"``, the precision of the world, and of what is computed from its states.
             Observations are always returned in float32.
         autoreset_mode: when an environment whose episode ended begins anew: Gymnasium's ``AutoresetMode`` or its value. At the
@@ -82,7 +84,13 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         UnsupportedError: if ``make_world`` makes arrays of another type than ``dtype``.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+    metadata: ClassVar[dict[str, Any]] = {
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 50,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+    #: Left, right, bottom and top of what pictures show.
+    view: ClassVar[tuple[float, float, float, float]] = (-1.0, 1.0, -1.0, 1.0)
     #: The usual length of an episode.
     episode_steps: ClassVar[int]
     #: The spaces of one environment.
@@ -97,13 +105,15 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         dt: float,
         substeps: int,
         max_episode_steps: int | None,
-        render_mode: None = None,
+        render_mode: str | None = None,
         dtype: Any = "float64",
         autoreset_mode: Any = AutoresetMode.NEXT_STEP,
         randomise: dict[str, tuple[Any, Any]] | None = None,
     ) -> None:
         if render_mode is not None:
-            raise ArgumentError(f"render_mode: expected None, for there are no pictures, got {checks.short(render_mode)}")
+            checks.known("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+            if type(self).sketch is WorldVectorEnv.sketch:
+                raise UnsupportedError(f"render_mode: {type(self).__name__} has no pictures; it needs a method sketch(member)")
         self.num_envs = checks.count("num_envs", num_envs, 1)
         # Bounds of the observations, states, forces, draws, rewards, and the results of a step.
         seen = int(np.prod(self.one_observation.shape or (1,)))
@@ -122,7 +132,10 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
                 f"make_world make arrays of self.dtype, and World(…, dtype=self.dtype)"
             )
         self.autoreset_mode = _mode(autoreset_mode)
-        self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}  # type: ignore[misc]  # Gymnasium reads it
+        self._camera: Camera | None = None
+        self._window: Window | None = None
+        fps = max(1, round(1.0 / (self.world.dt * self.substeps)))
+        self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode, "render_fps": fps}  # type: ignore[misc]  # Gymnasium reads it
         self._randomised = {} if randomise is None else _checked(self.world, randomise)
         self.steps = np.zeros(self.num_envs, dtype=np.int64)
         self._begun, self._over = False, np.zeros(self.num_envs, dtype=np.bool_)
@@ -168,6 +181,31 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
     def begin_action(self, actions: Any) -> None:
         """Called before the steps of an action, for what ``judge`` needs of the states before them."""
 
+    def sketch(self, member: int) -> list[Line]:
+        """The lines that show an environment, in the units of ``view``."""
+        raise UnsupportedError(f"render: {type(self).__name__} has no pictures; it needs a method sketch(member)")
+
+    def frames(self, count: int) -> tuple[Frame, ...]:
+        """Pictures of the first environments, each of shape (height, width, 3)."""
+        if self._camera is None:
+            self._camera = Camera(self.view)
+        return tuple(self._camera.frame(self.sketch(member)) for member in range(count))
+
+    def render(self) -> tuple[Frame, ...] | None:
+        """See Gymnasium: a frame of each environment, or a window that shows the first ones."""
+        if self.render_mode == "rgb_array":
+            return self.frames(self.num_envs)
+        if self.render_mode == "human":
+            self._window = self._window or Window()
+            self._window.show(tiled(self.frames(min(self.num_envs, MOST_TILES))), 1.0 / self.metadata["render_fps"])
+        return None
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the window."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observations, dict[str, Any]]:
         """Begin new episodes; see Gymnasium. ``options={"reset_mask": mask}`` does so for some environments only."""
         super().reset(seed=seed)
@@ -177,6 +215,8 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
             raise ShapeError(f"reset_mask: expected {self.num_envs} booleans, got {which.dtype} of shape {which.shape}")
         self._begin(np.flatnonzero(which))
         self._begun = True
+        if self.render_mode == "human":
+            self.render()
         return self.seen(), {}
 
     def step(self, actions: Any) -> tuple[Observations, Array, Truths, Truths, dict[str, Any]]:
@@ -188,6 +228,8 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
             raise ShapeError(f"actions: expected shape {self.action_space.shape}, got {actions.dtype} of shape {actions.shape}")
         over = (self._over != 0).nonzero()[0] if self.begins_at_next_step else NONE
         seen, rewards, terminated, truncated = self.advance(actions, over)
+        if self.render_mode == "human":
+            self.render()
         if self.autoreset_mode is not AutoresetMode.SAME_STEP or not len(ended := np.flatnonzero(terminated | truncated)):
             return seen, rewards, terminated, truncated, {}
         last, which = np.zeros_like(seen), np.zeros(self.num_envs, np.bool_)
@@ -250,7 +292,7 @@ class WorldEnv(gymnasium.Env):  # type: ignore[misc]
         options: the arguments of the vector environment, ``vector``, except ``num_envs``.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
     #: The vector environment of the same kind.
     vector: ClassVar[type[WorldVectorEnv]]
 
@@ -258,7 +300,17 @@ class WorldEnv(gymnasium.Env):  # type: ignore[misc]
         # Gymnasium's wrapper limits the length of an episode.
         self.many = self.vector(1, **{"max_episode_steps": None, "autoreset_mode": AutoresetMode.DISABLED} | options)
         self.observation_space, self.action_space = self.many.single_observation_space, self.many.single_action_space
-        self.render_mode = None
+        self.render_mode = self.many.render_mode
+        self.metadata = {**type(self).metadata, "render_fps": self.many.metadata["render_fps"]}  # type: ignore[misc]  # likewise
+
+    def render(self) -> Any:
+        """See Gymnasium: a frame, of shape (height, width, 3), or a window."""
+        frames = self.many.render()
+        return None if frames is None else frames[0]
+
+    def close(self) -> None:
+        """Close the window."""
+        self.many.close_extras()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observations, dict[str, Any]]:
         """Begin a new episode; see Gymnasium."""

@@ -12,6 +12,7 @@ from ...model.equations import system
 from ...model.methods import Method
 from ...runs.world import World
 from .base import WorldEnv, WorldVectorEnv
+from .pictures import CARRYING, FIXED, Line
 from .traced import TracedVectorEnv
 
 #: The push of an action, in newtons.
@@ -105,6 +106,20 @@ class CartPoleVectorEnv(TracedVectorEnv):
     def score(v: Any, y: Any, action: Any, before: tuple[Any, Any]) -> tuple[Any, Any]:
         """1 for each step, until the cart is off or the pole has fallen."""
         return 1.0, (np.abs(y[0]) > END) | (np.abs(y[1]) > TILT)
+
+    view = (-2.7, 2.7, -1.2, 2.4)
+
+    def sketch(self, member: int) -> list[Line]:
+        """The rail, the cart and the pole."""
+        place, angle = (float(each) for each in self.world.y[:2, member])
+        half_length = float(np.broadcast_to(self.world.system.arguments()["half_length"], (self.num_envs,))[member])
+        tip = place + 2.0 * half_length * np.sin(angle), 2.0 * half_length * np.cos(angle)
+        return [
+            Line([(-END, 0.0), (END, 0.0)], 2.0, FIXED),
+            Line([(place - 0.2, 0.0), (place + 0.2, 0.0)], 18.0, CARRYING),
+            Line([(place, 0.0), tip], 7.0),
+            Line([(place, 0.0)], 5.0, FIXED),
+        ]
 
 
 class CartPoleEnv(WorldEnv):

@@ -14,6 +14,7 @@ from ...model.systems import Rods
 from ...reference.functions import cos, sin
 from ...runs.world import World
 from .base import WorldEnv, WorldVectorEnv
+from .pictures import CARRYING, FIXED, Line
 from .traced import TracedVectorEnv
 
 #: Gravity, in SI units; masses and lengths of the rods are 1.
@@ -98,6 +99,18 @@ class DoubleRodVectorEnv(TracedVectorEnv):
         """Whether the tip is up."""
         up = y[1][1] > GOAL
         return np.where(up, 0.0, -1.0), up
+
+    view = (-3.3, 3.3, -2.2, 2.2)
+
+    def sketch(self, member: int) -> list[Line]:
+        """The rods, and the height to be reached."""
+        joint, tip = ((float(x), float(y)) for x, y in self.world.y[..., member])
+        return [
+            Line([(-3.0, GOAL), (3.0, GOAL)], 2.0, FIXED),
+            Line([(0.0, 0.0), joint], 9.0, CARRYING),
+            Line([joint, tip], 9.0),
+            Line([(0.0, 0.0)], 6.0, FIXED),
+        ]
 
 
 def _rods(v: Any, y: Any) -> tuple[Any, Any]:

@@ -12,6 +12,7 @@ from ...model.methods import Method
 from ...model.systems import Pendulum
 from ...runs.world import World
 from .base import WorldEnv, WorldVectorEnv
+from .pictures import FIXED, Line
 from .traced import TracedVectorEnv
 
 #: Gravity, mass and length of the rod in Gymnasium's environment of this name, in SI units.
@@ -89,6 +90,14 @@ class PendulumVectorEnv(TracedVectorEnv):
         above = angle - 2.0 * np.pi * np.floor(angle / (2.0 * np.pi)) - np.pi
         torque = _torque(action)
         return -(above * above + 0.1 * (speed * speed) + 0.001 * (torque * torque)), False
+
+    view = (-1.8, 1.8, -1.2, 1.2)
+
+    def sketch(self, member: int) -> list[Line]:
+        """The rod on its hinge."""
+        angle = float(self.world.y[member])
+        tip = LENGTH * np.sin(angle), -LENGTH * np.cos(angle)
+        return [Line([(0.0, 0.0), tip], 14.0), Line([(0.0, 0.0)], 8.0, FIXED)]
 
 
 def _torque(action: Any) -> Any:
