@@ -192,6 +192,71 @@ def test_members_and_systems_without_inputs() -> None:
     assert free.eigenvalues == pytest.approx([np.exp(-0.1)])
 
 
+# ---- dead time
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.11, 0.3, 0.41, 0.9, 0.6 + 1e-13])
+@pytest.mark.parametrize("interpolation", ["hold", "linear"])
+def test_a_dead_time_of_any_length_is_exact(interpolation: Any, delay: float) -> None:
+    """Beside a step of a thirtieth of dt, of which the delay is a whole number, and whose input is the same."""
+    dt, fine = 0.3, 30
+    system = sw.LinearSystem([[-0.4, -4.0], [1.0, 0.0]], [[1.0, 0.3], [0.0, 0.5]], [[0.0, 1.0]], [[0.2, 0.0]])
+    x = np.random.default_rng(5).normal(size=(6, 2))
+    x[0] = 0.0  # as before it
+    coarse = sw.discretise(system, dt, "exact", interpolation=interpolation, delay=delay).run(x, [0.3, 0.7])
+    times = np.arange(5 * fine + 1) / fine
+    between = np.stack([np.interp(times, np.arange(6), x[:, j]) for j in range(2)], axis=1)
+    between = x[(times + 1e-9).astype(int)] if interpolation == "hold" else between
+    whole = round(delay / dt * fine) * dt / fine
+    run = sw.discretise(system, dt / fine, "exact", interpolation=interpolation, delay=whole).run(between, [0.3, 0.7])
+    assert coarse.state[:, :2] == pytest.approx(run.state[::fine, :2], abs=1e-12)  # 150 steps of some roundings
+    assert coarse.z == pytest.approx(run.z[::fine], abs=1e-12)
+
+
+@pytest.mark.parametrize("interpolation", ["hold", "linear"])
+@pytest.mark.parametrize(
+    "method", ["standard_euler", "false_euler", "leapfrog", "verlet", "rk4", "rodas4", "trapezoidal", "dop853"]
+)
+def test_a_method_sees_what_it_sees_in_a_run(method: str, interpolation: Any) -> None:
+    """Late samples of a run: the mean over a step where a held one begins within it."""
+    dt, delay = 0.2, 0.27
+    rng = np.random.default_rng(6)
+    x = np.concatenate([[0.0, 0.0], rng.normal(size=10)])
+    system = sw.LinearSystem([[0.0, -4.0], [1.0, 0.0]], [[1.0], [0.0]])
+    late = system.with_inputs(sw.Sampled(x, dt, delay, interpolation))
+    run = sw.integrate(late, method, v=0.0, y=0.0, dt=dt, steps=10, every=1)
+    samples = sw.discretise(system, dt, method, interpolation=interpolation, delay=delay).run(x)
+    assert samples.state[:11, :2] == pytest.approx(np.concatenate([run.v, run.y], axis=1), abs=1e-12)
+
+
+def test_whole_samples_are_powers_of_z() -> None:
+    omega = np.linspace(0.1, 9.0, 12)
+    for how in ("zoh", "linear", "tustin", "rk4", "impulse"):
+        plain, late = (sw.discretise(sw.TransferFunction(*G), 0.3, how, delay=delay) for delay in (0.0, 0.9))
+        shift = np.exp(-0.9j * omega)
+        assert late.frequency_response(omega) == pytest.approx(plain.frequency_response(omega) * shift, rel=1e-11)
+        assert (late.delay, len(late.P) >= 4) == (0.9, True)
+    padded = np.concatenate([[0.0, 0.0], sw.discretise(sw.TransferFunction(*G), 0.3).num])
+    assert sw.discretise(sw.TransferFunction(*G), 0.3, delay=0.6).num == pytest.approx(padded, abs=1e-14)
+
+
+def test_a_late_impulse_response() -> None:
+    """Of 1/(s + 2): dt·e^(−2(t − τ)) from τ on."""
+    run = sw.discretise(sw.TransferFunction(1.0, [1.0, 2.0]), 0.25, "impulse", delay=0.35).run([1.0, 0.0, 0.0, 0.0, 0.0])
+    t = 0.25 * np.arange(5)
+    assert run.z[:, 0] == pytest.approx(np.where(t >= 0.35, 0.25 * np.exp(-2.0 * (t - 0.35)), 0.0), abs=1e-15)
+
+
+def test_the_margin_of_the_delay_is_where_the_loop_oscillates() -> None:
+    """From both sides, of the continuous loop: with short samples the hold adds half of one to the dead time."""
+    plant, dt = sw.TransferFunction(4.0, [1.0, 3.0, 3.0, 1.0]), 0.01
+    margin = sw.margins(plant).delay
+    for factor, stable in ((0.98, True), (1.02, False)):
+        late = sw.discretise(plant, dt, delay=factor * margin - 0.5 * dt)
+        closed = late.P - late.Q @ late.C
+        assert bool(np.abs(np.linalg.eigvals(closed)).max() < 1.0) is stable
+
+
 # ---- polynomials and responses
 
 
@@ -279,6 +344,10 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
         ArgumentError,
         "prewarp: expected a frequency below that of half",
     ),
+    (lambda: sw.discretise(SYSTEM, 0.1, delay=-0.1), ArgumentError, "delay: expected a dead time of zero or more, got -0.1"),
+    (lambda: sw.discretise(SYSTEM, 0.1, delay=[0.1, 0.2]), ShapeError, "delay: expected one number"),
+    (lambda: sw.discretise(SYSTEM, 0.1, delay=1e9), ArgumentError, "delay: the matrices with the samples under way"),
+    (lambda: sw.discretise(SYSTEM, 0.1, "tustin", prewarp=1.0, delay=0.13), UnsupportedError, "delay: with prewarp="),
     (lambda: sw.discretise(SYSTEM, 0.1).run(1.0), ShapeError, "x: expected shape (samples, batch…)"),
     (lambda: sw.discretise(sw.Oscillator(), 0.1).run([1.0]), ShapeError, "x: expected shape (samples, 2, batch…)"),
     (lambda: sw.discretise(SYSTEM, 0.1).run([1.0], [1.0]), ShapeError, "start: expected shape"),

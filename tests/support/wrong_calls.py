@@ -397,7 +397,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "stability_limit": (sw.stability_limit, {"system": sw.Oscillator(), "method": "rk4", "at": None, "t": 0.0}),
     "discretise": (
         sw.discretise,
-        {"system": sw.TransferFunction(1.0, [1.0, 1.0]), "dt": 0.1, "how": "exact", "interpolation": "linear", "prewarp": None},
+        {"system": sw.TransferFunction(1.0, [1.0, 1.0]), "dt": 0.1, "how": "exact", "interpolation": "linear", "prewarp": None}
+        | {"delay": 0.03},
     ),
     "DiscreteSystem.run": (sw.discretise(sw.TransferFunction(1.0, [1.0, 1.0]), 0.1).run, {"x": [1.0, 2.0], "start": [0.5]}),
     "DiscreteSystem.frequency_response": (

@@ -27,6 +27,8 @@ from ...reference.resolvent import polynomials
 from ...runs import engine
 from ...runs.engine.linear import one_step
 from ..stability import eigen, maps
+from .delay import divided, divided_by, not_of_tustin, samples_of, shifted
+from .delay import joined as with_samples
 from .response import Complex, response
 
 if TYPE_CHECKING:
@@ -70,6 +72,7 @@ class DiscreteSystem(ValueEquality):
         Q_next: that of the next sample, zero for held inputs.
         C: output matrix, shape (outputs, n, *batch); without C of the system the outputs are the states.
         D: feedthrough matrix, shape (outputs, inputs, *batch).
+        delay: the dead time of the inputs. Its samples under way are states behind those of the system, the newest first.
 
     Example:
         >>> held = sw.discretise(sw.TransferFunction(1.0, [1.0, 0.0]), 0.5)  # an integrator
@@ -86,6 +89,7 @@ class DiscreteSystem(ValueEquality):
     Q_next: Array
     C: Array
     D: Array
+    delay: float = 0.0
 
     @property
     def batch(self) -> Shape:
@@ -150,7 +154,8 @@ class DiscreteSystem(ValueEquality):
 
         Args:
             x: the samples, shape (samples, *batch), of several inputs (samples, inputs, *batch).
-            start: the state at the first sample in the order of A, shape (n, *batch); zero if None. For "impulse" it is that
+            start: the state at the first sample in the order of A, shape (n, *batch); zero if None. Samples under way are zero
+                unless they are given behind it. For "impulse" it is that
                 before the first impulse.
 
         Returns:
@@ -165,7 +170,10 @@ class DiscreteSystem(ValueEquality):
         if samples.ndim < 2 or samples.shape[1] != m or not len(samples):
             wanted = "(samples, batch…)" if m == 1 else f"(samples, {m}, batch…)"
             raise ShapeError(f"x: expected shape {wanted}, with at least one sample, got {np.shape(x)}")
-        s = checks.block("start", 0.0 if start is None else start, (n,), "states")
+        s = checks.numbers("start", 0.0 if start is None else start)
+        if s.ndim and len(s) == len(self.system.A) < n:
+            s = np.concatenate([s, np.zeros((n - len(s), *s.shape[1:]))])
+        s = checks.block("start", s, (n,), "states")
         batch = checks.batch_shape({"x": samples.shape[2:], "start": s.shape[1:], "system": self.batch})
         checks.fits("x: the states and outputs", 1.0 * len(samples) * (n + len(self.C)), batch, "take fewer samples at a time")
         P, Q, after, C, D = (aligned(each, 2, batch) for each in (self.P, self.Q, self.Q_next, self.C, self.D))
@@ -210,6 +218,7 @@ def discretise(
     *,
     interpolation: SampleInterpolation | None = None,
     prewarp: float | None = None,
+    delay: float = 0.0,
 ) -> DiscreteSystem:
     """A linear system from sample to sample, exactly or by a method (§4).
 
@@ -230,6 +239,9 @@ def discretise(
         how: one of the table; a method by its name, or what ``stepwell.method`` returns.
         interpolation: how the input runs between samples, for a method or "exact": ``"hold"`` (if None) or ``"linear"``.
         prewarp: for "tustin", the frequency in radians per unit of time at which the response is that of the system.
+        delay: dead time of the inputs, in units of time, zero or more: that of a computer, a bus, a valve. It need not be a
+            multiple of dt: in an exact step the input then changes within the step, once. The samples that are under way are
+            states behind those of the system, the newest first.
 
     Returns:
         A ``DiscreteSystem``.
@@ -256,6 +268,9 @@ def discretise(
     if prewarp is not None and way != "tustin":
         raise ArgumentError(f'prewarp: expected None for {way!r}, since only "tustin" moves frequencies; got {prewarp!r}')
     checks.fits("system: the matrices of a step", 60.0 * (len(system.A) + 2) ** 2, system.batch, "take fewer states")
+    delay = float(checks.not_negative("delay", checks.number("delay", delay), "a dead time"))
+    late = samples_of(delay, dt)
+    not_of_tustin(prewarp, late[1])
     if way == "tustin":
         method = find_method("trapezoidal")
     if method is not None:
@@ -266,7 +281,15 @@ def discretise(
     n = len(system.A)
     C = system.C if system.C is not None else np.eye(n).reshape(n, n, *(1,) * (system.A.ndim - 2))
     D = part.D if part is not None else np.zeros((len(C), 0))
-    return DiscreteSystem(system, way, between, dt, P, Q, after, C, D)
+    if late != (0, 0.0) and Q.shape[1]:
+        if not late[1]:
+            parts = shifted(P, Q, after, D, late[0])
+        elif method is None:
+            parts = divided(system, P, D, way, between, dt, late)
+        else:
+            parts = divided_by(system, method, P, D, between, dt, late)
+        P, Q, after, C, D = with_samples(parts, C, Q.shape[1], system.batch)
+    return DiscreteSystem(system, way, between, dt, P, Q, after, C, D, delay)
 
 
 def _way(how: Any) -> tuple[str, Method | None]:
