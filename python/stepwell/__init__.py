@@ -39,6 +39,8 @@ registry.register(
     explore="stepwell.views.explorer.page:explore",
     growth_of="stepwell.analysis.growth:finding_of",
     held_by_stability="stepwell.analysis.stiffness:held_by_stability",
+    oscillator_limit="stepwell.analysis.stability.kept:oscillator_limit",
+    own_method="stepwell.model.own_methods:own_method",
     own_system="stepwell.model.systems.own:OwnSystem",
     picture_of_run="stepwell.views.charts.runs:own_picture",
     run_to_dataframe="stepwell.interop.tables:to_dataframe",

@@ -337,5 +337,23 @@ def program(method: str, *, attempts: bool = False) -> tuple[list[tuple[str, lis
     """What a method does to blocks, and the places of the new blocks; of attempts also those of estimates of the error.
 
     Names are "v", "y", "dv" and "dy" (with the time, as a share of the step; operands are v and y), "velocity", "add",
-    "subtract", "scale" (with the factor), "series of v" and "series of y" (with the order of the coefficient).
+    "subtract", "scale" (with the factor), "series of v" and "series of y" (with the order of the coefficient), "kept v" and
+    "kept y" (with the place among the blocks that the method keeps).
+    """
+
+def define(
+    key: str,
+    name: str,
+    step: tuple[list[tuple[str, list[int], float]], list[int]],
+    *,
+    acceleration: bool,
+    attempt: tuple[list[tuple[str, list[int], float]], list[int]] | None = None,
+    error_order: int = 0,
+    start: tuple[list[tuple[str, list[int], float]], list[int]] | None = None,
+    kept: list[bool] = ...,
+) -> None:
+    """Make a user's method known by a key, which stands for its programs; what is known by it already stays.
+
+    Programs are as ``program`` returns them: of a step, the new v and y and what is kept; of an attempt, the new v and y and the
+    estimates of their errors; of a start, v and what is kept. ``kept`` has for each kept block whether it is one of velocities.
     """

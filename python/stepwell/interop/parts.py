@@ -22,6 +22,7 @@ from ..model.equations.definition import Definition
 from ..model.equations.trace import Equations
 from ..model.methods import Method
 from ..model.methods import method as find_method
+from ..model.own_methods import OwnMethod, as_data, of_data
 from ..model.systems import System
 from ..model.systems.digest import digest
 from ..model.systems.own import OwnSystem
@@ -77,6 +78,8 @@ class Writer:
                 return {KIND: "warning", "name": value.__name__}
             case np.dtype():
                 return {KIND: "dtype", "name": value.str}
+            case OwnMethod():
+                return {KIND: "own method", "of": as_data(value)}
             case Method():
                 return {KIND: "method", "name": value.name}
             case Definition():
@@ -171,6 +174,8 @@ class Reader:
                 return np.dtype(part["name"])
             case "method":
                 return find_method(part["name"])
+            case "own method":
+                return of_data(part["of"])
             case "function":
                 return self._definition(part["module"], part["name"])
             case "of time":

@@ -85,6 +85,16 @@ def not_with_exact(method: Method, **options: Any) -> None:
             raise UnsupportedError(f"{name}: does not go with exact: {reasons[name]}")
 
 
+def one_state(what: str, method: Method) -> None:
+    """Raise if a step of the method goes on from more than v and y, so that it is no map from states to states."""
+    if method.kept:
+        raise UnsupportedError(
+            f"{what}: a step of {method.name} goes on from more than v and y: from {', '.join(method.kept)}, which it keeps "
+            f"between steps. What is asked for is that of a map from one state to the next; its limit on an oscillator is "
+            f"{method.name}.limit"
+        )
+
+
 def not_of_a_step(control: Any) -> None:
     """Raise if a control does not work with adaptive steps."""
     if getattr(control, "relative", None) is not None and control.gain is None:

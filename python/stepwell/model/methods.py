@@ -5,11 +5,12 @@ from __future__ import annotations
 import importlib
 import math
 import re
+from collections.abc import Callable
 from functools import cache
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, cast, overload
 
 from .. import _core
-from ..base import checks
+from ..base import checks, registry
 from ..base.arrays import Array, Blocks, Scaled
 from ..base.immutable import Immutable
 from ..base.reprs import facts
@@ -42,6 +43,12 @@ class Method(Immutable):
 
     #: The name by which it is chosen.
     name: str
+    #: The name by which the core knows it.
+    key: str
+    #: The names of the blocks that it keeps between steps beside v and y.
+    kept: tuple[str, ...] = ()
+    #: Of each whether it is one of velocities.
+    kept_of_v: tuple[bool, ...] = ()
     #: Hoffmann's name.
     title: str
     #: Standard names of the same method.
@@ -85,6 +92,7 @@ class Method(Immutable):
     def __init__(self, record: dict[str, Any]) -> None:
         for key, value in record.items():
             setattr(self, key, tuple(value) if isinstance(value, list) else value)
+        self.key = self.name
         self.has_series = self.family == "Taylor"
         self.is_exact = self.family == "exact"
         self.__doc__ = self._text()
@@ -98,6 +106,15 @@ class Method(Immutable):
         return method, (self.name,)
 
     @property
+    def begins(self) -> bool:
+        """Whether a run begins with more than its state: with what the method carries in place of v, or keeps beside it."""
+        return self.carry is not None or bool(self.kept)
+
+    def kept_numbers(self, n_v: int, n_y: int) -> int:
+        """How many numbers it keeps beside those of a member's blocks."""
+        return sum(n_v if of_v else n_y for of_v in self.kept_of_v)
+
+    @property
     def has_derivatives(self) -> bool:
         """Whether a step takes derivatives of the rates, so that it goes over symbols only."""
         return self.has_series or self.is_implicit
@@ -105,7 +122,7 @@ class Method(Immutable):
     @property
     def takes_derivatives_by_time(self) -> bool:
         """Whether a step takes the derivatives of rates by the time, and with them those of inputs."""
-        return self.has_series or (not self.is_exact and any(name == "v by time" for name, _, _ in _core.program(self.name)[0]))
+        return self.has_series or (not self.is_exact and any(name == "v by time" for name, _, _ in _core.program(self.key)[0]))
 
     @property
     def is_always_stable(self) -> bool:
@@ -141,9 +158,13 @@ class Method(Immutable):
             lines.append(f"Not to be taken for: {', '.join(self.false_friends)}.")
         lines += [
             f"Undamped oscillator stable: {limit}.",
-            f"Source: {'Hoffmann’s ' if self.section.startswith('§') else ''}{self.section}; {self.reference}.",
+            f"Source: {self._source_of()}.",
         ]
         return "\n".join(lines)
+
+    def _source_of(self) -> str:
+        hoffmann = "Hoffmann’s " if self.section.startswith("§") else ""
+        return "; ".join(filter(None, [hoffmann + self.section, self.reference]))
 
     def __repr__(self) -> str:
         return f"<method {self.name}: {self.title}, order {self.order}, {self._costs()} per step>"
@@ -166,7 +187,7 @@ class Method(Immutable):
                 ("adaptive steps", "no" if self.error_order is None else "yes (tolerance=)"),
                 ("also called", "; ".join(self.other_names)),
                 ("not to be taken for", "; ".join(self.false_friends)),
-                ("source", f"{self.section}; {self.reference}"),
+                ("source", "; ".join(filter(None, [self.section, self.reference]))),
             ],
             self.about,
         )
@@ -269,12 +290,35 @@ def of_operations(name: str | Method) -> Method:
     return chosen
 
 
-def method(name: str | Method) -> Method:
-    """The method of that name.
+@overload
+def method(name: str | Method) -> Method: ...
+
+
+@overload
+def method(name: Callable[..., Any], *, start: Callable[..., Any] | None = None) -> Method: ...
+
+
+@overload
+def method(*, start: Callable[..., Any]) -> Callable[[Callable[..., Any]], Method]: ...
+
+
+def method(name: Any = None, *, start: Any = None) -> Any:
+    """The method of that name; or, as a decorator, a method of your own.
+
+    A function of ``(s, t, h, v, y)`` that returns the new ``v`` and ``y`` becomes a method. It is recorded once, over blocks:
+    ``s.dv(t, v, y)`` and ``s.dy(t, v, y)`` are the increments h·v̇ and h·ẏ, ``s.velocity(d)`` is the velocity whose increment is
+    d; blocks are added, and multiplied by numbers; times are ``t``, ``t + 0.5 * h`` and so on. (A division is a product with the
+    reciprocal.) Order, cost and stability limit follow from what it does. It then steps every system as a built-in method does,
+    with the same bits by the NumPy reference.
+
+    - It returns four blocks, ``v, y, error_v, error_y``, if it estimates its error; then it takes adaptive steps.
+    - Further arguments are blocks that it keeps between steps, as the rates of steps before: it returns them behind ``v, y``, and
+      ``start=`` makes them for the first step.
 
     Args:
         name: its name or another name in its record, in any spelling: ``"false_euler"``, ``"symplectic Euler"`` or
-            ``"Euler-Cromer"``; or ``"exact"``.
+            ``"Euler-Cromer"``; or ``"exact"``; or a function.
+        start: a function of ``(s, t, h, v, y)`` that returns the blocks that your method keeps, as they are at the start.
 
     Returns:
         The ``Method``, with its record.
@@ -282,13 +326,29 @@ def method(name: str | Method) -> Method:
     Raises:
         UnknownNameError: if no method or more than one has that name. The message suggests the nearest; it explains the name of a
             method that is easily confused with one of these, such as ``"RK45"``.
+        ArgumentError: if a function does something else with blocks; what, and what it can do.
+        UnsupportedError: if a function's steps are wrong however short they are.
 
     Example:
         >>> sw.method("velocity Verlet").name
         'leapfrog'
+        >>> @sw.method
+        ... def ralston(s, t, h, v, y):
+        ...     dv, dy = s.dv(t, v, y), s.dy(t, v, y)
+        ...     later, v2, y2 = t + 2 / 3 * h, v + 2 / 3 * dv, y + 2 / 3 * dy
+        ...     return v + 0.25 * dv + 0.75 * s.dv(later, v2, y2), y + 0.25 * dy + 0.75 * s.dy(later, v2, y2)
+        >>> ralston
+        <method ralston: Ralston, order 2, 2 function evaluations per step>
+        >>> sw.integrate(sw.Pendulum(), ralston, v=0.0, y=1.0, dt=0.01, steps=100).y[-1].round(3)
+        0.6
     """
     if isinstance(name, Method):
         return name
+    if callable(name) or (name is None and start is not None):
+        own_method = registry.task("own_method")
+        return own_method(name, start) if name is not None else lambda function: own_method(function, start)
+    if start is not None:
+        raise ArgumentError(f"start: expected with a function, got the name {checks.short(name)}")
     if type(name) is str and (known := _catalogue().get(name)) is not None:
         return known
     if isinstance(name, str) and name == EXACT.name:

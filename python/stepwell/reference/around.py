@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array, Blocks, Scaled
+from ..base.arrays import Array, Scaled
 from . import bits
 
 #: The kinds of parts, from the inside out: friction resists all other forces, so it comes last.
@@ -91,9 +91,10 @@ class Rubbing(Around):
         return bits.at_most(-self.limit, x) & bits.at_most(x, self.limit)
 
 
-def whole_step(step: Callable[..., Blocks], s: Any, t: float, h: float, v: Array, y: Array) -> Blocks:
-    """A step of a method, and what comes after it: coming to rest, and projection."""
-    new_v, new_y = step(s, t, h, v, y)
+def whole_step(step: Callable[..., Any], s: Any, t: float, h: float, v: Array, y: Array, *kept: Array) -> Any:
+    """A step of a method, and coming to rest and projection after it; what the method keeps stands behind v and y."""
+    new_v, new_y, *kept_now = step(s, t, h, v, y, *kept)
     if hasattr(s, "bring_to_rest"):
         new_v = s.bring_to_rest(t, v, y, new_v)
-    return s.project(new_v, new_y) if hasattr(s, "project") else (new_v, new_y)
+    new_v, new_y = s.project(new_v, new_y) if hasattr(s, "project") else (new_v, new_y)
+    return new_v, new_y, *kept_now

@@ -364,20 +364,34 @@ class Touching(Around):
         )
 
 
-def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any) -> Any:
-    """One step by a method, with projection and contact. What a method carries begins anew where a point met a surface."""
+def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any, *kept: Any) -> Any:
+    """One step by a method, with projection and contact, and what the method keeps behind v and y.
+
+    What a method carries or keeps begins anew where a point met a surface.
+    """
     before = v, y
     with over(of_step(t, h, hasattr(steps, "finish"))):
-        after = whole_step(steps.step, s, t, h, v, y)
+        *after, kept_now = _with_kept(whole_step(steps.step, s, t, h, v, y, *kept))
     if not getattr(s, "met", None):
-        return after
-    if not hasattr(steps, "finish"):
-        return s.resolve(before, after)[1:]
+        return *after, *kept_now
     end, (slot, y1) = t + h, after
+
+    def renewed(old: Any, new: Any) -> Any:
+        new, as_stepped = new[s.free], old[s.free]
+        return s.among(old, bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], as_stepped.shape), new, as_stepped))
+
+    if not hasattr(steps, "finish"):
+        touched, v, y = s.resolve(before, after)
+        if not kept:
+            return v, y
+        started = steps.start(s, choice, end, h, v, y)
+        return v, y, *(renewed(old, new) for old, new in zip(kept_now, started, strict=True))
     v0, v1 = steps.finish(s, choice, t, *before), steps.finish(s, choice, end, slot, y1)
     touched, v, y = s.resolve((v0, before[1]), (v1, y1))
-    started = steps.start(s, choice, end, v, y)
-    started, as_stepped = started[s.free], slot[s.free]
-    return s.among(
-        slot, bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], as_stepped.shape), started, as_stepped)
-    ), y
+    return renewed(slot, steps.start(s, choice, end, v, y)), y
+
+
+def _with_kept(stepped: Any) -> tuple[Any, Any, Any]:
+    """v, y, and what is kept behind them."""
+    v, y, *kept = stepped
+    return v, y, kept

@@ -111,16 +111,20 @@ class Tracer:
         """The state after a step, and what a control has added up by then."""
         h = self.tape.step()
         s, (v, y, more) = self.scaled(h), self.state()
+        shapes = self.system.y_shape, self.system.v_shape
+        kept = [_array(shapes[of_v], more) for of_v in method.kept_of_v]
         if hasattr(s, "work"):
             s.work = next(more)
-        v, y = contact.step(method.steps, s, choice, self.tape.time(), h, v, y)
-        return self.flat(v, y) + ([s.work] if hasattr(s, "work") else [])
+        blocks = contact.step(method.steps, s, choice, self.tape.time(), h, v, y, *kept)
+        return self.flat(*blocks) + ([s.work] if hasattr(s, "work") else [])
 
     def slot(self, method: Any, which: str, choice: int) -> list[Any]:
         """The state after a method's ``start`` or ``finish``."""
         h, t = self.tape.step(), self.tape.time()
         s, (v, y, _) = self.scaled(h), self.state()
         with over(of_slot(t, h)):
+            if method.kept:
+                return self.flat(v, y, *method.steps.start(s, choice, t, h, v, y))
             return self.flat(getattr(method.steps, which)(s, choice, t, v, y), y)
 
     def attempted(self, *, backward: bool = False) -> adaptive.Attempted:

@@ -10,7 +10,7 @@ from ..base import checks, registry
 from ..base.arrays import Array, Shape
 from ..base.reprs import of_member
 from ..errors import ArgumentError, UnsupportedError
-from ..model.compatibility import fits_together, velocities
+from ..model.compatibility import fits_together, one_state, velocities
 from ..model.controls import ConstraintControl, EnergyControl
 from ..model.methods import Method
 from ..model.methods import method as find_method
@@ -139,6 +139,7 @@ def check_matrix_form(system: System, method: Method, form: str, force: Any) -> 
         )
     if not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    one_state("form", method)
     if method.takes_derivatives_by_time and any(map(_is_smooth, system.given_inputs().values())):
         raise UnsupportedError(
             f"form: {method.name} takes the derivatives of inputs too, and the transition matrix their values only; "

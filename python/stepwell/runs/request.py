@@ -23,6 +23,7 @@ from ..model.compatibility import (
     goes_on_by_a_rule,
     not_with_exact,
     samples_meet_steps,
+    one_state,
     velocities,
 )
 from ..model.controls import a_control
@@ -222,7 +223,7 @@ class Request(NamedTuple):
         stepped = system.over_steps(method, checks.once_of(t0) if isinstance(t0, np.ndarray) else t0, dt)
         carried = False
         if before is not None and before.carry is not None and (carried := before.holds(system, batch, v, y)):
-            v = spread(np.asarray(before.carry, np.float64), system.v_shape, batch)
+            v = spread(np.asarray(before.carry, np.float64), plan.slot_shape[: plan.slot_axes], batch)
         if bad is not None:
             bad = checks.diverged_before(bad, v, y, batch)
         if force is not None:
@@ -463,6 +464,8 @@ class Request(NamedTuple):
         control, form = a_control(options.control), checks.known("form", options.form, ("direct", "matrix"))
         if form != "direct" and (fused or control is not None):
             raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
+        if form != "direct":
+            one_state("form", method)
         if form != "direct" and not system.linear:
             raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
         if single:

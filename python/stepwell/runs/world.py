@@ -402,8 +402,8 @@ class World:
         options: dict[str, Any] = {"t0": plan.t0, "start_step": self.step_number, "dt": plan.dt, "start": self._start}
         options |= {"fused": plan.fused, "dtype": str(self._y.dtype), "control": system.keeper}
         options["force"] = None if plan.force is None else plan.force.copy()
-        carry = self._core.carry() if plan.method.carry is not None else None
-        carry = None if carry is None else carry.reshape(self._v.shape)
+        carry = self._core.carry() if plan.method.begins else None
+        carry = None if carry is None else carry.reshape(plan.slot_shape)
         names = tuple(each.name for each in self._events or () if each.then)
         return Continuation(system, plan.method, self._v.copy(), self._y.copy(), options, carry, changed_by=names)
 

@@ -341,7 +341,7 @@ fn what_all_members_have_in_common_is_in_no_loop() {
     for (method, nodes) in [("false_euler", 1), ("standard_heun", 2), ("rk4", 3)] {
         let of = |driven: bool| arithmetic(&tapes(&pendulum(method, driven)).step.split.body);
         let (free, driven) = (of(false), of(true));
-        let evaluations = stepwell_core::model::steppers::method(method).unwrap().program().evaluations();
+        let evaluations = stepwell_core::model::methods::method(method).unwrap().program().evaluations();
         assert!(driven - free <= nodes + evaluations, "{method}: {driven} against {free}");
     }
 }

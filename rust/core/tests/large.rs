@@ -20,9 +20,9 @@ use stepwell_core::{
     model::{
         around::controls,
         spec::{Row, Signature, Spec, Table},
-        steppers::{RECORDS, method},
         system::Shape,
         systems::kind,
+        {methods::method, steppers::RECORDS},
     },
     stage::{Clock, Machine},
     step::{
@@ -399,8 +399,9 @@ fn the_matrix_form_of_a_large_member_is_its_tape() {
 
 /// How many rows the arena of a method has, how often it asks for rates and how many passes it makes.
 fn schedule(name: &str, traits: RateTraits) -> (usize, usize, usize) {
-    let program = method(name).unwrap().program();
-    let schedule = BlockSchedule::new(&program, &program.results, Goal::State, traits, Shape { v: 9, y: 9 });
+    let method = method(name).unwrap();
+    let program = method.program();
+    let schedule = BlockSchedule::new(program, &program.results, Goal::State, traits, Shape { v: 9, y: 9 });
     let passes = schedule.actions.iter().filter(|action| matches!(action, Action::Pass(_))).count();
     (schedule.rows, schedule.actions.len() - passes, passes)
 }

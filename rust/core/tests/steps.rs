@@ -13,9 +13,10 @@ use stepwell_core::{
             self,
             contact::{self, Contacts},
         },
-        method::{Needs, Record},
+        method::Needs,
+        methods::{Method, method},
         spec::{Parameters, Signature},
-        steppers::{RECORDS, method},
+        steppers::RECORDS,
         system::{Make, Shape, System},
         systems::{self, KINDS},
     },
@@ -271,7 +272,7 @@ fn own() -> [Signature; 4] {
 }
 
 /// What a step makes: the state, then the tally.
-fn step<N: Number>(method: &Record, make: Make<N>, p: &Parameters<N>, shape: Shape, t: N, state: &[N], tally: N) -> Vec<N> {
+fn step<N: Number>(method: &Method, make: Make<N>, p: &Parameters<N>, shape: Shape, t: N, state: &[N], tally: N) -> Vec<N> {
     let system = around::wrap(p, make(p), tally);
     let (v, y) = state.split_at(shape.v);
     let (v0, y0) = (DVector::from_column_slice(v), DVector::from_column_slice(y));
@@ -279,13 +280,13 @@ fn step<N: Number>(method: &Record, make: Make<N>, p: &Parameters<N>, shape: Sha
     let (mut v, mut y) = system.project(next[0].clone(), next[1].clone());
     if let Some(contacts) = Contacts::new(p) {
         let carry = contact::carry(method, 0);
-        [v, y] = contacts.after(carry.as_ref(), &*system, t, [&v0, &y0], [v, y]);
+        [v, y] = contacts.after(carry, &*system, t, [&v0, &y0], [v, y], &mut []);
     }
     v.iter().chain(&y).copied().chain(system.tally()).collect()
 }
 
 /// The step as a tape, and what it makes.
-fn trace(method: &Record, signature: &Signature) -> (Tape, Vec<Id>) {
+fn trace(method: &Method, signature: &Signature) -> (Tape, Vec<Id>) {
     let kind = systems::kind(signature).unwrap();
     let shape = around::fit(kind, signature, method).unwrap();
     let state = shape.v + shape.y;
@@ -339,16 +340,17 @@ fn a_tape_makes_what_the_step_makes() {
     for signature in systems() {
         let (kind, make) = (systems::kind(&signature).unwrap(), systems::make(&signature.system).unwrap());
         let parameters = numbers(signature.parameters(), 1);
-        for method in RECORDS.iter().filter(|method| !method.program().has_derivatives()) {
-            let shape = match around::fit(kind, &signature, method) {
+        let methods = RECORDS.iter().map(|record| method(record.name).unwrap());
+        for method in methods.filter(|method| !method.program().has_derivatives()) {
+            let shape = match around::fit(kind, &signature, &method) {
                 Ok(shape) => shape,
                 Err(Error::VelocityDependent { .. }) => continue,
                 Err(error) => panic!("{error}"),
             };
             let state = numbers(shape.v + shape.y + 1, 2);
-            let (tape, roots) = trace(method, &signature);
+            let (tape, roots) = trace(&method, &signature);
             let p = Parameters { signature: &signature, h, numbers: parameters.clone(), sample };
-            let stepped = step(method, make, &p, shape, t, &state[..shape.v + shape.y], state[shape.v + shape.y]);
+            let stepped = step(&method, make, &p, shape, t, &state[..shape.v + shape.y], state[shape.v + shape.y]);
             let stepped: Vec<u64> = stepped.into_iter().map(f64::to_bits).collect();
             assert_eq!(evaluate(&tape, &roots, h, t, &parameters, &state), stepped, "{} on {signature:?}", method.name);
             assert!(stepped.iter().all(|bits| f64::from_bits(*bits).is_finite()), "{} on {signature:?}", method.name);
@@ -383,7 +385,7 @@ fn of_the_state(tape: &Tape, roots: &[Id]) -> Counts {
 fn false_euler_on_an_oscillator_is_four_operations() {
     for form in ["canonical", "physical"] {
         let signature = signature("oscillator", &[("form", form)], &[], &[("omega", 1)], &[]);
-        let (tape, roots) = trace(method("false_euler").unwrap(), &signature);
+        let (tape, roots) = trace(&method("false_euler").unwrap(), &signature);
         assert_eq!(of_the_state(&tape, &roots), Counts { additions: 2, multiplications: 2, ..Counts::default() }, "{form}");
     }
 }
@@ -394,7 +396,7 @@ fn zeros_that_begin_the_sums_of_a_few_bodies_cost_nothing() {
     // from the body before it taken from zero; then the step itself.
     for (n, pairs, additions) in [(2, 1, 1), (3, 3, 2)] {
         for dim in [2, 3] {
-            let (tape, roots) = trace(method("false_euler").unwrap(), &bodies(n, dim, "newton", &[]));
+            let (tape, roots) = trace(&method("false_euler").unwrap(), &bodies(n, dim, "newton", &[]));
             let most = pairs * (2 * dim) + additions * n * dim + 2 * n * dim;
             assert!(of_the_state(&tape, &roots).additions as usize <= most, "{n} bodies in {dim} dimensions");
         }
@@ -459,7 +461,7 @@ fn quantities_of_bodies_are_what_they_are_said_to_be() {
 #[test]
 fn what_cannot_be_made_is_refused() {
     let standard_euler = method("standard_euler").unwrap();
-    let fit = |signature: &Signature| around::fit(systems::kind(signature).unwrap(), signature, standard_euler);
+    let fit = |signature: &Signature| around::fit(systems::kind(signature).unwrap(), signature, &standard_euler);
     let unknown = |signature: Signature| assert!(matches!(fit(&signature), Err(Error::Options { .. })), "{signature:?}");
     let misshapen = |signature: Signature| assert!(matches!(fit(&signature), Err(Error::Shape { .. })), "{signature:?}");
     unknown(signature("oscillator", &[("form", "square")], &[], &[("omega", 1)], &[]));
@@ -509,7 +511,7 @@ fn forces_of_the_velocity_are_refused_where_they_do_harm() {
     let term = |signature: &Signature, name: &str| match around::fit(
         systems::kind(signature).unwrap(),
         signature,
-        method(name).unwrap(),
+        &method(name).unwrap(),
     ) {
         Err(Error::VelocityDependent { term, .. }) => Some(term),
         _ => None,

@@ -1,5 +1,6 @@
 //! The Python binding: arrays in, arrays out, the GIL released, errors mapped. No arithmetic and no decisions here.
 
+mod methods;
 mod model;
 mod tape;
 mod world;
@@ -14,11 +15,7 @@ use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
     error::Error,
     isa::Level,
-    model::{
-        method::{Fact, Record},
-        program::{Entry, Program},
-        steppers, systems as kinds,
-    },
+    model::systems as kinds,
     run::{
         adaptive,
         fixed::{self, Arrays, FixedRun, Steppable},
@@ -33,29 +30,6 @@ use stepwell_core::{
 
 use model::{ModelSpec, by_row, core_error, readable};
 use tape::{Operation, operation};
-
-/// Everything that a method says of itself.
-fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
-    let d = PyDict::new(py);
-    for (name, fact) in r.facts() {
-        match fact {
-            Fact::Text(text) => d.set_item(name, text)?,
-            Fact::MaybeText(text) => d.set_item(name, text)?,
-            Fact::Texts(texts) => d.set_item(name, texts)?,
-            Fact::Whole(whole) => d.set_item(name, whole)?,
-            Fact::Number(number) => d.set_item(name, number)?,
-            Fact::Numbers(numbers) => d.set_item(name, numbers)?,
-            Fact::Truth(truth) => d.set_item(name, truth)?,
-        }
-    }
-    Ok(d)
-}
-
-/// The records of all methods, by name.
-#[pyfunction]
-fn catalogue(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
-    steppers::RECORDS.iter().map(|r| describe(py, r)).collect()
-}
 
 /// Whether something is an array of floats that can be used as it is: contiguous, aligned, and finite or above zero where that is
 /// asked. What is wrong with any other is for others to say; this is asked of every array of every call.
@@ -394,40 +368,6 @@ fn split_of<'py>(py: Python<'py>, split: &Split) -> PyResult<Bound<'py, PyDict>>
     Ok(d)
 }
 
-/// A name, the places of operands, and a time or a factor.
-type BlockOperation = (&'static str, Vec<usize>, f64);
-
-/// The operations of a method on blocks: names, operands, times or factors, and the indices of the results; see `_core.pyi`.
-#[pyfunction]
-#[pyo3(signature = (method, *, attempts=false))]
-fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<usize>)> {
-    let record = stepwell_core::model::steppers::method(method)
-        .map_err(|_| model::argument_error(format!("method: there is no {method:?}")))?;
-    let made = if attempts { record.attempt() } else { Some(record.program()) };
-    let Program { entries, results } = made.ok_or_else(|| core_error(Error::NoEstimate))?;
-    let entry = |entry: &Entry| {
-        let (name, number) = match *entry {
-            Entry::V => ("v", 0.0),
-            Entry::Y => ("y", 0.0),
-            Entry::Dv(t, ..) => ("dv", t.node()),
-            Entry::Dy(t, ..) => ("dy", t.node()),
-            Entry::Velocity(_) => ("velocity", 0.0),
-            Entry::Add(..) => ("add", 0.0),
-            Entry::Sub(..) => ("subtract", 0.0),
-            Entry::Scale(by, _) => ("scale", by),
-            Entry::SeriesV(order, ..) => ("series of v", f64::from(order)),
-            Entry::SeriesY(order, ..) => ("series of y", f64::from(order)),
-            Entry::ImplicitV(gamma, ..) => ("implicit v", gamma),
-            Entry::ImplicitY(gamma, ..) => ("implicit y", gamma),
-            Entry::ByTimeV => ("v by time", 0.0),
-            Entry::ByTimeY => ("y by time", 0.0),
-            Entry::Mass(_) => ("mass", 0.0),
-        };
-        (name, entry.operands().into_iter().map(|block| block.index()).collect(), number)
-    };
-    Ok((entries.iter().map(entry).collect(), results.into_iter().map(|block| block.index()).collect()))
-}
-
 /// Raises if a model cannot be stepped so.
 #[pyfunction]
 fn check(py: Python<'_>, model: &ModelSpec) -> PyResult<()> {
@@ -533,7 +473,7 @@ fn forget() {
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    m.add_function(wrap_pyfunction!(catalogue, m)?)?;
+    m.add_function(wrap_pyfunction!(methods::catalogue, m)?)?;
     m.add_function(wrap_pyfunction!(tape::tape_operations, m)?)?;
     m.add_function(wrap_pyfunction!(sound, m)?)?;
     m.add_function(wrap_pyfunction!(systems, m)?)?;
@@ -549,7 +489,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(compiled, m)?)?;
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
     m.add_function(wrap_pyfunction!(operations, m)?)?;
-    m.add_function(wrap_pyfunction!(program, m)?)?;
+    m.add_function(wrap_pyfunction!(methods::program, m)?)?;
+    m.add_function(wrap_pyfunction!(methods::define, m)?)?;
     m.add_function(wrap_pyfunction!(series_evaluations, m)?)?;
     m.add_function(wrap_pyfunction!(forget, m)?)?;
     m.add_class::<ModelSpec>()?;

@@ -20,7 +20,7 @@ from ...base.immutable import ValueEquality
 from ...base.interrupts import POLL, available
 from ...base.reprs import cell, counted, facts, share
 from ...errors import ArgumentError, DivergenceWarning, ShapeError, UnsupportedError
-from ...model.compatibility import fits_together
+from ...model.compatibility import fits_together, one_state
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
 from ...model.systems import System
@@ -332,6 +332,7 @@ def _start(system: System, method: Method, v: Any, y: Any) -> tuple[System, Arra
     """The system with the shapes of the state, and the blocks of the state, checked."""
     system = a_system(system).for_state_shapes(v, y)
     fits_together(system, method)
+    one_state("lyapunov", method)
     v = checks.block("v", velocities(system, v), system.v_shape, system.axes)
     return system, v, checks.block("y", y, system.y_shape, system.axes)
 
@@ -447,7 +448,7 @@ def _motions(tapes: _Tapes, plan: engine.Plan, v: Array, y: Array, shares: int) 
 def _world(plan: engine.Plan, step: _core.Equations, numbers: Array) -> _core.World:
     """The world that makes this step with these numbers, in place."""
     parameters = plan.system.parameters(plan.batch, series=plan.method.has_derivatives)
-    model = _core.ModelSpec(plan.system.kernel, plan.method.name, [*parameters, ("step()", step)])
+    model = _core.ModelSpec(plan.system.kernel, plan.method.key, [*parameters, ("step()", step)])
     return _core.World(model, plan, np.empty(0), numbers.reshape(-1))
 
 

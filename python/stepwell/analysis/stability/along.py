@@ -17,7 +17,7 @@ from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.reprs import cell, facts
 from ...errors import ArgumentError, DTypeError
-from ...model.compatibility import fits_together
+from ...model.compatibility import fits_together, one_state
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
 from ...model.systems import LinearSystem, Oscillator, System
@@ -140,6 +140,7 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
     method = run.method if method is None else find_method(method)
     system = run.system.uncontrolled
     fits_together(system, method)
+    one_state("stability_along", method)
     n = sum(maps.size(system))
     checks.fits("the matrices", 8 * n * n * len(run.t), run.status.shape, "save fewer states")
     A = _linearised(system, run)

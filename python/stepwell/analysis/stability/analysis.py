@@ -12,7 +12,7 @@ from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
 from ...base.reprs import facts
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
-from ...model.compatibility import fits_together
+from ...model.compatibility import fits_together, one_state
 from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import System
@@ -271,6 +271,7 @@ def analyse(
     at = state_argument(at, v, y)
     system = a_system(system).for_state_shapes(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, method)
+    one_state("analyse", method)
     if isinstance(at, Run):
         if type(at.system) is not type(system):
             raise ShapeError(f"at: expected a run of {system!r}, got one of {at.system!r}")

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...model.compatibility import one_state
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
 from ...model.systems import LinearSystem, Oscillator, System
@@ -65,6 +66,7 @@ def series(method: str | Method) -> Series:
 
 def polynomials(system: System, method: Method) -> Any:
     """P of a linear system as exact polynomials in the step, or quotients of them, shape (n, n, *members)."""
+    one_state("P", method)
     system = system.without_inputs()
     if method.is_implicit and sum(maps.size(system)) > 1:
         return _of_rates(system, method)

@@ -23,7 +23,7 @@ from ...base import checks
 from ...base.arrays import Array, Shape
 from ...base.reprs import share
 from ...errors import AccuracyWarning, UnsupportedError
-from ...model.compatibility import fits_together
+from ...model.compatibility import fits_together, one_state
 from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import LinearSystem, Springs, System
@@ -90,6 +90,7 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     at = state_argument(at, v, y)
     system = a_system(system).for_state_shapes(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, method)
+    one_state("stability_limit", method)
     t = checks.number("t", t)
     if at is None and not system.linear:
         bound = ", or ask its safe_step for a bound" if isinstance(system, Springs) else ""

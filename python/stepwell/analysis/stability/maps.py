@@ -13,6 +13,7 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Blocks, Shape
+from ...model.compatibility import one_state
 from ...model.methods import Method
 from ...model.parameters import aligned
 from ...model.systems import System
@@ -35,6 +36,7 @@ def transition(system: System, method: Method, dt: Array) -> Array:
 
     For one step length the core computes it; for several, the reference does so at once, with the same bits.
     """
+    one_state("P", method)
     free = system.without_inputs()
     if method.is_exact:
         return exact.transition(free, dt)
@@ -73,6 +75,7 @@ def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: A
     It is computed by the complex step where the system's reference accepts complex numbers and the method needs no derivatives,
     else from the tape of the step. A projection of the system onto its energy is part of the step.
     """
+    one_state("P", method)
     members = together(system, dt, v, y)
     slot = _started(system, method, dt, members, t, v, y) if method.carry else v
     if method.has_derivatives or not system.complex_step:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
-from ...model.compatibility import fits_together
+from ...model.compatibility import fits_together, one_state
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
 from ...model.parameters import aligned
@@ -35,6 +35,7 @@ def safe_step(springs: Springs, method: str | Method) -> Any:
     """The step below which a method is stable on a net, from bounds: see ``Springs.safe_step``."""
     method = find_method(method)
     fits_together(springs, method)
+    one_state("safe_step", method)
     by_mass = 1.0 / springs.masses
     by_mass = np.array(np.broadcast_to(by_mass, (springs.n, *by_mass.shape[1:])))
     by_mass[springs.fixed] = 0.0

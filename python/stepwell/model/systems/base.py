@@ -383,10 +383,10 @@ class System(Immutable, ValueEquality, ABC):
         return changed(self, _free=self.uncontrolled, around=self._around_with(control), velocity_term="energy control")
 
     def stepped_by(self, method: Method) -> Self:
-        """This system for a method: if v and y of its stages belong to different times, a control acts between steps."""
+        """This system for a method: if what its stages use is of different times, a control acts between steps."""
         if self.control is None:
             return self
-        between = method.needs_acceleration or method.has_series
+        between = method.needs_acceleration or method.has_series or bool(method.kept)
         if getattr(self.control, "between", between) == between:
             return self
         return changed(self, around=self._around_with(changed(self.control, between=between)))

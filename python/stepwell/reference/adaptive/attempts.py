@@ -126,9 +126,14 @@ def tried(pair: Pair, system: Attempted, t: Any, step: Any, v: Array, y: Array, 
     s = system.rates(step)
     if axes is not None:
         s.axes = axes
-    increments = pair.stages(s, t, step, v, y)
-    v1, y1 = tableau.plus(v, y, pair.WEIGHTS, increments)
-    weights = [pair.ERROR, *([coarse] if (coarse := getattr(pair, "COARSE", None)) else [])]
-    errors = [tableau.combined(each, increments) for each in weights]
+    errors: list[tuple[Array, Array]]
+    if hasattr(pair, "attempt"):  # a user's method, which is not a tableau
+        v1, y1, *error = pair.attempt(s, t, step, v, y)
+        errors = [(error[0], error[1])]
+    else:
+        increments = pair.stages(s, t, step, v, y)
+        v1, y1 = tableau.plus(v, y, pair.WEIGHTS, increments)
+        weights = [pair.ERROR, *([coarse] if (coarse := getattr(pair, "COARSE", None)) else [])]
+        errors = [tableau.combined(each, increments) for each in weights]
     v2, y2, work = system.project(v1, y1)
     return Tried(v1, y1, errors, (v2, y2), s.work / step if hasattr(s, "work") else work)

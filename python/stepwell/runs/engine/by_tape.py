@@ -135,15 +135,21 @@ def blocks_of(v: Array, y: Array, rows: Array) -> Blocks:
     return rows[:n_v].reshape(v.shape), rows[n_v : n_v + n_y].reshape(y.shape)
 
 
-def evaluated_step(plan: Plan, s: Any) -> reference.Step:
-    """A step, which adds the work of a control to ``s.work``."""
+def evaluated_step(plan: Plan, s: Any) -> Callable[[float, Array, Array, list[Array]], list[Array]]:
+    """A step, with what the method keeps behind v and y, which adds the work of a control to ``s.work``."""
     next_rows = evaluated(plan, "step")
 
-    def step(t: float, v: Array, y: Array) -> Blocks:
+    def step(t: float, v: Array, y: Array, kept: list[Array]) -> list[Array]:
+        rows = [*rows_of(plan, v, y), *(row for block in kept for row in block.reshape(-1, *plan.batch))]
         if plan.system.control is None:
-            return blocks_of(v, y, next_rows(rows_of(plan, v, y), t))
-        *_, s.work = out = next_rows([*rows_of(plan, v, y), np.asarray(s.work, dtype=plan.dtype)], t)
-        return blocks_of(v, y, out)
+            out = next_rows(rows, t)
+        else:
+            *_, s.work = out = next_rows([*rows, np.asarray(s.work, dtype=plan.dtype)], t)
+        blocks, ends = [v, y, *kept], np.cumsum([len(each.reshape(-1, *plan.batch)) for each in (v, y, *kept)])
+        return [
+            out[end - len(each.reshape(-1, *plan.batch)) : end].reshape(each.shape)
+            for each, end in zip(blocks, ends, strict=True)
+        ]
 
     return step
 

@@ -15,7 +15,7 @@ from ...model.parameters import rows
 from ...reference import contact
 from ...reference import run as reference
 from ...reference.signal import of_slot, over
-from .by_tape import evaluated_slot, evaluated_step
+from .by_tape import evaluated, evaluated_slot, evaluated_step, rows_of
 from .plan import Arrays, Outcome, Plan, model, per_step
 
 Looped = tuple[Array, Array, Blocks, Whole]
@@ -43,14 +43,21 @@ def _run_by_reference(plan: Plan, v: Array, y: Array, before: Whole, carried: bo
     if plan.single:
         v, y = v.astype(plan.dtype), y.astype(plan.dtype)
 
-    def plain(t: float, v: Array, y: Array) -> Blocks:
-        blocks: Blocks = contact.step(steps, s, plan.choice, t, plan.dt, v, y)
-        return blocks
+    def plain(t: float, v: Array, y: Array, kept: list[Array]) -> Any:
+        return contact.step(steps, s, plan.choice, t, plan.dt, v, y, *kept)
 
-    step = evaluated_step(plan, s) if plan.by_tape else plain
-    slot = v if carried else to_slot(plan, v, y)
+    make = evaluated_step(plan, s) if plan.by_tape else plain
+    slot, *kept = to_blocks(plan, v if carried else to_slot(plan, v, y))
+
+    def step(t: float, v: Array, y: Array) -> Blocks:
+        nonlocal kept
+        v, y, *kept = make(t, v, y, kept)
+        return v, y
+
     slot, y, saved, first_bad = looped(plan, step, slot, y, before, plan.block_axes, to_velocity(plan))
     out = finished(plan, slot, saved, first_bad)
+    if plan.method.kept:
+        out = out._replace(slot=_joined(plan, [slot, *kept]))
     with np.errstate(all="ignore"):
         recorded = {
             name: _stacked((s.record(name, *state) for state in zip(out.v, out.y, strict=True)), plan.save_count)
@@ -58,6 +65,23 @@ def _run_by_reference(plan: Plan, v: Array, y: Array, before: Whole, carried: bo
         }
     work = None if plan.system.control is None else np.broadcast_to(np.asarray(s.work), plan.batch).copy()
     return out._replace(recorded=recorded, work=per_step(plan, work))
+
+
+def to_blocks(plan: Plan, slot: Array) -> list[Array]:
+    """v, or what is carried in its place, and the blocks that the method keeps."""
+    if not plan.method.kept:
+        return [slot]
+    shapes = [plan.system.v_shape, *((plan.system.y_shape, plan.system.v_shape)[of_v] for of_v in plan.method.kept_of_v)]
+    ends = np.cumsum([prod(shape) for shape in shapes])[:-1]
+    parts = np.split(slot, ends)
+    return [part.reshape((*shape, *slot.shape[1:])) for part, shape in zip(parts, shapes, strict=True)]
+
+
+def _joined(plan: Plan, blocks: list[Any]) -> Array:
+    """V and the blocks that the method keeps, as rows: undoes ``to_blocks``."""
+    shapes = [plan.system.v_shape, *((plan.system.y_shape, plan.system.v_shape)[of_v] for of_v in plan.method.kept_of_v)]
+    wide = [np.broadcast_to(block, (*shape, *plan.batch)) for block, shape in zip(blocks, shapes, strict=True)]
+    return np.concatenate([block.reshape((prod(shape), *plan.batch)) for block, shape in zip(wide, shapes, strict=True)])
 
 
 def _stacked(states: Iterable[Array], count: int) -> Array:
@@ -109,11 +133,19 @@ def looped(
 
 
 def to_slot(plan: Plan, v: Array, y: Array) -> Array:
-    """What the method carries at the first step."""
-    if plan.method.carry is None:
+    """What the method carries at the first step; v and what it keeps, as rows, if it does."""
+    if not plan.method.begins:
         return v
     t = plan.t0 + plan.first * plan.dt
     with np.errstate(all="ignore"):
+        if plan.method.kept:
+            if plan.by_tape:
+                rows = evaluated(plan, "start")(rows_of(plan, v, y), t)
+                n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
+                return np.concatenate([rows[:n_v], rows[n_v + n_y :]])
+            with over(of_slot(t, plan.dt)):
+                begun: Any = plan.method.steps
+                return _joined(plan, [v, *begun.start(plan.scaled(), plan.choice, t, plan.dt, v, y)])
         if plan.by_tape:
             return evaluated_slot(plan, "start")(t, v, y)
         with over(of_slot(t, plan.dt)):
@@ -136,11 +168,12 @@ def run_by_core(
     plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
     """The run by the core. ``carries`` is whether it returns a carry, as the method does if None."""
-    carries = plan.method.carry is not None if carries is None else carries
+    carries = plan.method.begins if carries is None else carries
     count = plan.save_count
     empty = np.empty if count * (v.size + y.size) < buffer_pool.LEAST_POOLED // 8 else buffer_pool.empty
-    saved_v, saved_y = empty((count, *v.shape), plan.dtype), empty((count, *y.shape), plan.dtype)
-    carry = np.empty(v.shape, plan.dtype) if carries else None
+    shape_of_v = (*plan.system.v_shape, *plan.batch) if plan.method.kept else v.shape
+    saved_v, saved_y = empty((count, *shape_of_v), plan.dtype), empty((count, *y.shape), plan.dtype)
+    carry = np.empty(plan.slot_shape if plan.method.kept else v.shape, plan.dtype) if carries else None
     recorded = None
     if plan.record:
         shapes = {name: plan.system.quantities[name] for name in plan.record}

@@ -123,7 +123,7 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
         linear_map[BEGINS] = plan.t0
     parameters = flat(linear_map, plan.batch)
     nodes = list(exact.nodes_of(plan))
-    return _core.ModelSpec("matrix", plan.method.name, parameters, matrix=(nodes, n_v), fused=plan.fused, single=plan.single)
+    return _core.ModelSpec("matrix", plan.method.key, parameters, matrix=(nodes, n_v), fused=plan.fused, single=plan.single)
 
 
 def _matrix_step(plan: Plan, P: Array, Q: Array) -> Callable[[float, Array], Array]:

@@ -97,6 +97,19 @@ class Plan(NamedTuple):
         return self.fused or self.single or self.method.has_derivatives
 
     @property
+    def slot_shape(self) -> Shape:
+        """The shape of the slot of v; behind the numbers of v, in one axis, stand those that the method keeps, if it does."""
+        if not self.method.kept:
+            return (*self.system.v_shape, *self.batch)
+        n_v, n_y = prod(self.system.v_shape), prod(self.system.y_shape)
+        return (n_v + self.method.kept_numbers(n_v, n_y), *self.batch)
+
+    @property
+    def slot_axes(self) -> int:
+        """The number of axes of the slot of a member."""
+        return 1 if self.method.kept else len(self.system.v_shape)
+
+    @property
     def members(self) -> int:
         """The number of trajectories."""
         return prod(self.batch)
@@ -111,14 +124,15 @@ class Arrays(NamedTuple):
     """The arrays of a run for the core: those it starts from and those it fills.
 
     Attributes:
-        v: rows of the v slot, with one number for each member or one for all.
+        v: rows of the v slot, with one number for each member or one for all; behind them those that the method keeps, if
+            ``carried``.
         y: rows of y, likewise.
-        carried: whether the v slot holds the carry of the method instead of velocities.
+        carried: whether the v slot holds the carry of the method instead of velocities, and what it keeps.
         saved_v: the saved velocities (in the matrix form: v slots), shape (saved, *block, *batch).
         saved_y: the saved coordinates.
         recorded: recorded quantities, shape (saved, numbers, *batch); None if there are none.
         tally: for each member the sum that a control or projection accumulates; None without one.
-        carry: the last v slots; None if the method carries v.
+        carry: the last v slots, and what the method keeps; None if it carries v and keeps nothing.
         first_bad: for each member the first step that was not finite, −1 for none; read and written.
     """
 
@@ -172,7 +186,7 @@ def model(plan: Plan) -> _core.ModelSpec:
             if isinstance(value, np.ndarray):
                 checks.fits_single(name, value)
         options["single"] = True
-    return _core.ModelSpec(plan.system.kernel, plan.method.name, parameters, **options)
+    return _core.ModelSpec(plan.system.kernel, plan.method.key, parameters, **options)
 
 
 def per_step(plan: Plan, work: Array | None) -> Array | None:

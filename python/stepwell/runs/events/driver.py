@@ -90,7 +90,7 @@ class _Driver(Collected):
         self.saves = plan.saves
         blocks = plan.system.v_shape, plan.system.y_shape
         self.saved = tuple(np.empty((len(self.saves), *shape, total)) for shape in blocks)
-        self.slot = np.empty((*blocks[0], total))
+        self.slot = np.empty((*plan.slot_shape[: plan.slot_axes], total))
         self.first_bad = np.full(total, -1, dtype=np.int64)
         self.done = 0
         #: Members with a quantity that is near zero at the end of the last steps.
@@ -100,7 +100,8 @@ class _Driver(Collected):
     def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
         plan, total = self.plan, self.plan.members
         numbers = max(1, prod(plan.system.v_shape) + prod(plan.system.y_shape))
-        v, y = v.reshape(*plan.system.v_shape, total), y.reshape(*plan.system.y_shape, total)
+        axes = v.ndim - len(plan.batch)  # of v, or of the slot if carried
+        v, y = v.reshape(*v.shape[:axes], total), y.reshape(*plan.system.y_shape, total)
         bad = self.first_bad.copy() if before is None else before.reshape(-1)
         size = max(1, NUMBERS_AT_ONCE // numbers)
         # In float32 the core's quantities are too coarse to notice all changes of sign.
@@ -245,7 +246,8 @@ class _Driver(Collected):
     def _outcome(self) -> engine.Outcome:
         """The outcome as of a run without events, without the sum of a control."""
         batch, blocks = self.plan.batch, (self.plan.system.v_shape, self.plan.system.y_shape)
-        shapes = (len(self.saves), *blocks[0]), (len(self.saves), *blocks[1]), blocks[0]
+        of_slot = self.plan.slot_shape[: self.plan.slot_axes]
+        shapes = (len(self.saves), *blocks[0]), (len(self.saves), *blocks[1]), of_slot
         v, y, slot = (
             each.reshape((*shape, *batch)).astype(self.plan.dtype, copy=False)
             for each, shape in zip((*self.saved, self.slot), shapes, strict=True)
@@ -333,7 +335,7 @@ class _Resetting(_Driver):
         gone, self.rests[member] = ~np.isnan(arrived.t), arrived.rests
         self.stopped_at[member[gone]] = arrived.t[gone]
         slot = out.slot
-        if now.method.carry is not None:
+        if now.method.begins:
             anew = self.members.plan(member)._replace(first=now.first + now.steps)
             slot[..., which] = engine.to_slot(anew, arrived.v, arrived.y)
         else:

@@ -166,10 +166,10 @@ class Frames(Collected):
 
     def _write(self, step: int, index: Whole, v: Array, y: Array) -> None:
         """Write the states of these members at this step, and leave the carry of the others as it is."""
-        carry = self._loop.carry() if self.plan.method.carry is not None else None
+        carry = self._loop.carry() if self.plan.method.begins else None
         for block, new in zip(self._blocks, (v, y), strict=True):
             block.reshape(*new.shape[:-1], len(self._all))[..., index] = new
         if carry is not None:
-            slot = carry.reshape(*v.shape[:-1], len(self._all))
+            slot = carry.reshape(*self.plan.slot_shape[: self.plan.slot_axes], len(self._all))
             slot[..., index] = engine.to_slot(self.members.plan(index)._replace(first=step), v, y)
             self._loop.carry_on(carry)

@@ -86,17 +86,20 @@ class Trials:
             return self._single_step(self._singles, index, t, h.astype(np.float32).astype(np.float64), v, y)
 
     def _parts(self) -> list[str]:
-        """The parts of a step; what a method carries in place of v is computed again for its length."""
+        """The parts of a step; what a method carries or keeps is computed again for its length."""
+        if self._plan.method.kept:
+            return ["start", "step"]
         return ["step"] if self._plan.method.carry is None else ["start", "step", "finish"]
 
     def _single_step(self, steps: list[Steps], index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         rows: list[Any] = [*_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
         works = [np.zeros(len(index))] if self._plan.system.control is not None else []
         n_v, n = len(_rows(v, self._plan.system.v_shape)), len(rows)
+        numbers = n + self._plan.method.kept_numbers(n_v, n - n_v)
         for part, each in zip(self._parts(), steps, strict=True):
             at = t + h if part == "finish" else t
-            rows = each([*rows, *works], at, h, *by_tape.some_of(each, index))[:n]
-        return _block(rows[:n_v], v), _block(rows[n_v:], y)
+            rows = each([*rows, *works], at, h, *by_tape.some_of(each, index))[:numbers]
+        return _block(rows[:n_v], v), _block(rows[n_v:n], y)
 
     def rates(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """By how much v and y of these members would change in a step of this length at their rates here."""
@@ -224,9 +227,14 @@ def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple
 
 def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
     """A step of a method from v and y; what it carries in place of v is computed again for this length."""
-    steps, carries = plan.method.steps, plan.method.carry is not None
+    steps: Any = plan.method.steps
     s.axes = plan.block_axes  # behind these are those of members, each with a length of its own
-    if not carries:
+    if plan.method.kept:
+        with over(of_slot(t, h)):
+            kept = steps.start(s, plan.choice, t, h, v, y)
+        v, y, *_ = contact.step(steps, s, plan.choice, t, h, v, y, *kept)
+        return v, y
+    if plan.method.carry is None:
         return tuple(contact.step(steps, s, plan.choice, t, h, v, y))
     with over(of_slot(t, h)):
         slot = steps.start(s, plan.choice, t, v, y)
@@ -245,7 +253,10 @@ def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any)
     else:
         s = system.rates(h)
         s.axes = plan.block_axes
-        v, y = tableau.plus(v, y, steps.WEIGHTS, steps.stages(s, t, h, v, y))
+        if hasattr(steps, "attempt"):  # a user's method, which is not a tableau
+            v, y = steps.step(s, t, h, v, y)
+        else:
+            v, y = tableau.plus(v, y, steps.WEIGHTS, steps.stages(s, t, h, v, y))
     v, y, _ = system.project(v, y)
     return v, y
 

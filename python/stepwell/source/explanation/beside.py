@@ -13,14 +13,14 @@ from ...reference.traced import Tracer
 from ...runs.engine import Plan
 from .formula import Formula, Notation
 from .listing import Leaf, Section, Writer
-from .naming import indexed, parameters
+from .naming import indexed, kept, parameters
 
 
 def lines_beside(plan: Plan, choice: int, record: Sequence[str]) -> tuple[Section, ...]:
-    """The sections of the start and the finish of a method with a carry, and of the recorded quantities."""
+    """The sections of a method's start and finish, where it begins with more than its state, and of the recorded quantities."""
     sections = []
-    if plan.method.carry is not None:
-        for which in ("start", "finish"):
+    if plan.method.begins:
+        for which in ("start", "finish") if plan.method.carry is not None else ("start",):
             sections.append(_lines(plan, which, partial(Tracer.slot, method=plan.method, which=which, choice=choice)))
     for name in record:
         sections.append(_lines(plan, f"record {name}", partial(Tracer.record, names=[name])))
@@ -39,8 +39,12 @@ def _lines(plan: Plan, when: str, traced: Callable[[Tracer], list[Any]]) -> Sect
     makes = {"start": carry, "finish": "v"}.get(when, when.removeprefix("record "))
     blocks = [(reads, system.v_shape), ("y", system.y_shape)]
     of_state = [indexed(name, index) for name, shape in blocks for index in np.ndindex(shape)]
-    results = [indexed(makes, index) for index in np.ndindex(system.v_shape if is_end else system.quantities[makes])]
-    wanted = symbols[: len(results)]
+    if when == "start" and plan.method.kept:
+        results = [indexed(name, index) for name, shape in kept(plan) for index in np.ndindex(shape)]
+        wanted = symbols[len(symbols) - len(results) :]
+    else:
+        results = [indexed(makes, index) for index in np.ndindex(system.v_shape if is_end else system.quantities[makes])]
+        wanted = symbols[: len(results)]
     # Recorded quantities are computed without fused multiply-adds.
     on, wanted = tape.fused(wanted) if plan.fused and is_end else (tape, wanted)
     params = [tape.param(i) for i in range(len(numbers))]

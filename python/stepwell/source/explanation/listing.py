@@ -286,7 +286,7 @@ def line_of_matrices(plan: Plan) -> tuple[Section, ...]:
 
 def lines_of_program(plan: Plan, attempts: bool) -> tuple[Section, ...]:
     """The operations of a method on blocks."""
-    entries, results = _core.program(plan.method.name, attempts=attempts)
+    entries, results = _core.program(plan.method.key, attempts=attempts)
     carry = plan.method.carry or "v"
     called = dict(zip(results, [f"{carry}'", "y'", "error_v", "error_y", "coarse_v", "coarse_y"], strict=False))
     counts: Counter[str] = Counter()

@@ -41,6 +41,7 @@ class Named(Tracer):
 
     def step(self, method: Any, choice: int = 0) -> list[Any]:
         """The slots after a step, of which the parts of its elimination are named, too."""
+        self._taken.update(method.kept)  # a user's names of these may be those of increments
         with pivoting.noting(self._note_part):
             return super().step(method, choice)
 
@@ -146,9 +147,15 @@ def named_numbers(plan: Plan, values: Mapping[str, Any]) -> tuple[list[str], lis
     return numbers, tables
 
 
+def kept(plan: Plan) -> list[tuple[str, Shape]]:
+    """The blocks that the method keeps beside the state, with their shapes."""
+    shapes = plan.system.y_shape, plan.system.v_shape
+    return [(name, shapes[of_v]) for name, of_v in zip(plan.method.kept, plan.method.kept_of_v, strict=True)]
+
+
 def states(plan: Plan, attempts: bool, mark: str = "") -> list[str]:
     """The names of the numbers of a state, with a mark behind them."""
-    blocks = [(plan.method.carry or "v", plan.system.v_shape), ("y", plan.system.y_shape)]
+    blocks = [(plan.method.carry or "v", plan.system.v_shape), ("y", plan.system.y_shape), *kept(plan)]
     names = [indexed(name + mark, index) for name, shape in blocks for index in np.ndindex(shape)]
     beside: list[str] = [] if plan.system.control is None else ["work"]
     if attempts:

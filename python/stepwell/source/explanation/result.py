@@ -227,6 +227,8 @@ class Explanation(ValueEquality):
     def _when(self, section: Section) -> str:
         """How often a section is computed, in words; for one member without the members."""
         if section.when in BESIDE:
+            if self.method.kept:
+                return f"at the start of a run, {', '.join(self.method.kept)} from v and y"
             return BESIDE[section.when].format(carry=self.method.carry)
         if section.when.startswith("record "):
             return "recorded of a state that is kept"
@@ -254,7 +256,7 @@ class Explanation(ValueEquality):
 
     def _gamma(self) -> str:
         """The factor of h·J in the equations of an implicit step."""
-        gammas = [share for name, _, share in _core.program(self.method.name)[0] if name == "implicit v"]
+        gammas = [share for name, _, share in _core.program(self.method.key)[0] if name == "implicit v"]
         return "" if gammas in ([], [1.0]) else f"{gammas[0]:.6g}·"
 
     def words(self) -> list[str]:
@@ -277,6 +279,8 @@ class Explanation(ValueEquality):
         for name, meaning in known.items():
             if any(_names(name, each) for each in text):
                 shown.append(meaning if name in MEANINGS else f"{name}: {meaning}")
+        if self.method.kept:
+            shown.append(f"{', '.join(self.method.kept)}: what is kept between steps beside v and y")
         if self.method.carry:
             shown.append(f"{self.method.carry}: what is carried in place of v between steps")
         return [f"Names: {'; '.join(shown)}."] if shown else []

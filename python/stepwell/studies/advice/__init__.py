@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from ...base import checks
 from ...errors import ArgumentError, TooLargeError, UnsupportedError
+from ...model.compatibility import one_state
 from ...model.methods import Method, choice
 from ...runs import float32
 from ...runs.integration import quietly
@@ -219,6 +220,7 @@ def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
         return "adaptive steps do not work with surfaces"
     dt = TIMED_STEP * scene.dt
     try:
+        one_state("advice", candidate.method)
         if candidate.dtype == "float32":
             float32.step(scene.system, candidate.method, "direct", grid.dt(candidate.first))
             float32.check_inputs(scene.system, (1.0 + SINGLE_STEP_ROUNDING) * grid.end)

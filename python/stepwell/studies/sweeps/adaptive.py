@@ -178,11 +178,11 @@ class Pieces:
 
     Args:
         system: the system of the chunk.
-        method: the name of the method.
+        method: the method.
         looks: whether stiffness is looked for.
     """
 
-    def __init__(self, system: System, method: str, *, looks: bool) -> None:
+    def __init__(self, system: System, method: Method, *, looks: bool) -> None:
         self.system, self._method, self._looks = system, method, looks
         self._last: tuple[Run, Request] | None = None
         self._waypoints: Array | None = None

@@ -11,7 +11,6 @@ import numpy as np
 
 from ... import _core
 from ...base.reprs import counted
-from ...model.methods import method as find_method
 from ...model.systems import System
 from ...runs.events import Event
 from .axes import Grid
@@ -38,7 +37,7 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
     identity: dict[str, Any] = {
         "stepwell": str(_core.__version__),
         "system": system.kind_name,
-        "method": task.method,
+        "method": task.method.key,
         "steps": task.steps,
         "transient": task.transient,
         "observe": task.observe,
@@ -53,11 +52,11 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
     if task.at is not None:
         identity["at"] = _digest(task.at)
     attrs: dict[str, Any] = {
-        "title": f"{system.kind_name} by {find_method(task.method).title}: a sweep of {counted(grid.members, 'member')}",
+        "title": f"{system.kind_name} by {task.method.title}: a sweep of {counted(grid.members, 'member')}",
         "stepwell_version": str(_core.__version__),
         "numpy_version": np.__version__,
         "system": repr(task.system) if isinstance(task.system, System) else system.kind_name,
-        "method": task.method,
+        "method": task.method.name,
         **_step_facts(task, grid),
         "t0": task.options["t0"],
         "fused": int(task.options["fused"]),

@@ -205,7 +205,7 @@ def sweep(
             raise ArgumentError("steps: expected with fixed steps; or give tolerance= and at= for adaptive steps")
     task = Task(
         system=system,
-        method=method.name,
+        method=method,
         options=arguments,
         transient=0 if transient is None else checks.count("transient", transient, 0),
         steps=0 if steps is None else checks.count("steps", steps, 1),

@@ -10,6 +10,7 @@ import numpy as np
 from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError
+from ...model.methods import Method
 from ...model.systems import System
 from .outcomes import Outcome, Results, Variable
 
@@ -46,7 +47,7 @@ class Exponents(Outcome):
     def of_start(
         self,
         system: System,
-        method: str,
+        method: Method,
         options: dict[str, Any],
         transient: int,
         steps: int,

@@ -18,6 +18,7 @@ from ...base import checks
 from ...base.arrays import Array
 from ...errors import ShapeError, UnsupportedError
 from ...model.compatibility import velocities
+from ...model.methods import Method
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ...runs.diagnostics import of_a_strong_control
@@ -49,7 +50,7 @@ class Task(NamedTuple):
 
     Attributes:
         system: a system, or a callable that makes one from parameters by name.
-        method: the name of the method.
+        method: the method.
         options: further arguments of ``integrate``, the same for all members.
         transient: the number of steps before the observed ones.
         steps: the number of observed steps.
@@ -62,7 +63,7 @@ class Task(NamedTuple):
     """
 
     system: Any
-    method: str
+    method: Method
     options: dict[str, Any]
     transient: int
     steps: int

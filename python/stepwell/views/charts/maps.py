@@ -16,7 +16,7 @@ from ...base.immutable import ValueEquality
 from ...base.pictures import drawn
 from ...base.tables import Table
 from ...errors import ArgumentError, ShapeError
-from ...model.compatibility import fits_together
+from ...model.compatibility import fits_together, one_state
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
 from ...model.systems import Oscillator
@@ -249,6 +249,7 @@ def stability_map(
     rows = 1 if damping is None else rows
     # One oscillator is refused in fewer words than all.
     fits_together(Oscillator(damping=None if damping is None else most), chosen)
+    one_state("method", chosen)
     checks.fits("size: the matrices", 48, (rows, columns), "ask for fewer points")
 
     if phi is None:

@@ -21,7 +21,7 @@ from ...base.literals import RunForm
 from ...base.pictures import Drawn
 from ...base.tables import Table, stacked
 from ...errors import ArgumentError, ShapeError, UnsupportedError
-from ...model.compatibility import fits_together
+from ...model.compatibility import fits_together, one_state
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
 from ...model.systems import Oscillator, System
@@ -129,6 +129,7 @@ def powers(
     chosen = find_method(method)
     system = Oscillator() if system is None else a_system(system)
     fits_together(system, chosen)
+    one_state("form", chosen)
     if not system.linear:
         raise UnsupportedError(f"system: only linear systems have powers, and {system!r} is not linear")
     if system.batch:

@@ -39,6 +39,8 @@ impl<T: Real> SideStage<T> {
 pub struct Lanes<T: Real = f64> {
     tapes: Arc<Tapes<T>>,
     shape: Shape,
+    /// Numbers of a member that the method keeps behind both slots.
+    kept: usize,
     recorded: usize,
     level: Level,
     clock: Clock,
@@ -68,7 +70,7 @@ impl<T: Traceable> Lanes<T> {
         let tapes = traced.tapes_of::<T>()?;
         let step = PreparedStage::with(&tapes.step, compiled, spec, clock, f64::INFINITY);
         let lanes = step.lanes();
-        let numbers = traced.shape.v + traced.shape.y + traced.tally;
+        let numbers = traced.shape.v + traced.shape.y + traced.kept + traced.tally;
         let side = |stage: &Option<Stage<T>>| stage.as_ref().map(|stage| SideStage::new(stage, spec, level, lanes, clock));
         Ok(Lanes {
             state: Aligned::new(numbers * lanes),
@@ -81,6 +83,7 @@ impl<T: Traceable> Lanes<T> {
             step,
             tapes,
             shape: traced.shape,
+            kept: traced.kept,
             recorded: traced.recorded,
         })
     }
@@ -96,6 +99,11 @@ impl<T: Traceable> Lanes<T> {
     fn sizes(&self) -> (usize, usize) {
         let lanes = self.step.lanes();
         (self.shape.v * lanes, self.shape.y * lanes)
+    }
+
+    /// Numbers before the tally.
+    fn before_tally(&self) -> usize {
+        (self.shape.v + self.shape.y + self.kept) * self.step.lanes()
     }
 }
 
@@ -135,10 +143,12 @@ impl<T: Traceable> Group<T> for Lanes<T> {
     }
 
     fn start(&mut self, k: i64) {
-        let v = self.sizes().0;
+        let (v, y) = self.sizes();
+        let (slots, tally) = (v + y, self.before_tally());
         if let (Some(side), Some(stage)) = (&mut self.start, &self.tapes.start) {
             let made = side.run(stage, &self.clock, k, &self.state);
             self.state[..v].copy_from_slice(&made[..v]);
+            self.state[slots..tally].copy_from_slice(&made[slots..tally]);
         }
     }
 
@@ -189,12 +199,21 @@ impl<T: Traceable> Group<T> for Lanes<T> {
     }
 
     fn tally(&self) -> &[T] {
-        let (v, y) = self.sizes();
-        &self.state[v + y..]
+        &self.state[self.before_tally()..]
     }
 
     fn tally_mut(&mut self) -> &mut [T] {
+        let before = self.before_tally();
+        &mut self.state[before..]
+    }
+
+    fn kept(&self) -> Vec<&[T]> {
         let (v, y) = self.sizes();
-        &mut self.state[v + y..]
+        if self.kept == 0 { Vec::new() } else { vec![&self.state[v + y..self.before_tally()]] }
+    }
+
+    fn kept_mut(&mut self) -> Vec<&mut [T]> {
+        let ((v, y), tally) = (self.sizes(), self.before_tally());
+        if self.kept == 0 { Vec::new() } else { vec![&mut self.state[v + y..tally]] }
     }
 }

@@ -42,7 +42,7 @@ pub trait Group<T: Real = f64>: Send + Sync {
     /// Both slots, to write.
     fn slots_mut(&mut self) -> (&mut [T], &mut [T]);
 
-    /// Turns velocities in the `v` slot into what the method carries, at step `k`.
+    /// Turns velocities in the `v` slot into what the method carries, and makes what it keeps, at step `k`.
     fn start(&mut self, k: i64);
 
     /// `n` steps from step `k`.
@@ -68,6 +68,16 @@ pub trait Group<T: Real = f64>: Send + Sync {
 
     /// Records the present state, whose v slot is finished: rows of lanes.
     fn record(&mut self, rows: &mut [T]);
+
+    /// The blocks that the method keeps between steps beside both slots, each as rows of lanes.
+    fn kept(&self) -> Vec<&[T]> {
+        Vec::new()
+    }
+
+    /// The same blocks, to write.
+    fn kept_mut(&mut self) -> Vec<&mut [T]> {
+        Vec::new()
+    }
 
     /// The sums over the steps, such as the work of a control, and what is watched: rows of lanes, or nothing.
     fn tally(&self) -> &[T];

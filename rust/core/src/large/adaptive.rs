@@ -12,7 +12,7 @@ use crate::{
     error::Error,
     group::AdaptiveBatch,
     isa::Level,
-    model::{around::controls, spec::Spec, steppers::method},
+    model::{around::controls, methods::method, spec::Spec},
     stage::{Clock, Stop},
     step::{
         key::StepKind,
@@ -46,7 +46,7 @@ impl LargeAdaptive {
         budget: f64,
     ) -> Result<LargeAdaptive, Error> {
         let StepKind::Attempts { name, acceptance, backward, .. } = &traced.key().how else { return Err(Error::NoEstimate) };
-        let order = method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?.order;
+        let order = method(name)?.error_order.ok_or(Error::NoEstimate)?;
         let blocks = Blocks::new(schedules, rates, traced.shape);
         let executor = blocks.executor(&blocks.schedules.step, level, &Clock::NONE);
         let pushes = controls::pushes(&traced.key().signature);

@@ -12,8 +12,8 @@ use crate::{
     error::Error,
     isa::Level,
     model::{
+        methods::method,
         program::{Block, Program},
-        steppers::method,
         system::Shape,
     },
     stage::Clock,
@@ -28,6 +28,8 @@ pub struct Schedules {
     pub start: Option<BlockSchedule>,
     /// Turns what the method carries into velocities.
     pub finish: Option<BlockSchedule>,
+    /// Of each block that the method keeps, whether it has the numbers of v.
+    pub kept: Vec<bool>,
 }
 
 /// The name of the method, its way to start in steps of fixed length, and what it relies on.
@@ -51,19 +53,20 @@ impl Schedules {
 
     fn new(name: &str, choice: Option<usize>, traits: RateTraits, shape: Shape) -> Result<Schedules, Error> {
         let method = method(name)?;
-        let schedule = |program: Program| {
-            // A program of one result changes the block v alone.
-            let results: Vec<Block> = match program.results[..] {
-                [v] => vec![v, Block::Y],
-                _ => program.results.clone(),
-            };
-            BlockSchedule::new(&program, &results, if choice.is_some() { Goal::State } else { Goal::Attempt }, traits, shape)
+        let goal = if choice.is_some() { Goal::State } else { Goal::Attempt };
+        let schedule = |program: &Program| BlockSchedule::new(program, &program.results, goal, traits, shape);
+        // Those that change the block v alone, and make what is kept.
+        let of_slot = |program: &Program| {
+            let mut results = program.results.clone();
+            results.insert(1, Block::Y);
+            BlockSchedule::new(program, &results, goal, traits, shape)
         };
         let step = if choice.is_some() { Some(method.program()) } else { method.attempt() };
         Ok(Schedules {
             step: schedule(step.ok_or(Error::NoEstimate)?),
-            start: choice.and_then(|choice| method.start(choice)).map(schedule),
-            finish: choice.and_then(|choice| method.finish(choice)).map(schedule),
+            start: choice.and_then(|choice| method.start(choice)).map(of_slot),
+            finish: choice.and_then(|choice| method.finish(choice)).map(of_slot),
+            kept: method.kept.clone(),
         })
     }
 
@@ -96,6 +99,20 @@ impl Blocks {
 
     pub(crate) fn executor(&self, schedule: &BlockSchedule, level: Level, clock: &Clock) -> Executor {
         Executor::new(schedule, level, self.stride, clock)
+    }
+
+    /// How many numbers each block has that the method keeps; they are the rows behind both slots.
+    fn kept_sizes(&self) -> impl Iterator<Item = usize> {
+        self.schedules.kept.iter().map(|of_v| self.sizes[usize::from(!of_v)])
+    }
+
+    pub(crate) fn kept(&self) -> Vec<&[f64]> {
+        self.arena.chunks(self.stride).skip(2).zip(self.kept_sizes()).map(|(row, numbers)| &row[..numbers]).collect()
+    }
+
+    pub(crate) fn kept_mut(&mut self) -> Vec<&mut [f64]> {
+        let sizes: Vec<usize> = self.kept_sizes().collect();
+        self.arena.chunks_mut(self.stride).skip(2).zip(sizes).map(|(row, numbers)| &mut row[..numbers]).collect()
     }
 
     pub(crate) fn slots(&self) -> (&[f64], &[f64]) {

@@ -25,8 +25,10 @@ pub(crate) struct RowContacts {
     dim: usize,
     /// The slots before the step.
     before: [Vec<f64>; 2],
-    /// The slots after the step, and the velocities at both ends; used if the method carries something other than v.
+    /// The slots after the step, what the method keeps, and the velocities at both ends; used if it carries something other than v
+    /// or keeps anything.
     after: [Vec<f64>; 2],
+    kept: Vec<f64>,
     velocities: [Vec<f64>; 2],
     /// Whether each number belongs to a point that met a surface.
     touched: Vec<bool>,
@@ -50,7 +52,7 @@ impl RowContacts {
         let lanes = (0..lanes).map(|lane| Contacts::new(&parameters(spec, h, member(lane)))).collect::<Option<_>>()?;
         let none = || [Vec::new(), Vec::new()];
         let dim = dimensions(&spec.signature);
-        Some(RowContacts { lanes, dim, before: none(), after: none(), velocities: none(), touched: Vec::new() })
+        Some(RowContacts { lanes, dim, before: none(), after: none(), kept: Vec::new(), velocities: none(), touched: Vec::new() })
     }
 
     /// Copies the state before a step.
@@ -110,7 +112,14 @@ impl RowContacts {
     }
 
     /// Applies contact to the slots after a step from time t.
-    pub(super) fn after(&mut self, blocks: &mut Blocks, carry: Option<[&mut Executor; 2]>, t: f64, h: f64) {
+    pub(super) fn after(
+        &mut self,
+        blocks: &mut Blocks,
+        start: Option<&mut Executor>,
+        finish: Option<&mut Executor>,
+        t: f64,
+        h: f64,
+    ) {
         if self.lanes.iter().any(Contacts::are_joined) {
             let (v, y) = blocks.slots_mut();
             return self.resolve_joined(v, y);
@@ -118,15 +127,25 @@ impl RowContacts {
         if !self.is_near(blocks.slots().1) {
             return;
         }
-        let Some([start, finish]) = carry else {
+        let (end, schedules) = (t + h, Arc::clone(&blocks.schedules));
+        let (Some(finish), Some(to_v)) = (finish, &schedules.finish) else {
             let (v, y) = blocks.slots_mut();
             let v0 = std::mem::take(&mut self.before[0]);
             self.resolve(&v0, v, y);
             self.before[0] = v0;
+            if let (Some(start), Some(schedule)) = (start, &schedules.start) {
+                self.kept.clear();
+                blocks.kept().iter().for_each(|block| self.kept.extend_from_slice(block));
+                start.run(schedule, blocks.rates.as_mut(), blocks.sizes, end, h, &mut blocks.arena);
+                let mut before = self.kept.iter();
+                for block in blocks.kept_mut() {
+                    let numbers = block.iter_mut().zip(&self.touched).zip(&mut before);
+                    numbers.for_each(|((number, touched), before)| *number = if *touched { *number } else { *before });
+                }
+            }
             return;
         };
-        let (end, schedules) = (t + h, Arc::clone(&blocks.schedules));
-        let (Some(to_carry), Some(to_v)) = (&schedules.start, &schedules.finish) else { return };
+        let (Some(start), Some(to_carry)) = (start, &schedules.start) else { return };
         let (v, y) = blocks.slots();
         copy(&mut self.after, [v, y]);
         for (i, (state, t)) in [(&self.before, t), (&self.after, end)].into_iter().enumerate() {

@@ -115,13 +115,12 @@ impl Group for LargeGroup {
                 contacts.keep(self.blocks.slots());
             }
             let Blocks { schedules, rates, arena, sizes, stride } = &mut self.blocks;
-            rates.set_window(Some(window::of_step(t, h, self.start.is_some())));
+            rates.set_window(Some(window::of_step(t, h, self.finish.is_some())));
             self.step.run(&schedules.step, rates.as_mut(), *sizes, t, h, arena);
             let (v, y) = arena.split_at_mut(*stride);
             rates.project(&mut v[..sizes[0]], &mut y[..sizes[1]]);
             if let Some(contacts) = &mut self.contacts {
-                let carry = self.start.as_mut().zip(self.finish.as_mut()).map(|(start, finish)| [start, finish]);
-                contacts.after(&mut self.blocks, carry, t, h);
+                contacts.after(&mut self.blocks, self.start.as_mut(), self.finish.as_mut(), t, h);
             }
         }
     }
@@ -147,6 +146,14 @@ impl Group for LargeGroup {
         let (v, y) = (&arena[..sizes[0]], &arena[*stride..][..sizes[1]]);
         rates.cache_forces(y);
         rates.record(v, y, rows);
+    }
+
+    fn kept(&self) -> Vec<&[f64]> {
+        self.blocks.kept()
+    }
+
+    fn kept_mut(&mut self) -> Vec<&mut [f64]> {
+        self.blocks.kept_mut()
     }
 
     fn tally(&self) -> &[f64] {

@@ -21,9 +21,10 @@ use crate::{
 /// Operations from which on it is faster to keep a block in a row than to compute it again.
 const MIN_OPERATIONS_PER_ROW: usize = 4;
 
-/// The rows of the state, at the start of the step and, if it is the state that is changed, at its end.
+/// The row of the velocities, at the start of the step and, if it is the state that is changed, at its end. Behind both rows of
+/// the state are those of the blocks that the method keeps beside it.
 pub(crate) const V: usize = 0;
-/// Likewise of the coordinates.
+/// The row of the coordinates, likewise.
 pub(crate) const Y: usize = 1;
 
 /// Which rate.
@@ -90,7 +91,7 @@ pub struct BlockSchedule {
 /// The purpose of a schedule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
-    /// The first two results replace the state.
+    /// The first two results replace the state, the others the blocks that are kept beside it.
     State,
     /// The state stays, and rates are those of a system scaled to a step of 1, stretched to the step.
     Attempt,
@@ -158,7 +159,8 @@ impl BlockSchedule {
 
 impl PassPlan {
     fn new(program: &Program, results: &[Block], goal: Goal, traits: RateTraits, shape: Shape) -> PassPlan {
-        let mut nodes = vec![Node::Start(V), Node::Start(Y)];
+        let kept = if goal == Goal::State { results.len().saturating_sub(2) } else { 0 };
+        let mut nodes: Vec<Node> = (0..2 + kept).map(Node::Start).collect();
         // Of each block its node, and whether it is one of velocities.
         let mut made: Vec<(usize, bool)> = Vec::with_capacity(program.entries.len());
         for entry in &program.entries {
@@ -166,6 +168,7 @@ impl PassPlan {
             let (node, of_v) = match *entry {
                 Entry::V => (Node::Start(V), true),
                 Entry::Y => (Node::Start(Y), false),
+                Entry::Kept(i, of_v) => (Node::Start(2 + i as usize), of_v),
                 Entry::Dv(at, v, y) => (Node::Ask(Rate::Dv, at, if traits.reads_v { of(v) } else { V }, of(y)), true),
                 Entry::Dy(_, v, _) if traits.second_order => (Node::TimesStep(of(v)), false),
                 Entry::Dy(at, v, y) => (Node::Ask(Rate::Dy, at, of(v), of(y)), false),
@@ -296,15 +299,17 @@ impl PassPlan {
         }
 
         let mut rows: Vec<Option<usize>> = vec![None; self.nodes.len()];
-        (rows[V], rows[Y]) = (Some(V), Some(Y));
-        let mut busy = vec![last[V], last[Y]];
-        let mut home = [goal == Goal::State; 2];
+        // What stands at the start, and where results stand at the end.
+        let homes = if goal == Goal::State { self.results.len() } else { 2 };
+        (0..homes).for_each(|row| rows[row] = Some(row));
+        let mut busy = last[..homes].to_vec();
+        let mut home = vec![goal == Goal::State; homes];
         let mut take = |node: usize, time: usize, rows: &mut Vec<Option<usize>>| {
             // Those that are asked for at one time all read and write: none may take what another reads. A pass goes number by
             // number.
             let is_free = |until: usize| if time.is_multiple_of(2) { until <= time } else { until < time };
-            let own = [V, Y].into_iter().find(|row| home[*row] && self.results[*row] == node && is_free(busy[*row]));
-            let row = own.or_else(|| (2..busy.len()).find(|row| is_free(busy[*row]))).unwrap_or_else(|| {
+            let own = (0..homes).find(|row| home[*row] && self.results[*row] == node && is_free(busy[*row]));
+            let row = own.or_else(|| (homes..busy.len()).find(|row| is_free(busy[*row]))).unwrap_or_else(|| {
                 busy.push(0);
                 busy.len() - 1
             });
@@ -332,7 +337,7 @@ impl PassPlan {
             let mut writes: Vec<(usize, usize)> = self.writes[pass].iter().map(|node| (row(*node), *node)).collect();
             if pass == turns && goal == Goal::State {
                 // Results in other rows are copied to theirs.
-                let away = [V, Y].into_iter().map(|home| (home, self.results[home]));
+                let away = (0..homes).map(|home| (home, self.results[home]));
                 writes.extend(away.filter(|(home, node)| row(*node) != *home));
             }
             if !writes.is_empty() {
@@ -359,7 +364,7 @@ impl PassPlan {
             }
         }
         let results = match goal {
-            Goal::State => vec![V, Y],
+            Goal::State => (0..homes).collect(),
             Goal::Attempt => self.results.iter().map(|node| row(*node)).collect(),
         };
         BlockSchedule { actions, rows: count, results }

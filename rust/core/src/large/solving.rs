@@ -13,9 +13,9 @@ use crate::{
     error::Error,
     isa::Level,
     model::{
+        methods::method,
         ordering::{Columns, Ordering},
         spec::{Signature, Spec},
-        steppers::method,
         system::Shape,
         window::Window,
     },

@@ -4,6 +4,7 @@ pub mod around;
 mod elimination;
 pub(crate) mod implicit;
 pub mod method;
+pub mod methods;
 mod newton;
 pub(crate) mod ordering;
 mod pivoting;

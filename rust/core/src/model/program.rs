@@ -42,6 +42,11 @@ impl Add<Length> for Time {
 }
 
 impl Time {
+    /// So many steps after the start.
+    pub fn after(steps: f64) -> Time {
+        Time(steps)
+    }
+
     /// The start of the step.
     pub(crate) const START: Time = Time(0.0);
 
@@ -67,6 +72,9 @@ pub enum Entry {
     V,
     /// The coordinates at the start of the step.
     Y,
+    /// One of the blocks that the method keeps between steps beside the state, at the start of the step; and whether it has the
+    /// numbers of v, or those of y.
+    Kept(u32, bool),
     /// h·v̇ at a time and a state.
     Dv(Time, Block, Block),
     /// h·ẏ at a time and a state.
@@ -99,7 +107,7 @@ impl Entry {
     /// The blocks that it reads.
     pub fn operands(self) -> Vec<Block> {
         match self {
-            Entry::V | Entry::Y | Entry::ByTimeV | Entry::ByTimeY => vec![],
+            Entry::V | Entry::Y | Entry::Kept(..) | Entry::ByTimeV | Entry::ByTimeY => vec![],
             Entry::Velocity(a) | Entry::Scale(_, a) | Entry::Mass(a) => vec![a],
             Entry::Dv(_, a, b) | Entry::Dy(_, a, b) | Entry::Add(a, b) | Entry::Sub(a, b) => vec![a, b],
             Entry::SeriesV(_, a, b) | Entry::SeriesY(_, a, b) => vec![a, b],
@@ -110,7 +118,7 @@ impl Entry {
     /// The same of the blocks that are now at other places.
     fn moved(self, to: impl Fn(Block) -> Block) -> Entry {
         match self {
-            Entry::V | Entry::Y | Entry::ByTimeV | Entry::ByTimeY => self,
+            Entry::V | Entry::Y | Entry::Kept(..) | Entry::ByTimeV | Entry::ByTimeY => self,
             Entry::Dv(t, a, b) => Entry::Dv(t, to(a), to(b)),
             Entry::Dy(t, a, b) => Entry::Dy(t, to(a), to(b)),
             Entry::Velocity(a) => Entry::Velocity(to(a)),
@@ -143,6 +151,7 @@ impl Entry {
             Entry::ByTimeV => (12, 0, 0, 0),
             Entry::ByTimeY => (13, 0, 0, 0),
             Entry::Mass(a) => (14, 0, a.0, 0),
+            Entry::Kept(i, of_v) => (15, 0, i, u32::from(of_v)),
         }
     }
 }
@@ -249,6 +258,15 @@ impl Program {
         Program { entries: recording.entries, results }.without_unused()
     }
 
+    /// Of entries that are known, each after what it reads; None if one reads what is not there.
+    pub fn of(entries: Vec<Entry>, results: Vec<usize>) -> Option<Program> {
+        let begins = entries.len() >= 2 && entries[0] == Entry::V && entries[1] == Entry::Y;
+        let reads = |(i, entry): (usize, &Entry)| entry.operands().iter().all(|operand| operand.index() < i);
+        let is_sound = begins && entries.iter().enumerate().all(reads) && results.iter().all(|result| *result < entries.len());
+        let results = results.into_iter().map(|result| Block(result as u32)).collect();
+        is_sound.then(|| Program { entries, results }.without_unused())
+    }
+
     /// The same without entries that no result is made of, such as a stage that counts only in an estimate of the error. The
     /// state stays, at its place.
     fn without_unused(self) -> Program {
@@ -323,6 +341,19 @@ impl Program {
 
     /// Executes the program over vectors of numbers, and returns its results.
     pub fn run<N: Number>(&self, s: &dyn System<N>, t: N, h: N, v: &DVector<N>, y: &DVector<N>) -> Vec<DVector<N>> {
+        self.run_with(s, t, h, v, y, &[])
+    }
+
+    /// The same of a method that keeps blocks between steps.
+    pub(crate) fn run_with<N: Number>(
+        &self,
+        s: &dyn System<N>,
+        t: N,
+        h: N,
+        v: &DVector<N>,
+        y: &DVector<N>,
+        kept: &[DVector<N>],
+    ) -> Vec<DVector<N>> {
         let mut blocks: Vec<DVector<N>> = Vec::with_capacity(self.entries.len());
         let mut series: Option<Vec<(DVector<N>, DVector<N>)>> = None;
         let mut implicit: Option<Implicit<N>> = if self.is_implicit() { Implicit::new(s, t, h, v, y) } else { None };
@@ -332,6 +363,7 @@ impl Program {
             let made = match *entry {
                 Entry::V => v.clone(),
                 Entry::Y => y.clone(),
+                Entry::Kept(i, _) => kept[i as usize].clone(),
                 Entry::Dv(at, v, y) => s.dv(at.at(t, h), of(v), of(y)),
                 Entry::Dy(at, v, y) => s.dy(at.at(t, h), of(v), of(y)),
                 Entry::Velocity(d) => s.velocity(of(d)),
@@ -391,5 +423,10 @@ impl Block {
     /// The number of the entry that makes it.
     pub fn index(self) -> usize {
         self.0 as usize
+    }
+
+    /// The block of the entry of that number.
+    pub fn at(entry: usize) -> Block {
+        Block(entry as u32)
     }
 }

@@ -32,13 +32,13 @@ pub struct FixedRun<'a> {
     pub steps: i64,
     /// Keep every so many steps, the first state and the last; or the last alone.
     pub every: Option<i64>,
-    /// The v slot at the first step, by rows.
+    /// The v slot at the first step, by rows; behind them what the method keeps, if `carried`.
     pub v: Vec<Row<'a>>,
     /// The coordinates at the first step, by rows.
     pub y: Vec<Row<'a>>,
     /// How many members.
     pub members: usize,
-    /// The v slot holds what the method carries already: do not start.
+    /// The v slot holds what the method carries already, and what it keeps is known: do not start.
     pub carried: bool,
     /// How many members have parameters of their own; those of further members repeat them.
     pub own: usize,
@@ -62,7 +62,7 @@ pub struct Arrays<'a, T = f64> {
     pub recorded: &'a mut [T],
     /// What the systems added up, and what is watched, rows of one number per member; empty if not asked for.
     pub tally: &'a mut [T],
-    /// The v slot at the end; empty if not asked for.
+    /// The v slot at the end, and what the method keeps; empty if not asked for.
     pub carry: &'a mut [T],
     /// Per member, the number of the first step that is not finite, or −1; members that have one are not checked.
     pub first_bad: &'a mut [i64],
@@ -156,7 +156,8 @@ pub fn run<T: Steppable>(plan: &FixedRun, arrays: Arrays<T>, monitor: &mut dyn F
     let traced = plan.model.traced()?;
     let (p, q) = (traced.shape.v, traced.shape.y);
     let kept = kept(plan.steps, plan.every);
-    expect("v", p, plan.v.len())?;
+    let kept_numbers = traced.kept;
+    expect("v", p + if plan.carried { kept_numbers } else { 0 }, plan.v.len())?;
     expect("y", q, plan.y.len())?;
     if plan.steps > 0 {
         expect("saved_v", kept * p * b, arrays.saved_v.len())?;
@@ -167,7 +168,7 @@ pub fn run<T: Steppable>(plan: &FixedRun, arrays: Arrays<T>, monitor: &mut dyn F
         expect("tally", traced.tally * b, arrays.tally.len())?;
     }
     if !arrays.carry.is_empty() {
-        expect("carry", p * b, arrays.carry.len())?;
+        expect("carry", (p + kept_numbers) * b, arrays.carry.len())?;
     }
     expect("first_bad", b, arrays.first_bad.len())?;
     let rows = [("a parameter", plan.own, &plan.model.spec.rows), ("a row of v", b, &plan.v), ("a row of y", b, &plan.y)];
@@ -216,12 +217,13 @@ pub fn run<T: Steppable>(plan: &FixedRun, arrays: Arrays<T>, monitor: &mut dyn F
     workers::share(parts, &workers, monitor, worker(), || Ok(worker()), Worker::part)
 }
 
-/// Both slots and the tally at the last check, and buffers for the carry, while the v slot holds velocities, and for recorded
+/// Both slots, what the method keeps and the tally at the last check, and buffers for the carry, while the v slot holds velocities, and for recorded
 /// quantities.
 #[derive(Default)]
 struct Good<T> {
     v: Vec<T>,
     y: Vec<T>,
+    kept: Vec<T>,
     tally: Vec<T>,
     carried: Vec<T>,
     recorded: Vec<T>,
@@ -343,13 +345,21 @@ impl<T: Real> Job<'_, '_, T> {
         let (plan, lanes) = (self.plan, self.group.lanes());
         self.group.prepare(&plan.model.spec, self.part.first + self.from, self.count);
         let (v, y) = self.group.slots_mut();
-        for (rows, slot) in [(&plan.v, &mut *v), (&plan.y, &mut *y)] {
-            for (row, slot) in rows.iter().zip(slot.chunks_exact_mut(lanes)) {
-                row.fill(self.part.first + self.from, self.count, slot);
-            }
-        }
+        let (first, count) = (self.part.first + self.from, self.count);
+        let fill = |rows: &[Row], slot: &mut [T]| {
+            rows.iter().zip(slot.chunks_exact_mut(lanes)).for_each(|(row, slot)| row.fill(first, count, slot));
+        };
+        let (of_v, mut kept_rows) = plan.v.split_at(v.len() / lanes);
+        fill(of_v, v);
+        fill(&plan.y, y);
         let numbers = (v.len() + y.len()).max(1) as i64;
-        if !plan.carried {
+        if plan.carried {
+            for block in self.group.kept_mut() {
+                let (rows, others) = kept_rows.split_at(block.len() / lanes);
+                fill(rows, block);
+                kept_rows = others;
+            }
+        } else {
             self.group.start(plan.first);
         }
         self.remember(plan.first);
@@ -391,7 +401,11 @@ impl<T: Real> Job<'_, '_, T> {
         if left > 0 && !go_on((left * self.count as i64) as u64) {
             return false;
         }
-        put(&mut self.part.carry, 0, self.from, self.count, self.group.slots().0, lanes);
+        let mut at = 0;
+        for block in std::iter::once(self.group.slots().0).chain(self.group.kept()) {
+            put(&mut self.part.carry, at, self.from, self.count, block, lanes);
+            at += block.len() / lanes;
+        }
         put(&mut self.part.tally, 0, self.from, self.count, self.group.tally(), lanes);
         true
     }
@@ -409,9 +423,15 @@ impl<T: Real> Job<'_, '_, T> {
         go_on((done * self.count as i64) as u64)
     }
 
+    /// How many numbers of a member each slot has.
+    fn rows(&self) -> (usize, usize) {
+        let (lanes, (v, y)) = (self.group.lanes(), self.group.slots());
+        (v.len() / lanes, y.len() / lanes)
+    }
+
     fn save(&mut self, i: usize, k: i64) {
         let lanes = self.group.lanes();
-        let (p, q) = (self.plan.v.len(), self.plan.y.len());
+        let (p, q) = self.rows();
         self.finish(k);
         let (v, y) = self.group.slots();
         put(&mut self.part.saved_v, i * p, self.from, self.count, v, lanes);
@@ -436,7 +456,7 @@ impl<T: Real> Job<'_, '_, T> {
     /// returned: then the steps are made one by one, to find which member diverged and at which step.
     fn save_unrolled(&mut self, i: usize, k: i64, steps: usize) -> bool {
         let lanes = self.group.lanes();
-        let (p, q) = (self.plan.v.len(), self.plan.y.len());
+        let (p, q) = self.rows();
         let (from, count) = (self.from, self.count);
         if self.carries {
             let ((v, y), tally) = (self.group.slots(), self.group.tally());
@@ -480,6 +500,8 @@ impl<T: Real> Job<'_, '_, T> {
         for (good, now) in [(&mut self.good.v, v), (&mut self.good.y, y), (&mut self.good.tally, self.group.tally())] {
             keep(good, now);
         }
+        self.good.kept.clear();
+        self.group.kept().iter().for_each(|block| self.good.kept.extend_from_slice(block));
         self.checked = k;
     }
 
@@ -545,6 +567,12 @@ impl<T: Real> Job<'_, '_, T> {
         v.copy_from_slice(&self.good.v);
         y.copy_from_slice(&self.good.y);
         self.group.tally_mut().copy_from_slice(&self.good.tally);
+        let mut rest = self.good.kept.as_slice();
+        for block in self.group.kept_mut() {
+            let (good, others) = rest.split_at(block.len());
+            block.copy_from_slice(good);
+            rest = others;
+        }
     }
 
     /// Notes the members with a velocity that is not finite after step `k`, in whose state the group is, if it is computed from a

@@ -19,8 +19,9 @@ struct Share<T> {
     group: Box<dyn Group<T>>,
     first: usize,
     count: usize,
-    /// Both slots before the step that is being made, if that can be stopped, and before the one that was made last.
-    before: [(Vec<T>, Vec<T>); 2],
+    /// Both slots, and what the method keeps, before the step that is being made, if that can be stopped, and before the one that
+    /// was made last.
+    before: [Vec<T>; 2],
 }
 
 impl<T: Real> Share<T> {
@@ -45,7 +46,10 @@ pub struct World<T = f64> {
     shares: Vec<Share<T>>,
     members: usize,
     sizes: (usize, usize),
+    /// Whether the method has a carry, or keeps blocks beside the state.
     carries: bool,
+    /// How many numbers all members have that it keeps.
+    kept: usize,
     /// The arrays as last written, if the method has a carry: if they differ now, the caller changed the state.
     written: (Vec<T>, Vec<T>),
     /// Whether the slots belong to the arrays as last written.
@@ -98,21 +102,28 @@ impl<T: Steppable> World<T> {
             group.prepare(&model.spec, first, count);
             group.compile_now();
             group.set_stop_flag(&stop);
-            let before = std::array::from_fn(|_| {
-                if steps_between_checks.is_none() {
-                    (group.slots().0.to_vec(), group.slots().1.to_vec())
-                } else {
-                    Default::default()
-                }
-            });
+            let before = Default::default();
             shares.push(Share { group, first, count, before });
             first += count;
         }
         let sizes = (traced.shape.v * members, traced.shape.y * members);
-        let carries = traced.carries;
+        let (carries, kept) = (traced.carries || traced.kept > 0, traced.kept * members);
         let written = if carries { (vec![T::default(); sizes.0], vec![T::default(); sizes.1]) } else { Default::default() };
         let force = model.spec.signature.place(NAME);
-        Ok(World { clock, shares, members, sizes, carries, written, is_written: false, step, steps_between_checks, stop, force })
+        Ok(World {
+            clock,
+            shares,
+            members,
+            sizes,
+            carries,
+            kept,
+            written,
+            is_written: false,
+            step,
+            steps_between_checks,
+            stop,
+            force,
+        })
     }
 
     /// How many numbers each array holds.
@@ -175,23 +186,36 @@ impl<T: Steppable> World<T> {
         !(self.is_written && equal_bits(v, &self.written.0) && equal_bits(y, &self.written.1))
     }
 
-    /// The carry of the method, as rows of one number per member; none if the next step begins with `v` itself.
+    /// The carry of the method and what it keeps, as rows of one number per member; none if the next step begins with `v` itself.
     pub fn carry(&self, v: &[T], y: &[T]) -> Option<Vec<T>> {
         if self.is_moved(v, y) {
             return None;
         }
-        let mut carry = vec![T::default(); self.sizes.0];
+        let mut carry = vec![T::default(); self.sizes.0 + self.kept];
         for share in &self.shares {
-            store(&mut carry, self.members, (share.first, share.count), share.group.slots().0, share.group.lanes());
+            let mut rest = carry.as_mut_slice();
+            for block in std::iter::once(share.group.slots().0).chain(share.group.kept()) {
+                let (rows, others) = rest.split_at_mut(block.len() / share.group.lanes() * self.members);
+                store(rows, self.members, (share.first, share.count), block, share.group.lanes());
+                rest = others;
+            }
         }
         Some(carry)
     }
 
     /// Continues with the carry that belongs to these arrays.
     pub fn carry_on(&mut self, carry: &[T], v: &[T], y: &[T]) {
-        if self.carries && carry.len() == self.sizes.0 {
-            let members = self.members;
-            self.shares.iter_mut().for_each(|share| share.load(carry, y, members));
+        if self.carries && carry.len() == self.sizes.0 + self.kept {
+            let (members, (slot, kept)) = (self.members, carry.split_at(self.sizes.0));
+            for share in &mut self.shares {
+                share.load(slot, y, members);
+                let (lanes, mut rest) = (share.group.lanes(), kept);
+                for block in share.group.kept_mut() {
+                    let (rows, others) = rest.split_at(block.len() / lanes * members);
+                    load(rows, members, (share.first, share.count), block, lanes);
+                    rest = others;
+                }
+            }
             self.written.0.copy_from_slice(v);
             self.written.1.copy_from_slice(y);
             self.is_written = true;
@@ -267,8 +291,9 @@ impl<T: Steppable> World<T> {
         while made < n {
             for Share { group, before, .. } in &mut self.shares {
                 before.swap(0, 1);
-                before[0].0.copy_from_slice(group.slots().0);
-                before[0].1.copy_from_slice(group.slots().1);
+                before[0].clear();
+                let (v, y) = group.slots();
+                [v, y].into_iter().chain(group.kept()).for_each(|block| before[0].extend_from_slice(block));
                 group.advance(from + made, 1);
             }
             if !go_on(1) {
@@ -285,9 +310,16 @@ impl<T: Steppable> World<T> {
         // the last step. So the state before that step is the one that can be returned at once.
         let back = usize::from(self.carries && 0 < made && made < n);
         for Share { group, before, .. } in &mut self.shares {
-            let (v, y) = &before[back];
-            group.slots_mut().0.copy_from_slice(v);
-            group.slots_mut().1.copy_from_slice(y);
+            let (v, y) = group.slots_mut();
+            let (old_v, rest) = before[back].split_at(v.len());
+            let (old_y, mut rest) = rest.split_at(y.len());
+            v.copy_from_slice(old_v);
+            y.copy_from_slice(old_y);
+            for block in group.kept_mut() {
+                let (old, others) = rest.split_at(block.len());
+                block.copy_from_slice(old);
+                rest = others;
+            }
         }
         made = (made - back as i64).min(n - 1);
         if made > 0 {

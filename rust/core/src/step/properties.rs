@@ -5,9 +5,9 @@ use crate::{
     error::Error,
     model::{
         around::{self, contact, controls},
+        methods::method,
         program::Program,
         spec::Signature,
-        steppers::method,
         system::Shape,
         systems::{equations, kind},
     },
@@ -26,7 +26,7 @@ pub(crate) fn shape(signature: &Signature, how: &StepKind) -> Result<Shape, Erro
         }
         StepKind::Step(step) => equations::fit(step, signature),
         StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => {
-            around::fit(kind(signature)?, signature, method(name)?)
+            around::fit(kind(signature)?, signature, method(name)?.as_ref())
         }
     }
 }
@@ -85,7 +85,7 @@ pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) ->
                 equations = rates * n;
                 solving = 4 * n * n * n / 3 + 3 * n * n * program.solutions();
                 if equations + solving > MAX_IMPLICIT_TAPE_OPERATIONS && rates <= MAX_LONG_TAPE_OPERATIONS {
-                    (equations, solving) = solving::operations(signature, &program, shape)?;
+                    (equations, solving) = solving::operations(signature, program, shape)?;
                 }
                 solving += equations;
             }
@@ -107,7 +107,7 @@ pub(super) fn has_series(how: &StepKind) -> Result<bool, Error> {
 
 fn of_method(how: &StepKind, holds: impl Fn(&Program) -> bool) -> Result<bool, Error> {
     Ok(match how {
-        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => holds(&method(name)?.program()),
+        StepKind::Method { name, .. } | StepKind::Attempts { name, .. } => holds(method(name)?.program()),
         StepKind::Step(_) | StepKind::Matrix { .. } => false,
     })
 }

@@ -18,7 +18,7 @@ use crate::{
     error::Error,
     model::{
         around::{self, controls},
-        steppers::method,
+        methods::method,
         system::Shape,
     },
     stage::Stage,
@@ -60,8 +60,9 @@ pub struct Traced {
     key: TapeKey,
     /// How large the blocks are.
     pub shape: Shape,
-    /// How many numbers of the state stand behind v and y: a sum over the steps, the tally, if the system has one; what is
-    /// watched.
+    /// How many numbers of the state stand behind v and y: those that the method keeps.
+    pub kept: usize,
+    /// How many stand behind these: a sum over the steps, the tally, if the system has one; what is watched.
     pub tally: usize,
     /// How many numbers are recorded.
     pub recorded: usize,
@@ -112,18 +113,20 @@ impl TapeKey {
             if self.precision == Precision::Single {
                 self.fits_single(operations.1)?;
             }
-            let (mut tally, mut carries) = (0, false);
+            let (mut tally, mut kept, mut carries) = (0, 0, false);
             if let StepKind::Method { name, .. } = &self.how {
                 watch::check(&self.signature, shape)?;
                 tally = usize::from(controls::is_given(&self.signature)) + watch::numbers(&self.signature);
-                carries = method(name)?.carry.is_some();
+                let method = method(name)?;
+                (kept, carries) = (method.kept_numbers(shape), method.carries);
             }
             if let StepKind::Attempts { name, .. } = &self.how {
                 around::only_fixed(&self.signature)?;
-                method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?;
+                method(name)?.error_order.ok_or(Error::NoEstimate)?;
             }
             let traced = Traced {
                 shape,
+                kept,
                 tally,
                 carries,
                 series,
@@ -218,7 +221,7 @@ impl TapeKey {
             let method = method(name)?;
             for (slot, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
                 if let Some(program) = program {
-                    let (tape, next) = trace_slot(new(), &self.signature, &program)?;
+                    let (tape, next) = trace_slot(new(), &self.signature, program)?;
                     *slot = Some(fused(tape, next));
                 }
             }

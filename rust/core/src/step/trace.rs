@@ -15,11 +15,11 @@ use crate::{
             self,
             contact::{self, Contacts},
         },
-        method::Record,
+        methods::Method,
+        methods::method,
         program::{Program, Terms},
         spec::Signature,
-        steppers::method,
-        system::{Kind, Shape},
+        system::{Block, Kind, Shape},
         systems::{equations::next_state, kind, linear::products},
         window,
     },
@@ -61,20 +61,19 @@ pub(crate) fn trace_step(tape: Tape, signature: &Signature, how: &StepKind) -> R
         }
         StepKind::Method { name, choice } => {
             let (kind, method) = (kind(signature)?, method(name)?);
-            let carries = method.carry.is_some();
-            let seen = || window::of_step(time(signature), Symbol::new(Op::Step), carries);
-            let (tape, next) = record(tape, || window::over(signature, seen, || step(kind, signature, shape, method, *choice)));
+            let seen = || window::of_step(time(signature), Symbol::new(Op::Step), method.carries);
+            let (tape, next) = record(tape, || window::over(signature, seen, || step(kind, signature, shape, &method, *choice)));
             Ok(Steps { tape, next, shape, terms: Vec::new() })
         }
         StepKind::Attempts { name, order, acceptance, backward } => {
             let (kind, method) = (kind(signature)?, method(name)?);
-            let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
+            let (Some(program), Some(estimate)) = (method.attempt(), method.error_order) else { return Err(Error::NoEstimate) };
             let attempts = AttemptsOf { kind, signature, shape, acceptance, backward: *backward };
             let single = tape.precision() == Precision::Single;
-            let (tape, (next, terms)) = record(tape, || match series_order(&program, *order) {
+            let (tape, (next, terms)) = record(tape, || match series_order(program, *order) {
                 Some(order) => attempts.series(order),
-                None if single => (attempts.tried(&program), Vec::new()),
-                None => (attempts.attempts(&program, estimate.order), Vec::new()),
+                None if single => (attempts.tried(program), Vec::new()),
+                None => (attempts.attempts(program, estimate), Vec::new()),
             });
             Ok(Steps { tape, next, shape, terms })
         }
@@ -90,24 +89,40 @@ fn series_order(program: &Program, asked: u32) -> Option<u32> {
     }
 }
 
-fn step(kind: &Kind, signature: &Signature, shape: Shape, method: &Record, choice: usize) -> Vec<Id> {
+fn step(kind: &Kind, signature: &Signature, shape: Shape, method: &Method, choice: usize) -> Vec<Id> {
     let (h, t) = (Symbol::new(Op::Step), time(signature));
     let (v0, y0) = (block(0, shape.v), block(shape.v, shape.y));
     let p = parameters(signature, h);
-    let tally = Symbol::new(Op::State((shape.v + shape.y) as u32));
+    let before = kept(method, shape);
+    let behind = shape.v + shape.y + method.kept_numbers(shape);
+    let tally = Symbol::new(Op::State(behind as u32));
     let s = around::wrap(&p, (kind.make)(&p), tally);
-    let mut made = method.program().run(s.as_ref(), t, h, &v0, &y0).into_iter();
+    let mut made = method.program().run_with(s.as_ref(), t, h, &v0, &y0, &before).into_iter();
     let (new_v, new_y) = (made.next().unwrap_or_else(|| v0.clone()), made.next().unwrap_or_else(|| y0.clone()));
     let (mut v, mut y) = s.project(s.bring_to_rest(t, (&v0, &y0), new_v), new_y);
+    let mut kept: Vec<_> = made.collect();
     if let Some(contacts) = Contacts::new(&p) {
         let carry = contact::carry(method, choice);
-        [v, y] = contacts.after(carry.as_ref(), s.as_ref(), t, [&v0, &y0], [v, y]);
+        [v, y] = contacts.after(carry, s.as_ref(), t, [&v0, &y0], [v, y], &mut kept);
     }
     let mut next = ids([&v, &y]);
+    next.extend(ids(&kept));
     next.extend(s.tally().map(|tally| tally.0));
     let first = next.len();
     next.extend(watch::next(kind, &p, method, choice, t, [&v0, &y0], first));
     next
+}
+
+/// The blocks that a method keeps beside the state, which stand behind it.
+fn kept(method: &Method, shape: Shape) -> Vec<Block<Symbol>> {
+    let mut behind = shape.v + shape.y;
+    let numbers = method.kept.iter().map(|of_v| if *of_v { shape.v } else { shape.y });
+    numbers
+        .map(|numbers| {
+            behind += numbers;
+            block(behind - numbers, numbers)
+        })
+        .collect()
 }
 
 /// Traces the second part of an attempt of float32, onto a tape of float64 that may hold something already; and where its rows are.
@@ -115,10 +130,10 @@ pub(super) fn trace_judged(tape: Tape, signature: &Signature, how: &StepKind) ->
     let shape = shape(signature, how)?;
     let StepKind::Attempts { name, acceptance, backward, .. } = how else { return Err(Error::NoEstimate) };
     let (kind, method) = (kind(signature)?, method(name)?);
-    let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
+    let (Some(program), Some(order)) = (method.attempt(), method.error_order) else { return Err(Error::NoEstimate) };
     let attempts = AttemptsOf { kind, signature, shape, acceptance, backward: *backward };
-    let (tape, next) = record(tape, || attempts.judged(&program, estimate.order));
-    Ok((tape, next, attempts.rows(&program)))
+    let (tape, next) = record(tape, || attempts.judged(program, order));
+    Ok((tape, next, attempts.rows(program)))
 }
 
 /// Traces where a member stands at the start, without control, onto a tape that may hold something already.
@@ -186,7 +201,7 @@ fn matrix(signature: &Signature, shape: Shape, nodes: &[u64], fused: bool) -> Ve
     made.into_iter().map(|symbol| symbol.0).collect()
 }
 
-/// Traces a program that changes the block v alone.
+/// Traces a program that changes the block v alone, and makes the blocks that are kept, if there are any.
 pub(super) fn trace_slot(tape: Tape, signature: &Signature, program: &Program) -> Result<(Tape, Vec<Id>), Error> {
     let kind = kind(signature)?;
     let shape = (kind.shape)(signature)?;
@@ -194,8 +209,10 @@ pub(super) fn trace_slot(tape: Tape, signature: &Signature, program: &Program) -
         let (h, t) = (Symbol::new(Op::Step), time(signature));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(signature, h);
-        let made = || program.run(around::wrap_for_carry(&p, (kind.make)(&p)).as_ref(), t, h, &v, &y).into_iter().next();
-        ids([&window::over(signature, || window::of_slot(t, h), made).unwrap_or_else(|| v.clone()), &y])
+        let made = || program.run(around::wrap_for_carry(&p, (kind.make)(&p)).as_ref(), t, h, &v, &y);
+        let mut made = window::over(signature, || window::of_slot(t, h), made);
+        made.insert(1, y);
+        ids(&made)
     }))
 }
 
@@ -232,8 +249,8 @@ pub fn trace(tape: Tape, signature: &Signature, how: &StepKind, what: &str) -> R
         }
         "judged" => trace_judged(tape, signature, how).map(|(tape, next, _)| (tape, next)),
         "begin" => trace_begin(tape, signature, how),
-        "start" => trace_slot(tape, signature, &method(name)?.start(choice).ok_or_else(unknown)?),
-        "finish" => trace_slot(tape, signature, &method(name)?.finish(choice).ok_or_else(unknown)?),
+        "start" => trace_slot(tape, signature, method(name)?.start(choice).ok_or_else(unknown)?),
+        "finish" => trace_slot(tape, signature, method(name)?.finish(choice).ok_or_else(unknown)?),
         "record" => trace_record(tape, signature, &[which.to_owned()]),
         _ => Err(unknown()),
     }

@@ -8,7 +8,7 @@ use crate::{
     error::Error,
     model::{
         around,
-        method::Record,
+        methods::Method,
         spec::{Parameters, Signature},
         system::{Block, Kind, Shape},
         systems::equations::{self, values_of},
@@ -40,7 +40,7 @@ pub(crate) fn check(signature: &Signature, shape: Shape) -> Result<(), Error> {
 pub(crate) fn next(
     kind: &Kind,
     p: &Parameters<Symbol>,
-    method: &Record,
+    method: &Method,
     choice: usize,
     t: Symbol,
     [v, y]: [&Block<Symbol>; 2],

@@ -10,7 +10,8 @@ mod part;
 
 use self::part::{Attempts, Part};
 use super::{
-    method::{Needs, Record},
+    method::Needs,
+    methods::Method,
     spec::{Parameters, Signature},
     system::{Kind, Shape, System},
 };
@@ -29,7 +30,7 @@ pub(crate) fn parts<N: Number>() -> Vec<Part<N>> {
 /// The size of the blocks, or an error if the parameters are wrong or the method cannot step the system.
 ///
 /// A system that passes this check can be made and stepped.
-pub fn fit(kind: &Kind, signature: &Signature, method: &Record) -> Result<Shape, Error> {
+pub fn fit(kind: &Kind, signature: &Signature, method: &Method) -> Result<Shape, Error> {
     let shape = (kind.shape)(signature)?;
     if signature.equations.as_ref().is_some_and(|equations| equations.mass.is_some()) && !method.program().is_implicit() {
         return Err(Error::MassMatrix { method: method.name });

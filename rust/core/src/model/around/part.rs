@@ -3,7 +3,7 @@
 use crate::{
     error::Error,
     model::{
-        method::Record,
+        methods::Method,
         spec::{Parameters, Signature},
         system::{Kind, Shape, System},
     },
@@ -19,7 +19,7 @@ pub(crate) struct Part<N: Number> {
     /// An error if its parameters are wrong, or if it does not work with the system or with another part.
     pub check: fn(&Kind, &Signature, Shape) -> Result<(), Error>,
     /// The term of it that depends on the velocity, if there is one: methods that need an acceleration refuse it.
-    pub velocity_term: fn(&Signature, &Record) -> Option<&'static str>,
+    pub velocity_term: fn(&Signature, &Method) -> Option<&'static str>,
     /// Where attempts at adaptive steps have it.
     pub attempts: Attempts,
     /// Whether a method's start and finish see it.

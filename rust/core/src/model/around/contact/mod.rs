@@ -26,7 +26,7 @@ use super::{
 use crate::{
     error::Error,
     model::{
-        method::Record,
+        methods::Method,
         program::Program,
         spec::{Parameters, Signature},
         system::{Block, Shape, System},
@@ -173,25 +173,32 @@ impl<N: Number> Contacts<N> {
         (touched, [v, y])
     }
 
-    /// The state after a step of a method. What it carries begins anew where a point met a surface.
+    /// The state after a step of a method. What it carries or keeps begins anew where a point met a surface.
     pub fn after(
         &self,
-        carry: Option<&[Program; 2]>,
+        carry: Carry,
         s: &dyn System<N>,
         t: N,
         before: [&Block<N>; 2],
         after: [Block<N>; 2],
+        kept: &mut [Block<N>],
     ) -> [Block<N>; 2] {
-        let Some([start, finish]) = carry else { return self.resolve(before, after).1 };
-        let first = |program: &Program, t: N, v: &Block<N>, y: &Block<N>| {
-            program.run(s, t, self.h, v, y).into_iter().next().unwrap_or_else(|| v.clone())
+        let Some(start) = carry.start else { return self.resolve(before, after).1 };
+        let finished = |t: N, slot: &Block<N>, y: &Block<N>| match carry.finish {
+            Some(finish) => finish.run(s, t, self.h, slot, y).into_iter().next().unwrap_or_else(|| slot.clone()),
+            None => slot.clone(),
         };
         let (end, [slot, y1]) = (t + self.h, after);
-        let (v0, v1) = (first(finish, t, before[0], before[1]), first(finish, end, &slot, &y1));
+        let (v0, v1) = (finished(t, before[0], before[1]), finished(end, &slot, &y1));
         let (touched, [v, y]) = self.resolve([&v0, before[1]], [v1, y1]);
-        let anew = first(start, end, &v, &y);
-        let slot = Block::from_fn(slot.len(), |i, _| touched[i / self.dim].map_or(slot[i], |it| N::choose(it, anew[i], slot[i])));
-        [slot, y]
+        let anew = start.run(s, end, self.h, &v, &y);
+        let renewed = |old: &Block<N>, new: &Block<N>| {
+            Block::from_fn(old.len(), |i, _| touched[i / self.dim].map_or(old[i], |it| N::choose(it, new[i], old[i])))
+        };
+        for (old, new) in kept.iter_mut().zip(&anew[1..]) {
+            *old = renewed(old, new);
+        }
+        [if carry.finish.is_some() { renewed(&slot, &anew[0]) } else { v }, y]
     }
 }
 
@@ -207,9 +214,16 @@ impl Contacts<f64> {
     }
 }
 
-/// The programs with which a method goes from velocities to what it carries, and back.
-pub fn carry(method: &Record, choice: usize) -> Option<[Program; 2]> {
-    Some([method.start(choice)?, method.finish(choice)?])
+/// The programs with which a method goes from velocities to what it carries or keeps, and back.
+#[derive(Clone, Copy)]
+pub struct Carry<'a> {
+    start: Option<&'a Program>,
+    finish: Option<&'a Program>,
+}
+
+/// Those of a method.
+pub fn carry(method: &Method, choice: usize) -> Carry<'_> {
+    Carry { start: method.start(choice), finish: method.finish(choice) }
 }
 
 /// Surfaces that push points back by springs.

@@ -46,7 +46,7 @@ pub(crate) fn part<N: Number>() -> Part<N> {
         check,
         // What a method carries in place of v would have to change with v.
         velocity_term: |signature, method| {
-            let is_apart = is_after_the_step(signature) && method.carry.is_none();
+            let is_apart = is_after_the_step(signature) && !method.carries;
             (!is_apart).then_some("energy control")
         },
         attempts: Attempts::Other,
