@@ -398,6 +398,10 @@ def without_start(s: Any, t: Any, h: Any, v: Any, y: Any, dv1: Any, dy1: Any) ->
     return v + dv1, y + dy1, dv1, dy1
 
 
+def of_two_arguments(v: Any, y: Any) -> Any:
+    return v, y
+
+
 def swapped(s: Any, t: Any, h: Any, v: Any, y: Any, dv1: Any, dy1: Any) -> Any:
     return v + dv1, y + dy1, dy1, dv1
 
@@ -428,8 +432,9 @@ WRONG: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
     (a_method(lambda s, t, h, v, y: (v + s.dv(t, v, y), y)), UnsupportedError, "got one of order 0"),
     (a_method(lambda s, t, h, v, y: (v, y), name="rk4"), ArgumentError, "'rk4' is built in"),
     (lambda: sw.method(lambda s, t, h, v, y: (v, y)), ArgumentError, "expected a function with a name"),
-    (lambda: sw.method(np.sin), ArgumentError, r"expected a function of \(s, t, h, v, y\), and behind them"),
-    (lambda: sw.method(max), DTypeError, "expected a function of Python"),
+    (lambda: sw.method(of_two_arguments), ArgumentError, r"method: expected a function of \(s, t, h, v, y\), and behind them"),
+    (lambda: sw.method(np.sin), StepwellError, "method: there is no <ufunc"),
+    (lambda: sw.method(start=max)(without_start), DTypeError, "start: expected a function of Python"),
     (lambda: sw.method(without_start), ArgumentError, "start: expected a function .* that returns dv1, dy1"),
     (lambda: sw.method("rk4", start=one_before), ArgumentError, "start: expected with a function"),  # type: ignore[call-overload]
     (keeping(midpoint.programs.whole.run, one_before), ArgumentError, "expected a function"),  # type: ignore[attr-defined]

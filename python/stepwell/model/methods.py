@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable
 from functools import cache
+from types import FunctionType
 from typing import Any, Protocol, cast, overload
 
 from .. import _core
@@ -339,12 +340,12 @@ def method(name: Any = None, *, start: Any = None) -> Any:
         ...     return v + 0.25 * dv + 0.75 * s.dv(later, v2, y2), y + 0.25 * dy + 0.75 * s.dy(later, v2, y2)
         >>> ralston
         <method ralston: Ralston, order 2, 2 function evaluations per step>
-        >>> sw.integrate(sw.Pendulum(), ralston, v=0.0, y=1.0, dt=0.01, steps=100).y[-1].round(3)
+        >>> print(sw.integrate(sw.Pendulum(), ralston, v=0.0, y=1.0, dt=0.01, steps=100).y[-1].round(3))
         0.6
     """
     if isinstance(name, Method):
         return name
-    if callable(name) or (name is None and start is not None):
+    if isinstance(name, FunctionType) or (name is None and start is not None):
         own_method = registry.task("own_method")
         return own_method(name, start) if name is not None else lambda function: own_method(function, start)
     if start is not None:

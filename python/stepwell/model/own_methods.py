@@ -153,7 +153,7 @@ def own_method(function: Callable[..., Any], start: Callable[..., Any] | None = 
         raise ArgumentError(f"method: expected a function with a name, by def, got {checks.short(function)}")
     if name in {each.name for each in methods()}:
         raise ArgumentError(f"method: {name!r} is built in; give your function another name")
-    names = _arguments(name, function)
+    names = _arguments("method", function)
     kept, begin = names[len(ARGUMENTS) :], None
     of_kept: list[bool] = []
     if kept and start is None:
@@ -176,7 +176,7 @@ def own_method(function: Callable[..., Any], start: Callable[..., Any] | None = 
 
 
 def _arguments(name: str, function: Callable[..., Any], kept: bool = True) -> tuple[str, ...]:
-    """The names of a function's arguments."""
+    """The names of a function's arguments; ``name`` is the argument that it was given as."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
@@ -186,7 +186,7 @@ def _arguments(name: str, function: Callable[..., Any], kept: bool = True) -> tu
     if not plain or len(names) < len(ARGUMENTS) or (len(names) > len(ARGUMENTS) and not kept):
         more = ", and behind them the blocks that it keeps," if kept else ""
         raise ArgumentError(
-            f"{name}: expected a function of ({', '.join(ARGUMENTS)}){more} without defaults, got ({', '.join(names)})"
+            f"{name}: expected a function of ({', '.join(ARGUMENTS)}){more} without defaults, got {function.__name__}({', '.join(names)})"
         )
     return names
 
