@@ -248,6 +248,22 @@ def test_a_state_that_was_changed_begins_anew() -> None:
     assert np.array_equal(y, fresh.y[-1])
 
 
+@pytest.mark.parametrize("count", [4, 70])
+def test_members_that_are_reset_begin_anew_alone(count: int) -> None:
+    """As a world of these members would, and the others go on as if nothing had been."""
+    system, v, y = bodies(count)
+    v, y = (np.repeat(block[..., np.newaxis], 3, axis=-1) * [1.0, 1.1, 1.2] for block in (v, y))
+    world, untouched = (sw.World(system, adams_bashforth_3, v=v.copy(), y=y.copy(), dt=0.001) for _ in range(2))
+    for each in (world, untouched):
+        each.step(5)
+    world.reset(1, v=v[..., 0], y=y[..., 0])
+    for each in (world, untouched):
+        each.step(5)
+    fresh = sw.integrate(system, adams_bashforth_3, v=v[..., 0], y=y[..., 0], dt=0.001, steps=5, start_step=5)
+    assert np.array_equal(world.y[..., 1], fresh.y[-1])
+    assert np.array_equal(world.y[..., [0, 2]], untouched.y[..., [0, 2]])
+
+
 @pytest.mark.parametrize("method", ALL, ids=lambda m: m.name)
 def test_the_error_falls_with_the_order(method: sw.Method) -> None:
     ends = [sw.integrate(duffing(), method, v=0.1, y=1.0, dt=2.0 / n, steps=n).y[-1] for n in (200, 400, 800)]

@@ -24,6 +24,7 @@ __all__ = [
     "catalogue",
     "check",
     "compiled",
+    "define",
     "forget",
     "in_parts",
     "isa",

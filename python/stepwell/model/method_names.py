@@ -63,7 +63,9 @@ NOT_HERE = {
     r"tsit(ouras)?_?5.*|vern(er)?_?\d|(bogacki_shampine|bs|rk|ode)_?(3|23|32)|cash_karp|rkck|(ode|rk)(78|89)|ode113|feagin.*": (
         "not here; merson, fehlberg, fehlberg_5, dop853 and taylor choose their steps, with tolerance= and at=."
     ),
-    r"adams.*|abm?_?\d?|.*multistep.*|gear.*|stormer_cowell": "a method of several steps, and none of them is here; you can write one: stepwell.method(function, start=…).",
+    r"adams.*|abm?_?\d?|.*multistep.*|gear.*|stormer_cowell": (
+        "a method of several steps, and none of them is here; you can write one: stepwell.method(function, start=…)."
+    ),
 }
 
 

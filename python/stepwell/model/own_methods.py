@@ -12,7 +12,7 @@ from ..base import checks, registry
 from ..errors import ArgumentError, DTypeError, ShapeError
 from ..reference.program import Program, Programs
 from .method_order import order_of
-from .methods import Method, methods
+from .methods import EXACT, Method, methods
 from .recording import KINDS, recorded
 
 #: The first arguments of a method's function; those that follow are the blocks that it keeps.
@@ -151,7 +151,7 @@ def own_method(function: Callable[..., Any], start: Callable[..., Any] | None = 
     name = getattr(function, "__name__", "")
     if not name.isidentifier():
         raise ArgumentError(f"method: expected a function with a name, by def, got {checks.short(function)}")
-    if name in {each.name for each in methods()}:
+    if name in {EXACT.name, *(each.name for each in methods())}:
         raise ArgumentError(f"method: {name!r} is built in; give your function another name")
     names = _arguments("method", function)
     kept, begin = names[len(ARGUMENTS) :], None
@@ -186,7 +186,8 @@ def _arguments(name: str, function: Callable[..., Any], kept: bool = True) -> tu
     if not plain or len(names) < len(ARGUMENTS) or (len(names) > len(ARGUMENTS) and not kept):
         more = ", and behind them the blocks that it keeps," if kept else ""
         raise ArgumentError(
-            f"{name}: expected a function of ({', '.join(ARGUMENTS)}){more} without defaults, got {function.__name__}({', '.join(names)})"
+            f"{name}: expected a function of ({', '.join(ARGUMENTS)}){more} without defaults, got "
+            f"{function.__name__}({', '.join(names)})"
         )
     return names
 

@@ -22,8 +22,8 @@ from ..model.compatibility import (
     goes_back,
     goes_on_by_a_rule,
     not_with_exact,
-    samples_meet_steps,
     one_state,
+    samples_meet_steps,
     velocities,
 )
 from ..model.controls import a_control

@@ -243,7 +243,7 @@ class World:
         new = plan._replace(system=system.over_steps(plan.method, plan.t0, plan.dt))
         setting.same_operations(plan.system.parameters(batch), new.system.parameters(batch), names)
         carry = None
-        if plan.method.carry is not None:
+        if plan.method.begins:
             one, other = (list(bits_of_parameters(each.system, batch)) for each in (plan, new))
             carry = self._core.carry() if one == other else None  # the same numbers, written otherwise
         self._core.take(engine.model(new), new)
@@ -354,7 +354,7 @@ class World:
             whole.reshape(*own, plan.members)[..., index] = setting.of_some(name, value, own, over)
             wider[name] = whole
         after = setting.with_parameters(system, wider) if wider else system
-        carry = self._core.carry() if plan.method.carry is not None else None
+        carry = self._core.carry() if plan.method.begins else None
         for array, numbers in [*states, *live]:
             rows = array.reshape(*array.shape[: array.ndim - len(batch)], plan.members)
             rows[..., index] = numbers

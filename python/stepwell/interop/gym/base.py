@@ -268,7 +268,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         for name, (low, high) in self._randomised.items():
             array = world.parameters[name]
             array[..., places] = self.np_random.uniform(low, high, (*array.shape[:-1], len(places)))
-        if world.method.carry is not None or world._control is not None:
+        if world.method.begins or world._control is not None:
             world.reset(places, v=v, y=y)
         else:
             world.v[..., places] = v

@@ -99,7 +99,7 @@ class TracedVectorEnv(WorldVectorEnv):
         for tape, symbols in traced:
             step = tape.equations([], symbols)
             options: Any = {"single": True} if plan.single else {}
-            model = _core.ModelSpec(plan.system.kernel, plan.method.name, [*parameters, ("step()", step)], **options)
+            model = _core.ModelSpec(plan.system.kernel, plan.method.key, [*parameters, ("step()", step)], **options)
             core = _core.World(model, plan, np.empty(0, self.dtype), rows.reshape(-1))
             arrays = [(name, each.array.reshape(-1), each.row, each.least, each.most) for name, each in live.items()]
             core.watch(model, arrays)
@@ -113,7 +113,7 @@ class TracedVectorEnv(WorldVectorEnv):
         own_time = system.reads_time or bool(system.all_inputs())
         around = any(part.kind != "surfaces" for part in system.around)
         pushed = getattr(system, "push", None) is not None
-        return not (method.carry or method.is_implicit or own_time or around or pushed or world._plan.fused)
+        return not (method.begins or method.is_implicit or own_time or around or pushed or world._plan.fused)
 
     @property
     def steps(self) -> Any:

@@ -165,17 +165,15 @@ impl<T: Steppable> World<T> {
 
     /// Starts these members again from their state in the arrays, and goes on with all others, whose carry was this before.
     pub fn restart(&mut self, members: &[usize], carry: &mut [T], v: &[T], y: &[T]) {
-        if !self.carries || carry.len() != self.sizes.0 {
+        if !self.carries || carry.len() != self.sizes.0 + self.kept {
             return;
         }
         let (all, k) = (self.members, self.step);
         for share in &mut self.shares {
             share.load(v, y, all);
             share.group.start(k);
-            // What was started goes to the place of the velocities last written, which are copied below.
-            store(&mut self.written.0, all, (share.first, share.count), share.group.slots().0, share.group.lanes());
         }
-        for (row, started) in carry.chunks_exact_mut(all).zip(self.written.0.chunks_exact(all)) {
+        for (row, started) in carry.chunks_exact_mut(all).zip(self.held().chunks_exact(all)) {
             members.iter().for_each(|member| row[*member] = started[*member]);
         }
         self.carry_on(carry, v, y);
@@ -188,9 +186,11 @@ impl<T: Steppable> World<T> {
 
     /// The carry of the method and what it keeps, as rows of one number per member; none if the next step begins with `v` itself.
     pub fn carry(&self, v: &[T], y: &[T]) -> Option<Vec<T>> {
-        if self.is_moved(v, y) {
-            return None;
-        }
+        (!self.is_moved(v, y)).then(|| self.held())
+    }
+
+    /// The v slots and what the method keeps, as rows of one number per member.
+    fn held(&self) -> Vec<T> {
         let mut carry = vec![T::default(); self.sizes.0 + self.kept];
         for share in &self.shares {
             let mut rest = carry.as_mut_slice();
@@ -200,7 +200,7 @@ impl<T: Steppable> World<T> {
                 rest = others;
             }
         }
-        Some(carry)
+        carry
     }
 
     /// Continues with the carry that belongs to these arrays.
