@@ -85,7 +85,7 @@ impl<T: Of> ForceArray<T> {
 /// An array of a parameter, which the caller changes.
 struct LiveArray {
     name: String,
-    buffer: PyBuffer<f64>,
+    array: Py<PyArray1<f64>>,
     /// Its numbers now, and as they were read last.
     now: Vec<f64>,
     last: Vec<f64>,
@@ -118,15 +118,13 @@ impl Live {
             tables.push((*start, *interval, copied(by_row(samples)?)));
         }
         for (name, array, row, least, most) in arrays {
-            let buffer = PyBuffer::get(array.bind(py))?;
-            let (numbers, rows_of_it) = (buffer.item_count(), model.signature.count(&row));
+            let last = array.bind(py).try_readonly().map_err(in_use)?.as_slice()?.to_vec();
+            let rows_of_it = model.signature.count(&row);
             let Some(place) = model.signature.place(&row).filter(|_| rows_of_it > 0) else {
                 return Err(argument_error(format!("{name}: there is no such row")));
             };
-            let mut last = vec![0.0; numbers];
-            buffer.copy_to_slice(py, &mut last)?;
-            let width = numbers / rows_of_it;
-            live.push(LiveArray { name, buffer, now: last.clone(), last, place, width, bounds: (least, most) });
+            let width = last.len() / rows_of_it;
+            live.push(LiveArray { name, array, now: last.clone(), last, place, width, bounds: (least, most) });
         }
         Ok(Live { signature: Arc::clone(&model.signature), rows, tables, arrays: live, waits: false })
     }
@@ -134,8 +132,14 @@ impl Live {
     /// Gives the world what is in the arrays now, if it is not what was there before.
     fn read<T: Of>(&mut self, py: Python<'_>, world: &mut world::World<T>, changes: &AtomicI64) -> PyResult<()> {
         let Live { rows, arrays, waits, .. } = self;
-        for LiveArray { name, buffer, now, last, place, width, bounds } in arrays {
-            buffer.copy_to_slice(py, now)?;
+        for LiveArray { name, array, now, last, place, width, bounds } in arrays {
+            let array = array.bind(py);
+            if last.len() <= ONE_BY_ONE {
+                // To borrow an array takes longer than to read some numbers of it.
+                now.iter_mut().enumerate().for_each(|(i, now)| *now = array.get_owned([i]).unwrap_or(f64::NAN));
+            } else {
+                now.copy_from_slice(array.try_readonly().map_err(in_use)?.as_slice()?);
+            }
             if now.iter().zip(&*last).all(|(now, last)| now.to_bits() == last.to_bits()) {
                 continue;
             }
@@ -179,6 +183,8 @@ fn table(start: f64, interval: f64, samples: &[Vec<f64>]) -> Table<'_> {
 /// A name, its array, the parameter of which it is the rows, and the bounds of its numbers: above the first, at most the second.
 type WatchedArray = (String, Py<PyArray1<f64>>, String, f64, f64);
 
+/// Arrays of parameters of up to so many numbers are read number by number.
+const ONE_BY_ONE: usize = 16;
 /// Arrays of up to so many numbers are copied.
 const COPIED_NUMBERS: usize = 256;
 /// Other threads of Python go on meanwhile, unless a call is shorter than this part of the time between two checks: then to let

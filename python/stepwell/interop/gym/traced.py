@@ -113,7 +113,8 @@ class TracedVectorEnv(WorldVectorEnv):
         own_time = system.reads_time or bool(system.all_inputs())
         around = any(part.kind != "surfaces" for part in system.around)
         pushed = getattr(system, "push", None) is not None
-        return not (method.begins or method.is_implicit or own_time or around or pushed or world._plan.fused)
+        no_tape = method.begins or method.is_implicit or method.is_exact
+        return not (no_tape or own_time or around or pushed or world._plan.fused)
 
     @property
     def steps(self) -> Any:

@@ -88,8 +88,8 @@ class System(Immutable, ValueEquality, ABC):
     @property
     def _instead(self) -> str:
         return (
-            f"make another {self.kind_name}, with what is to change; for a number that changes each frame use force=, or a state "
-            f"whose rate is zero. A World that goes on from here: World(system, method, resume=world)"
+            f"make another {self.kind_name}, with what is to change; in a World use world.set(…) or world.parameters, or make "
+            f"another that goes on from here: World(system, method, resume=world)"
         )
 
     def part(self, kind: str) -> Any:
