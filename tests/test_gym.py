@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import doctest
 import inspect
+import pickle
 import sys
 import warnings
 from itertools import pairwise
@@ -227,6 +229,27 @@ def test_methods_that_are_not_on_that_tape(method: str) -> None:
     envs.reset(options={"reset_mask": np.arange(6) < 3})
     np.testing.assert_array_equal(envs.world.y[3:], before)
     assert np.isfinite(envs.step(np.ones((6, 1), F))[0]).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_copies_and_pickles_go_on_alike(name: str) -> None:
+    ranges = {"CartPole": {"pole": (0.05, 0.2)}, "Pendulum": {"omega": (3.0, 4.0)}}.get(name, {"gravity": (9.0, 10.0)})
+    envs = many(name, 6, max_episode_steps=9, randomise=ranges, render_mode="rgb_array")
+    envs.action_space.seed(1)
+    envs.reset(seed=1)
+    for _ in range(5):
+        envs.step(envs.action_space.sample())
+    envs.render()
+    others = [copy.deepcopy(envs), pickle.loads(pickle.dumps(envs))]
+    assert all(other._play is not None for other in others)
+    for _ in range(30):
+        action = envs.action_space.sample()
+        mine = envs.step(action)
+        for other in others:
+            for a, b in zip(mine[:4], other.step(action)[:4], strict=True):
+                np.testing.assert_array_equal(a, b)
+            np.testing.assert_array_equal(envs.steps, other.steps)
+    assert len(others[0].render()) == 6
 
 
 # ---- when an episode begins anew, and with which parameters

@@ -199,6 +199,22 @@ def _world(**arguments: Any) -> sw.World:
     return sw.World(**arguments | arrays)
 
 
+def _set(**parameters: Any) -> sw.World:
+    world = sw.World(sw.Pendulum(a=0.0), "leapfrog", v=np.zeros(3), y=np.ones(3), dt=0.1)
+    world.step(2)
+    world.set(**parameters)
+    world.step(2)
+    return world
+
+
+def _reset(members: Any, **states: Any) -> sw.World:
+    world = sw.World(sw.Pendulum(np.ones(3)), "leapfrog", v=np.zeros(3), y=np.ones(3), dt=0.1)
+    world.step(2)
+    world.reset(members, **states)
+    world.step(2)
+    return world
+
+
 def _of_run(name: str) -> Callable[..., Any]:
     return getattr(sw.integrate(**FREE, dt=0.1, steps=3, every=1), name)
 
@@ -333,6 +349,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "scenes.aircraft": (sw.scenes.aircraft, {"form": "euler", "roll": 40.0, "pitch": 0.0}),
     "scenes.gimbal_trap": (sw.scenes.gimbal_trap, {"form": "quaternion", "roll": 2.0, "torque": -1.5}),
     "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None, "force": None}),
+    "World.set": (_set, {"omega": 2.0, "a": 1.0}),
+    "World.reset": (_reset, {"members": 1, "v": 0.5, "y": 0.2, "omega": 2.0}),
     "World events": (_world, FREE | {"dt": 0.1, "events": [sw.Event(passage)]}),
     "scenes.rober": (sw.scenes.rober, {"horizon": 40.0}),
     "scenes.oregonator": (sw.scenes.oregonator, {"horizon": 360.0}),

@@ -141,6 +141,9 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         self._begun, self._over = False, np.zeros(self.num_envs, dtype=np.bool_)
         self.prepare()
 
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_camera": None, "_window": None}
+
     def prepare(self) -> None:
         """Called last when an environment is made, once its world is there."""
 

@@ -26,6 +26,8 @@ from .base import Observations, Truths, WorldVectorEnv
 MOST_OPERATIONS = 4000
 #: The rows behind the state that go on, and those of reward and truths: see ``World.play`` of the core.
 GO_ON, MADE = 2, 3
+#: The attributes that a copy makes for itself.
+OF_A_TAPE = ("_play", "_look", "_rows", "_actions")
 
 
 class TracedVectorEnv(WorldVectorEnv):
@@ -89,6 +91,8 @@ class TracedVectorEnv(WorldVectorEnv):
         rows[self._numbers + 1] = self._over
         self._rows, self._over = rows, rows[self._numbers + 1]
         self._actions = rows[self._kept :][:acted]
+        for name in self._randomised:
+            world.parameters[name]  # lives, so that the tape sees what episodes draw
         live = world._live
         self.world = World(world.system, plan.method, v=v, y=y, force=force, resume=world)
         if live:
@@ -105,6 +109,14 @@ class TracedVectorEnv(WorldVectorEnv):
             core.watch(model, arrays)
             made.append(core)
         self._play, self._look = made
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = super().__getstate__() | {"_steps": np.array(self.steps), "_over": np.asarray(self._over, np.bool_)}
+        return {name: value for name, value in state.items() if name not in OF_A_TAPE}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.prepare()
 
     def _fits(self) -> bool:
         """Whether the world's steps can be on a tape of their own."""
