@@ -70,14 +70,15 @@ test-wheels: .venv/wheels ## build them, check them, and try this machine's in a
 	$(BIN)/python tests/wheels.py dist/wheels
 	$(BIN)/python tests/installed.py dist/wheels
 
-# Old packages use what newer ones below them call deprecated. The extra sweep is left out: of what it installs the oldest versions that go together need NumPy 2.
-OLDEST := chart,gym,progress,tables,zarr
+# Of a wheel only the wheel itself is direct: its needs are named here. Old packages use what newer ones below them call deprecated. The extra sweep is left out: of what it installs the oldest versions that go together need NumPy 2.
+OLDEST := chart gym progress tables zarr
 RUST   := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 test-oldest: .venv/uv .venv/wheel ## build the core with the oldest Rust, and run the tests with the oldest NumPy and other packages, of Cargo.toml and pyproject.toml
 	rustup toolchain install --profile minimal $(RUST)
 	cargo +$(RUST) check --workspace --locked
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python .venv/oldest
-	$(UV) --resolution lowest-direct "$$(ls dist/*.whl)[$(OLDEST)]"
+	$(UV) --resolution lowest-direct -r pyproject.toml $(OLDEST:%=--extra %)
+	$(UV) --no-deps dist/*.whl
 	$(BIN)/uv pip freeze --python .venv/oldest > .venv/oldest.txt
 	$(UV) --constraint $(PINS) --constraint .venv/oldest.txt pytest pytest-xdist hypothesis mpmath packaging
 	$(subst $(BIN)/python,.venv/oldest/bin/python,$(PYTEST)) -W ignore::DeprecationWarning
