@@ -282,6 +282,12 @@ def test_an_array_for_each_member() -> None:
     assert omega.shape == ()
     world.set(omega=[1.0, 2.0, 3.0])
     assert world.parameters["omega"].shape == (3,)
+    wide = world.parameters["omega"]
+    for number in (2.0, np.array(3.0), [4.0]):  # the array stays as wide as it is
+        world.set(omega=number)
+        assert world.parameters["omega"] is wide
+        np.testing.assert_array_equal(wide, np.full(3, np.max(number)))
+        np.testing.assert_array_equal(world.system.omega, wide)
     with pytest.raises(ValueError, match="read-only"):
         omega[...] = 2.0
     assert_goes_on(world, sw.World(world.system, "false_euler", resume=world))

@@ -15,6 +15,7 @@ from ..base.reprs import MAX_LINE, counted, facts, shortened
 from ..errors import ArgumentError, FixedError, ShapeError, UnsupportedError
 from ..model import setting
 from ..model.controls import AnyControl
+from ..model.inputs import Input
 from ..model.methods import Method
 from ..model.systems import System
 from . import engine, float32
@@ -223,11 +224,24 @@ class World:
 
     def _set(self, parameters: dict[str, Any]) -> None:
         before = self.system
+        parameters = {name: self._spread(name, value) for name, value in parameters.items()}
         self._take(setting.with_parameters(before, parameters), parameters)
         known = setting.direct(self._system, self._plan.batch)
         for name in parameters:
             if name in known:
                 self._live_array(name)  # so that the next time takes no more than writing it
+
+    def _spread(self, name: str, value: Any) -> Any:
+        """Numbers for all members over the array that the parameter has, so that this stays as wide as it is."""
+        each, axes = self._live.get(name), len(self._plan.batch)
+        if each is None or not axes or each.array.shape[-axes:] != self._plan.batch or isinstance(value, Input):
+            return value
+        numbers = checks.numbers(name, value)
+        if numbers.ndim and numbers.shape == each.array.shape[:-axes]:
+            numbers = numbers.reshape(*numbers.shape, *(1,) * axes)
+        sizes = zip(numbers.shape, each.array.shape, strict=False)
+        fits = numbers.ndim in (0, each.array.ndim) and all(one in (1, size) for one, size in sizes)
+        return np.array(np.broadcast_to(numbers, each.array.shape)) if fits else numbers
 
     def _take(self, system: System, names: Any) -> None:
         """Go on with other parameters."""
