@@ -346,7 +346,7 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     ),
     (lambda: sw.discretise(SYSTEM, 0.1, delay=-0.1), ArgumentError, "delay: expected a dead time of zero or more, got -0.1"),
     (lambda: sw.discretise(SYSTEM, 0.1, delay=[0.1, 0.2]), ShapeError, "delay: expected one number"),
-    (lambda: sw.discretise(SYSTEM, 0.1, delay=1e9), ArgumentError, "delay: the matrices with the samples under way"),
+    (lambda: sw.discretise(SYSTEM, 0.1, delay=1e9), ArgumentError, "delay, dt: expected a dead time of at most 10000 samples"),
     (lambda: sw.discretise(SYSTEM, 0.1, "tustin", prewarp=1.0, delay=0.13), UnsupportedError, "delay: with prewarp="),
     (lambda: sw.discretise(SYSTEM, 0.1).run(1.0), ShapeError, "x: expected shape (samples, batch…)"),
     (lambda: sw.discretise(sw.Oscillator(), 0.1).run([1.0]), ShapeError, "x: expected shape (samples, 2, batch…)"),

@@ -11,6 +11,8 @@ from .analysis.discrete import DiscreteSystem as DiscreteSystem
 from .analysis.discrete import discretise as discretise
 from .analysis.discrete import frequency_response as frequency_response
 from .analysis.discrete import margins as margins
+from .analysis.discrete import sampled_loop as sampled_loop
+from .analysis.discrete import sampling_limit as sampling_limit
 from .analysis.dynamics import equilibria as equilibria
 from .analysis.dynamics import jacobian as jacobian
 from .analysis.dynamics import lyapunov as lyapunov

@@ -424,6 +424,15 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         {"omega": [1.0, 2.0]},
     ),
     "frequency_response": (sw.frequency_response, {"system": sw.TransferFunction(1.0, [1.0, 1.0]), "omega": [1.0, 2.0]}),
+    "sampled_loop": (
+        sw.sampled_loop,
+        {"plant": sw.TransferFunction(1.0, [1.0, 1.0]), "controller": sw.TransferFunction(1.0, [1.0, 0.0]), "dt": 0.1}
+        | {"delay": 0.03, "samples": 1, "how": "tustin"},
+    ),
+    "sampling_limit": (
+        sw.sampling_limit,
+        {"plant": sw.TransferFunction(1.0, [1.0, 0.0]), "controller": 4.0, "delay": 0.0, "samples": 1, "how": "tustin"},
+    ),
     "margins": (sw.margins, {"loop": sw.TransferFunction(9.0, [1.0, 3.0, 3.0, 1.0])}),
     "stability_limit at": (sw.stability_limit, {"system": sw.Pendulum(), "method": "rk4", "at": (0.0, 1.0), "t": 0.0}),
     "analyse v y": (sw.analyse, {"system": sw.Pendulum(), "method": "rk4", "dt": 0.1, "v": 0.0, "y": 1.0}),

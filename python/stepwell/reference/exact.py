@@ -84,7 +84,8 @@ def _scaled(M: Array, h: Any) -> Twice:
     h = np.asarray(h, dtype=np.float64)
     axes = max(M.ndim - 2, h.ndim)
     M = M.reshape(*M.shape[:2], *(1,) * (axes + 2 - M.ndim), *M.shape[2:])
-    high, low = two_product(M, h)
+    with np.errstate(all="ignore"):
+        high, low = two_product(M, h)
     return np.array(high), np.array(low)
 
 

@@ -1,10 +1,20 @@
 """Sampled systems (§4): a linear system from sample to sample, exactly or by a method, and its frequency response.
 
 ``systems`` makes the matrices of a step, ``response`` computes frequency responses, ``margins`` those of
-a loop.
+a loop; ``loops`` closes one by a sampled controller.
 """
 
+from .loops import sampled_loop, sampling_limit
 from .margins import Margins, frequency_response, margins
 from .systems import DiscreteSystem, SampledRun, discretise
 
-__all__ = ["DiscreteSystem", "Margins", "SampledRun", "discretise", "frequency_response", "margins"]
+__all__ = [
+    "DiscreteSystem",
+    "Margins",
+    "SampledRun",
+    "discretise",
+    "frequency_response",
+    "margins",
+    "sampled_loop",
+    "sampling_limit",
+]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Shape
-from ...errors import UnsupportedError
+from ...errors import TooLargeError, UnsupportedError
 from ...model.inputs import Sampled
 from ...model.methods import Method
 from ...model.parameters import aligned
@@ -19,6 +19,10 @@ from ...runs.integration import quietly
 
 #: A dead time that is nearer to whole samples than this share of one is that of whole samples.
 WHOLE = 1e-9
+
+
+#: The most samples of dead time.
+MOST_SAMPLES = 10_000
 
 
 class Parts(NamedTuple):
@@ -38,6 +42,10 @@ class Parts(NamedTuple):
 def samples_of(delay: float, dt: float) -> tuple[int, float]:
     """Dead time as whole samples and the rest of it, below dt."""
     share = delay / dt
+    if not share <= MOST_SAMPLES:
+        raise TooLargeError(
+            f"delay, dt: expected a dead time of at most {MOST_SAMPLES} samples, each of them a state, got {share:g}"
+        )
     whole = round(share)
     if abs(share - whole) > WHOLE:
         whole = int(share)

@@ -261,12 +261,16 @@ def discretise(
     way, method = _way(how)
     if method is None and way != "exact":
         if interpolation is not None:
-            raise ArgumentError(f"interpolation: expected None, as {way!r} says how the input runs, got {interpolation!r}")
+            raise ArgumentError(
+                f"interpolation: expected None, as {way!r} says how the input runs, got {checks.short(interpolation)}"
+            )
         between = {"zoh": "hold", "impulse": None}.get(way, "linear")
     else:
         between = checks.known("interpolation", "hold" if interpolation is None else interpolation, BETWEEN)
     if prewarp is not None and way != "tustin":
-        raise ArgumentError(f'prewarp: expected None for {way!r}, since only "tustin" moves frequencies; got {prewarp!r}')
+        raise ArgumentError(
+            f'prewarp: expected None for {way!r}, since only "tustin" moves frequencies; got {checks.short(prewarp)}'
+        )
     checks.fits("system: the matrices of a step", 60.0 * (len(system.A) + 2) ** 2, system.batch, "take fewer states")
     delay = float(checks.not_negative("delay", checks.number("delay", delay), "a dead time"))
     late = samples_of(delay, dt)
@@ -274,7 +278,12 @@ def discretise(
     if way == "tustin":
         method = find_method("trapezoidal")
     if method is not None:
-        P, Q, after = of_method(system, method, _warped(dt, prewarp), cast("SampleInterpolation", between))
+        try:
+            fits_together(system, method)
+        except UnsupportedError as error:
+            raise UnsupportedError(f"how: {error}") from None
+        with np.errstate(all="ignore"):  # a step may be so long that its states leave all numbers
+            P, Q, after = of_method(system, method, _warped(dt, prewarp), cast("SampleInterpolation", between))
     else:
         P, Q, after = _exactly(system, dt, way, between)
     part = realised(system, of_states=True) if system.B is not None else None
