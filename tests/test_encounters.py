@@ -28,7 +28,7 @@ def integrated(*arguments: Any, **options: Any) -> tuple[sw.Run, str]:
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.013, 0.001])
-@pytest.mark.parametrize("method", [m.name for m in sw.methods()])
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.name != "wisdom_holman"])  # which follows both exactly
 def test_head_on(method: str, dt: float) -> None:
     """Whatever comes after it, and whatever the energy; leapfrog's was 2585 at status OK.
 

@@ -79,6 +79,7 @@ def test_angular_momentum_is_not_kept_by_standard_euler() -> None:
 def test_the_order_of_the_bodies_does_not_matter(seed: int, n: int, dim: int, force: str, method: str) -> None:
     """Sums are made in another order: equal to rounding, which close encounters multiply."""
     assume(not sw.method(method).has_series or n <= MOST_IN_SERIES)
+    assume(method != "wisdom_holman" or force != "newton")  # each body goes around those before it
     system, v, y = bodies(seed, n, dim, force)
     order = np.random.default_rng(seed).permutation(n)
     run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=100)

@@ -125,6 +125,9 @@ def test_the_order_is_the_declared_one(name: str, method: sw.Method) -> None:
     few per cent of it.
     """
     true = ends(name, "fehlberg_5", 20_000)
+    if (name, method.name) == ("ellipse", "wisdom_holman"):  # two bodies alone, on Kepler's orbit, in one step
+        assert max(np.abs(end - exact).max() for end, exact in zip(ends(name, method.name, 1), true, strict=True)) < 1e-12
+        return
     try:
         ends(name, method.name, 4)
     except UnsupportedError:

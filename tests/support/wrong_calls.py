@@ -383,6 +383,16 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "orbits.state": (sw.orbits.state, {"mu": 1.0, "t": 0.5, "dim": 3, "a": 1.0, "eccentric_anomaly": 0.5, "e": 0.1}),
     "orbits.state by longitude": (sw.orbits.state, {"mu": 1.0, "a": -1.0, "true_longitude": 0.5, "e": 1.1}),
     "orbits.of_state": (sw.orbits.of_state, {"mu": 1.0, "v": [0.0, 1.0], "y": [1.0, 0.0], "t": 0.5}),
+    "orbits.corrected": (
+        sw.orbits.corrected,
+        {"system": sw.NBody([1.0, 0.1], force="newton"), "v": [[0.0, -0.1], [0.0, 1.0]], "y": [[-0.1, 0.0], [1.0, 0.0]]}
+        | {"dt": 0.1, "order": 5},
+    ),
+    "orbits.uncorrected": (
+        sw.orbits.uncorrected,
+        {"of": sw.NBody([1.0, 0.1], force="newton"), "v": [[0.0, -0.1], [0.0, 1.0]], "y": [[-0.1, 0.0], [1.0, 0.0]]}
+        | {"dt": 0.1, "order": 3},
+    ),
     "orbits.jacobi": (sw.orbits.jacobi, {"masses": [1.0, 1.0], "block": [[0.0, 0.0], [1.0, 0.0]]}),
     "orbits.inertial": (sw.orbits.inertial, {"masses": [1.0, 1.0], "block": [[0.0, 0.0], [1.0, 0.0]]}),
     "orbits.eccentric_anomaly": (sw.orbits.eccentric_anomaly, {"mean_anomaly": 0.5, "e": 0.1}),

@@ -121,6 +121,11 @@ class Method(Immutable):
         return self.has_series or self.is_implicit
 
     @property
+    def splits(self) -> bool:
+        """Whether it moves bodies by Kepler's motions, so that a step of them is one tape."""
+        return not self.is_exact and any(name == "drift of y" for name, _, _ in _core.program(self.key)[0])
+
+    @property
     def takes_derivatives_by_time(self) -> bool:
         """Whether a step takes the derivatives of rates by the time, and with them those of inputs."""
         return self.has_series or (not self.is_exact and any(name == "v by time" for name, _, _ in _core.program(self.key)[0]))

@@ -169,6 +169,8 @@ def _of_divergence(run: Run, request: Request) -> Finding | None:
         place = run.status.shape, run.t0 + run.start_step * run.dt, start, first
         if wrong := of_the_start(run.system, *place) or of_derivatives(run.system, run.method, *place):
             why = f"; {wrong} at the start, t = {time_of(run, run.start_step, first):g}"
+    if run.method.splits and isinstance(run.system, NBody) and run.system.force == "newton":
+        why += "; a step is too long for Kepler's motion on an orbit there, so take shorter steps, or dop853 with a tolerance"
     number = int(np.count_nonzero(bad))
     return Finding(
         DivergenceWarning,

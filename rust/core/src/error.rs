@@ -67,6 +67,16 @@ pub enum Error {
         /// What it may have.
         most: usize,
     },
+    /// A step by Kepler motions that is too long.
+    #[error(
+        "method: a step by Kepler motions of so many bodies has about {operations} operations, and may have {most}; take leapfrog for many bodies"
+    )]
+    TooLongToSplit {
+        /// What a step has.
+        operations: usize,
+        /// What it may have.
+        most: usize,
+    },
     /// A step that is too long to solve equations.
     #[error(
         "method: the equations of a step of this system by an implicit method have {unknowns} unknowns and up to {operations} \

@@ -64,6 +64,9 @@ pub(crate) fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperat
             Entry::ByTimeV => ("v by time", 0.0),
             Entry::ByTimeY => ("y by time", 0.0),
             Entry::Mass(_) => ("mass", 0.0),
+            Entry::Kick(t, ..) => ("kick", t.node()),
+            Entry::DriftV(share, ..) => ("drift of v", share),
+            Entry::DriftY(share, ..) => ("drift of y", share),
             Entry::Kept(i, of_v) => (if of_v { "kept v" } else { "kept y" }, f64::from(i)),
         };
         (name, entry.operands().into_iter().map(|block| block.index()).collect(), number)

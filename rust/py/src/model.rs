@@ -60,6 +60,7 @@ pub(crate) fn core_error(error: Error) -> PyErr {
         Error::Memory { .. } => "TooLargeError",
         Error::TooLongForSeries { .. }
         | Error::TooLongToSolve { .. }
+        | Error::TooLongToSplit { .. }
         | Error::TooLongForTimes { .. }
         | Error::MassMatrix { .. } => "UnsupportedError",
         _ => "ArgumentError",

@@ -3,6 +3,7 @@
 Angles are in rad. Arrays have one entry for each orbit along the first axis, and batch axes last.
 """
 
+from .corrector import corrected, uncorrected
 from .elements import Elements, of_state, state
 from .hierarchy import Start, elements, inertial, jacobi, system
 from .kepler import eccentric_anomaly
@@ -11,6 +12,7 @@ from .units import gravity
 __all__ = [
     "Elements",
     "Start",
+    "corrected",
     "eccentric_anomaly",
     "elements",
     "gravity",
@@ -19,4 +21,5 @@ __all__ = [
     "of_state",
     "state",
     "system",
+    "uncorrected",
 ]

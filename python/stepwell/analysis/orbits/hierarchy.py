@@ -177,14 +177,14 @@ def elements(of: Any, v: Any = None, y: Any = None, *, t: Any = 0.0, around: Any
     if isinstance(of, Run):
         if v is not None or y is not None:
             raise ArgumentError("v, y: expected none beside a run, which has its own")
-        bodies, t = _bodies(of.system), np.asarray(of.t)
+        bodies, t = newtonian("of", of.system), np.asarray(of.t)
         saved = of.v.shape[0]
         # The saved states become the first axis of the batch.
         v, y = np.moveaxis(of.v, 0, 2), np.moveaxis(of.y, 0, 2)
         times = t.reshape(saved, *(1,) * (v.ndim - 3)) if t.ndim == 1 else t
         made = _elements(bodies, v, y, times, around)
         return made._replace(**{name: np.moveaxis(getattr(made, name), 1, 0) for name in made._fields})
-    bodies = _bodies(of)
+    bodies = newtonian("of", of)
     if v is None or y is None:
         raise ArgumentError("v, y: expected the state of the bodies, got none; a run has its own")
     bodies = bodies.for_state_shapes(v, y)
@@ -252,13 +252,13 @@ def inertial(masses: Any, block: Any) -> Array:
     return np.stack([centre, *reversed(rows)])
 
 
-def _bodies(of: Any) -> NBody:
+def newtonian(argument: str, of: Any) -> NBody:
     """The bodies, if Newton's force is between them."""
     if not isinstance(of, NBody):
         kind = of if isinstance(of, System) else type(of).__name__
-        raise DTypeError(f"of: expected a run of NBody or the bodies, got {kind}")
+        raise DTypeError(f"{argument}: expected a run of NBody or the bodies, got {kind}")
     if of.force != "newton":
-        raise UnsupportedError(f"of: expected bodies under Newton's force, which has such orbits, got force={of.force!r}")
+        raise UnsupportedError(f"{argument}: expected bodies under Newton's force, which has such orbits, got force={of.force!r}")
     return of
 
 

@@ -61,6 +61,10 @@ def operations(method: str | Method, system: System | None = None) -> Operations
         raise ShapeError(f"system: expected one member to count the operations of, got a batch of shape {system.batch}")
     counted = written(Plan(system, method, (), 1.0))
     kinds = Counter(name for name, _, _ in _core.program(method.key)[0])
-    of_v, of_y = [evaluations(method, system)] * 2 if method.has_series else [kinds["dv"], kinds["dy"]]
+    of_v, of_y = (
+        [evaluations(method, system)] * 2
+        if method.has_series
+        else [kinds["dv"] + kinds["kick"], kinds["dy"] + kinds["drift of y"]]
+    )
     arithmetic = {kind: counted[kind] for kind in Operations._fields[:4]}
     return Operations(**arithmetic, rate_evaluations=of_v, rate_evaluations_y=of_y)

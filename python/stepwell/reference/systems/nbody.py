@@ -51,6 +51,26 @@ def square(d: Array) -> Array:
     return length
 
 
+def apart(shares: Array, block: Array) -> tuple[Array, Array]:
+    """Each body but the first from the centre of mass of those before it, and the centre of mass of all."""
+    centre, rows = block[0], []
+    for k in range(1, len(block)):
+        rows.append(block[k] - centre)
+        centre = centre + shares[k - 1] * rows[-1]
+    return np.stack(rows), centre
+
+
+def gathered(shares: Array, rows: Array, centre: Array | None) -> Array:
+    """The inverse: all bodies. The centre of mass is the origin if None."""
+    bodies: list[Array] = []
+    for k in range(len(rows) - 1, -1, -1):
+        lever = shares[k] * rows[k]
+        before: Array = -lever if centre is None else centre - lever
+        bodies.append(before + rows[k])
+        centre = before
+    return np.stack([before, *reversed(bodies)])
+
+
 class NBody(Recorded):
     """v̇ᵢ = Σⱼ G·mⱼ·(yⱼ − yᵢ)·f(r² + ε²), ẏ = v, with f = 1/r² (``logarithmic``, ``printed``) or 1/r³ (``newton``).
 
@@ -61,6 +81,7 @@ class NBody(Recorded):
         self.h = h
         self.force = force
         self.masses = masses
+        self.alone = strength
         self.strength = h * strength  # h·G·m
         self.soft = softening * softening
         self.half = (0.5 * h) * masses
@@ -76,6 +97,37 @@ class NBody(Recorded):
     def velocity(self, d: Array) -> Array:
         """The v whose increment of y is d."""
         return d / self.h
+
+    def central(self, y: Array) -> Array | None:
+        """H times the acceleration of Kepler's motions about the centres of the bodies before (Jacobi); None without these."""
+        if self.force != "newton" or len(y) < 2:
+            return None
+        shares, mu = self.hierarchy()
+        rows, _ = apart(shares, y)
+        inverse = 1.0 / np.sqrt(square(rows))
+        pull = (-self.h * mu) * (inverse * (inverse * inverse))
+        return gathered(shares, rows * pull[:, np.newaxis], None)
+
+    def drift(self, share: float, v: Array, y: Array) -> tuple[Array, Array]:
+        """The state after a share of the step of Kepler's motions; the centre of mass flies freely."""
+        from .. import kepler  # other methods need no such motion
+
+        h = self.h if share == 1.0 else share * self.h
+        shares, mu = self.hierarchy()
+        places, _ = apart(shares, y)
+        velocities, flight = apart(shares, v)
+        dv, dy = kepler.moved(mu, h, velocities, places)
+        return v + gathered(shares, dv, None), y + gathered(shares, dy, h * flight)
+
+    def hierarchy(self) -> tuple[Array, Array]:
+        """Of each body but the first its share in the mass of all up to it, and G times that mass."""
+        mass, mu = self.masses[0], self.alone[0]
+        shares, strengths = [], []
+        for k in range(1, len(self.masses)):
+            mass, mu = mass + self.masses[k], mu + self.alone[k]
+            shares.append(self.masses[k] / mass)
+            strengths.append(mu)
+        return np.stack(shares), np.stack(strengths)
 
     def meet(self, y: Array, potential: Array | None) -> Array:
         """h·v̇ from every pair once; adds h·G·Σⱼ mⱼ·φ to ``potential`` for each body, if it is there.

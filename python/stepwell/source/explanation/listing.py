@@ -291,7 +291,8 @@ def lines_of_program(plan: Plan, attempts: bool) -> tuple[Section, ...]:
     called = dict(zip(results, [f"{carry}'", "y'", "error_v", "error_y", "coarse_v", "coarse_y"], strict=False))
     counts: Counter[str] = Counter()
     for place, (name, of, _) in enumerate(entries):
-        if name in ("dv", "dy"):
+        if name in ("dv", "dy", "kick"):
+            name = "dv" if name == "kick" else name
             counts[name] += 1
             called.setdefault(place, f"{name}{counts[name]}")
             for block, operand in zip("vy", of, strict=True):
@@ -305,13 +306,20 @@ def lines_of_program(plan: Plan, attempts: bool) -> tuple[Section, ...]:
         match name:
             case "v" | "y":
                 text = Formula(carry if name == "v" else "y")
-            case "dv" | "dy":
+            case "dv" | "dy" | "kick":  # a step by Kepler motions is one tape: here a kick is h·v̇
+                name = "dv" if name == "kick" else name
                 t = "t" if share == 0.0 else "t + h" if share == 1.0 else f"t + {share!r}·h"
                 text = Formula(f"{name}({t}, {parts[0].text}, {parts[1].text})")
             case "implicit v" | "implicit y":
                 text = Formula(f"solve_{name[-1]}({parts[0].text}, {parts[1].text})")
             case "v by time" | "y by time":
                 text = Formula(f"d{name[0]}_by_t")
+            case "drift of v":
+                text = parts[0]
+            case "drift of y":  # and a drift is free flight
+                flight = Formula(f"dy(t, {parts[0].text}, {parts[1].text})")
+                flight = flight if share == 1.0 else formula("multiply", [number(_bits(share)), flight], 0, [None, None])
+                text = formula("add", [parts[1], flight], 0, [None, None])
             case "mass":
                 text = parts[0]  # a step with a mass matrix is one tape
             case "scale":

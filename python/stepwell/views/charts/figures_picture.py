@@ -38,6 +38,10 @@ MARKS = (
 )
 
 
+#: Letters of a title; the names of more methods together are written smaller.
+LETTERS = 50
+
+
 def overview(chart: Figures) -> Figure:
     """All methods on one figure: those of the same eigenvalues share a panel, and so do the errors of those that look exact."""
     apart, exact = groups(chart)
@@ -117,7 +121,7 @@ def _together(axes: Axes, chart: Figures, same: list[Samples]) -> None:
 
 def _head(axes: Axes, name: str, words: str) -> None:
     """The title of a panel, and below it what it shows."""
-    axes.set_title(name, loc="left", size=13, weight="bold", pad=23.0)
+    axes.set_title(name, loc="left", size=13 if len(name) <= LETTERS else 11, weight="bold", pad=23.0)
     axes.text(0.0, 1.03, words, transform=axes.transAxes, size=12, color=GREY)
 
 

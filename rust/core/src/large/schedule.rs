@@ -172,6 +172,21 @@ impl PassPlan {
                 Entry::Dv(at, v, y) => (Node::Ask(Rate::Dv, at, if traits.reads_v { of(v) } else { V }, of(y)), true),
                 Entry::Dy(_, v, _) if traits.second_order => (Node::TimesStep(of(v)), false),
                 Entry::Dy(at, v, y) => (Node::Ask(Rate::Dy, at, of(v), of(y)), false),
+                // A system with a splitting of its own is one tape (`tapes.rs`): here a kick is h·v̇, and a drift is free flight.
+                Entry::Kick(at, v, y) => (Node::Ask(Rate::Dv, at, if traits.reads_v { of(v) } else { V }, of(y)), true),
+                Entry::DriftV(_, v, _) => {
+                    made.push(made[v.index()]);
+                    continue;
+                }
+                Entry::DriftY(share, v, y) => {
+                    let dy =
+                        if traits.second_order { Node::TimesStep(of(v)) } else { Node::Ask(Rate::Dy, Time::START, of(v), of(y)) };
+                    nodes.push(dy);
+                    if share != 1.0 {
+                        nodes.push(Node::Scale(share, nodes.len() - 1));
+                    }
+                    (Node::Add(of(y), nodes.len() - 1), false)
+                }
                 Entry::Velocity(d) if traits.second_order => (Node::PerStep(of(d)), true),
                 Entry::Velocity(d) => (Node::Ask(Rate::Velocity, Time::START, V, of(d)), true),
                 Entry::Add(a, b) => (Node::Add(of(a), of(b)), made[a.index()].1),

@@ -3,6 +3,7 @@
 pub mod around;
 mod elimination;
 pub(crate) mod implicit;
+pub(crate) mod kepler;
 pub mod method;
 pub mod methods;
 mod newton;

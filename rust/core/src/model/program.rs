@@ -97,6 +97,12 @@ pub enum Entry {
     ImplicitY(f64, Block, Block),
     /// M·y, with the mass matrix of the system.
     Mass(Block),
+    /// h·v̇ at a time and a state, without the forces of the part whose motion is known.
+    Kick(Time, Block, Block),
+    /// v after a share of the step under that part alone.
+    DriftV(f64, Block, Block),
+    /// Likewise y.
+    DriftY(f64, Block, Block),
     /// h times the derivative of h·v̇ by the time, at the start of the step.
     ByTimeV,
     /// Likewise of y.
@@ -112,6 +118,7 @@ impl Entry {
             Entry::Dv(_, a, b) | Entry::Dy(_, a, b) | Entry::Add(a, b) | Entry::Sub(a, b) => vec![a, b],
             Entry::SeriesV(_, a, b) | Entry::SeriesY(_, a, b) => vec![a, b],
             Entry::ImplicitV(_, a, b) | Entry::ImplicitY(_, a, b) => vec![a, b],
+            Entry::Kick(_, a, b) | Entry::DriftV(_, a, b) | Entry::DriftY(_, a, b) => vec![a, b],
         }
     }
 
@@ -130,6 +137,9 @@ impl Entry {
             Entry::ImplicitV(gamma, a, b) => Entry::ImplicitV(gamma, to(a), to(b)),
             Entry::ImplicitY(gamma, a, b) => Entry::ImplicitY(gamma, to(a), to(b)),
             Entry::Mass(a) => Entry::Mass(to(a)),
+            Entry::Kick(t, a, b) => Entry::Kick(t, to(a), to(b)),
+            Entry::DriftV(c, a, b) => Entry::DriftV(c, to(a), to(b)),
+            Entry::DriftY(c, a, b) => Entry::DriftY(c, to(a), to(b)),
         }
     }
 
@@ -152,6 +162,9 @@ impl Entry {
             Entry::ByTimeY => (13, 0, 0, 0),
             Entry::Mass(a) => (14, 0, a.0, 0),
             Entry::Kept(i, of_v) => (15, 0, i, u32::from(of_v)),
+            Entry::Kick(t, a, b) => (16, t.0.to_bits(), a.0, b.0),
+            Entry::DriftV(c, a, b) => (17, c.to_bits(), a.0, b.0),
+            Entry::DriftY(c, a, b) => (18, c.to_bits(), a.0, b.0),
         }
     }
 }
@@ -228,6 +241,16 @@ impl Rates {
         (v, write(Entry::Mass(y)))
     }
 
+    /// h·v̇ without the forces of the part whose motion is known: all of it, of a system that has no such part.
+    pub(crate) fn kick(self, t: Time, v: Block, y: Block) -> Block {
+        write(Entry::Kick(t, v, y))
+    }
+
+    /// The state after a share of the step under the part whose motion is known: free flight, of a system that has none.
+    pub(crate) fn drift(self, share: f64, v: Block, y: Block) -> (Block, Block) {
+        (write(Entry::DriftV(share, v, y)), write(Entry::DriftY(share, v, y)))
+    }
+
     /// h times the derivatives of h·v̇ and h·ẏ by the time, at the start of the step.
     pub(crate) fn by_time(self) -> (Block, Block) {
         (write(Entry::ByTimeV), write(Entry::ByTimeY))
@@ -291,7 +314,7 @@ impl Program {
 
     /// Number of evaluations of the rate of v. Each order of a series counts as one.
     pub fn evaluations(&self) -> usize {
-        self.entries.iter().filter(|entry| matches!(entry, Entry::Dv(..) | Entry::SeriesV(..))).count()
+        self.entries.iter().filter(|entry| matches!(entry, Entry::Dv(..) | Entry::Kick(..) | Entry::SeriesV(..))).count()
     }
 
     /// The highest order of a series; 0 without one.
@@ -303,6 +326,11 @@ impl Program {
     /// Whether it needs derivatives of the rates, so that it goes over symbols only.
     pub fn has_derivatives(&self) -> bool {
         self.series_order() > 0 || self.is_implicit()
+    }
+
+    /// Whether it splits a system into a part whose motion is known and the rest.
+    pub fn splits(&self) -> bool {
+        self.entries.iter().any(|entry| matches!(entry, Entry::DriftV(..) | Entry::DriftY(..)))
     }
 
     /// Whether it solves equations.
@@ -328,7 +356,7 @@ impl Program {
         let mut nodes: Vec<f64> = Vec::new();
         for entry in &self.entries {
             match entry {
-                Entry::Dv(t, ..) => nodes.push(t.0),
+                Entry::Dv(t, ..) | Entry::Kick(t, ..) => nodes.push(t.0),
                 Entry::Dy(t, ..) if of_y => nodes.push(t.0),
                 Entry::SeriesV(..) | Entry::SeriesY(..) | Entry::ByTimeV | Entry::ByTimeY => nodes.push(0.0),
                 _ => {}
@@ -384,6 +412,18 @@ impl Program {
                     let [v, y] = implicit.as_mut().map_or_else(|| right.map(unknown), |it| it.solve(gamma, right));
                     if matches!(entry, Entry::ImplicitV(..)) { v } else { y }
                 }
+                Entry::Kick(at, v, y) => {
+                    let dv = s.dv(at.at(t, h), of(v), of(y));
+                    s.central(of(y)).map_or_else(|| dv.clone(), |central| &dv - central)
+                }
+                Entry::DriftV(share, v, y) => s.drift(share, of(v), of(y)).map_or_else(|| of(v).clone(), |[v, _]| v),
+                Entry::DriftY(share, v, y) => s.drift(share, of(v), of(y)).map_or_else(
+                    || {
+                        let dy = s.dy(t, of(v), of(y));
+                        of(y).zip_map(&dy, |y, dy| y + if share == 1.0 { dy } else { N::of(share) * dy })
+                    },
+                    |[_, y]| y,
+                ),
                 Entry::ByTimeV => implicit.as_ref().map_or_else(|| unknown(v), |it| it.by_time(h)[0].clone()),
                 Entry::ByTimeY => implicit.as_ref().map_or_else(|| unknown(y), |it| it.by_time(h)[1].clone()),
             };

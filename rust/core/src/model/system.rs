@@ -43,6 +43,16 @@ pub trait System<N: Number> {
         self.inner().map_or_else(|| d.map(|_| N::of(f64::NAN)), |inner| inner.velocity(d))
     }
 
+    /// h times the acceleration by the part of the forces under which [`System::drift`] moves, if the system has such a part.
+    fn central(&self, y: &Block<N>) -> Option<Block<N>> {
+        self.inner()?.central(y)
+    }
+
+    /// The state after a share of the step under that part alone, whose motion is known.
+    fn drift(&self, share: f64, v: &Block<N>, y: &Block<N>) -> Option<[Block<N>; 2]> {
+        self.inner()?.drift(share, v, y)
+    }
+
     /// h·v̇, h times the kinetic and h times the whole energy of a state, if the system has an energy that can be controlled.
     fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
         self.inner()?.energies(v, y)

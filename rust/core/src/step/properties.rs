@@ -9,7 +9,7 @@ use crate::{
         program::Program,
         spec::Signature,
         system::Shape,
-        systems::{equations, kind},
+        systems::{equations, kind, nbody},
     },
 };
 
@@ -89,7 +89,9 @@ pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) ->
                 }
                 solving += equations;
             }
-            (controls * rates, controls * rates * evaluations + contacts + solving)
+            // A solution of Kepler's equation and the changes of coordinates around it take some 350 operations a body.
+            let drifts = if splits(signature, program) { 350 * signature.count("masses") } else { 0 };
+            (controls * rates, controls * rates * evaluations + contacts + solving + drifts)
         }
     };
     Ok(Operations { rates, step, equations })
@@ -98,6 +100,15 @@ pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) ->
 /// Whether steps are made by derivatives of the rates: by a series of the solution, or by solving equations.
 pub(super) fn has_derivatives(how: &StepKind) -> Result<bool, Error> {
     of_method(how, Program::has_derivatives)
+}
+
+/// Whether they are made by a splitting that the system has, so that they are one tape.
+pub(super) fn has_splitting(signature: &Signature, how: &StepKind) -> Result<bool, Error> {
+    of_method(how, |program| splits(signature, program))
+}
+
+fn splits(signature: &Signature, program: &Program) -> bool {
+    program.splits() && nbody::splits(signature)
 }
 
 /// Whether they are made by a series of the solution.

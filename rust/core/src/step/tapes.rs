@@ -9,7 +9,7 @@ use super::{
     leaves::BEGINS,
     properties::{
         MAX_IMPLICIT_OPERATIONS, MAX_IMPLICIT_TAPE_OPERATIONS, MAX_LONG_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, MAX_UNKNOWNS,
-        Operations, has_derivatives, has_series, operations, recorded, shape,
+        Operations, has_derivatives, has_series, has_splitting, operations, recorded, shape,
     },
     trace::{trace_begin, trace_by_terms, trace_judged, trace_record, trace_slot, trace_step},
     watch,
@@ -103,6 +103,12 @@ impl TapeKey {
                 }
             } else if series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
                 return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
+            }
+            if !series && has_splitting(&self.signature, &self.how)? {
+                series = true;
+                if operations.1 > MAX_LONG_TAPE_OPERATIONS {
+                    return Err(Error::TooLongToSplit { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
+                }
             }
             if self.fused && !series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
                 return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });

@@ -16,6 +16,7 @@ use stepwell_base::bodies::{LANES, Law, meeting, partners};
 use crate::{
     error::Error,
     model::{
+        kepler,
         spec::{Parameters, Signature},
         system::{Block, Energies, Gradient, Kind, Shape, System},
     },
@@ -65,6 +66,11 @@ pub(crate) fn law(signature: &Signature) -> Option<Law> {
     }
 }
 
+/// Whether bodies of that signature have Kepler motions, which [`System::drift`] makes.
+pub(crate) fn splits(signature: &Signature) -> bool {
+    signature.system == KIND.name && law(signature) == Some(Law::Newton) && signature.count("masses") > 1
+}
+
 /// The sum of a number of each body: body i in part i mod `LANES`, then part after part.
 pub(crate) fn total<N: Number>(values: impl IntoIterator<Item = N>) -> N {
     let mut parts: Vec<N> = Vec::with_capacity(LANES);
@@ -88,6 +94,8 @@ struct Bodies<N: Number> {
     law: Law,
     dim: usize,
     masses: Vec<N>,
+    /// G·m
+    alone: Vec<N>,
     /// h·G·m
     strength: Vec<N>,
     soft: N,
@@ -97,10 +105,11 @@ struct Bodies<N: Number> {
 
 pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let (h, masses, softening) = (p.h, p.numbers("masses").to_vec(), p.number("softening"));
-    let strength = p.numbers("strength").iter().map(|strength| h * *strength).collect();
+    let alone = p.numbers("strength").to_vec();
+    let strength = alone.iter().map(|strength| h * *strength).collect();
     let half = masses.iter().map(|mass| (N::of(0.5) * h) * *mass).collect();
     let law = law(p.signature).unwrap_or(Law::Logarithmic); // `shape` has seen that there is one
-    Box::new(Bodies { h, law, dim: p.signature.whole("dim"), masses, strength, soft: softening * softening, half })
+    Box::new(Bodies { h, law, dim: p.signature.whole("dim"), masses, alone, strength, soft: softening * softening, half })
 }
 
 impl<N: Number> Bodies<N> {
@@ -140,6 +149,52 @@ impl<N: Number> Bodies<N> {
         (dv, potential)
     }
 
+    /// Of each body but the first its share in the mass of all up to it, and G times that mass (Jacobi's hierarchy); None under
+    /// another force than Newton's, which has no Kepler motions.
+    fn hierarchy(&self) -> Option<Vec<(N, N)>> {
+        if self.law != Law::Newton || self.masses.len() < 2 {
+            return None;
+        }
+        let (mut mass, mut mu) = (self.masses[0], self.alone[0]);
+        let each = self.masses.iter().zip(&self.alone).skip(1).map(|(own, strength)| {
+            mass += *own;
+            mu += *strength;
+            (*own / mass, mu)
+        });
+        Some(each.collect())
+    }
+
+    /// Each body but the first from the centre of mass of those before it, and the centre of mass of all.
+    fn apart(&self, hierarchy: &[(N, N)], block: &Block<N>) -> (Vec<Vec<N>>, Vec<N>) {
+        let mut bodies = block.as_slice().chunks(self.dim);
+        let mut centre = bodies.next().map_or_else(Vec::new, <[N]>::to_vec);
+        let mut rows = Vec::with_capacity(hierarchy.len());
+        for (body, (share, _)) in bodies.zip(hierarchy) {
+            let row: Vec<N> = body.iter().zip(&centre).map(|(body, centre)| *body - *centre).collect();
+            centre.iter_mut().zip(&row).for_each(|(centre, row)| *centre += *share * *row);
+            rows.push(row);
+        }
+        (rows, centre)
+    }
+
+    /// The inverse: all bodies. The centre of mass is the origin if None.
+    fn gathered(&self, hierarchy: &[(N, N)], rows: &[Vec<N>], mut centre: Option<Vec<N>>) -> Block<N> {
+        let mut all = Block::from_element(self.dim * (rows.len() + 1), N::of(0.0));
+        for (k, (row, (share, _))) in rows.iter().zip(hierarchy).enumerate().rev() {
+            let lever = row.iter().map(|row| *share * *row);
+            let before: Vec<N> = match &centre {
+                None => lever.map(|lever| -lever).collect(),
+                Some(centre) => centre.iter().zip(lever).map(|(centre, lever)| *centre - lever).collect(),
+            };
+            for (c, (before, row)) in before.iter().zip(row).enumerate() {
+                all[self.dim * (k + 1) + c] = *before + *row;
+            }
+            centre = Some(before);
+        }
+        centre.into_iter().flatten().enumerate().for_each(|(c, centre)| all[c] = centre);
+        all
+    }
+
     /// What is said of each body in turn: its mass, its place and its velocity.
     fn each<'a>(&'a self, v: &'a Block<N>, y: &'a Block<N>) -> impl Iterator<Item = (N, &'a [N], &'a [N])> {
         let (v, y) = (v.as_slice().chunks(self.dim), y.as_slice().chunks(self.dim));
@@ -158,6 +213,32 @@ impl<N: Number> System<N> for Bodies<N> {
 
     fn velocity(&self, d: &Block<N>) -> Block<N> {
         d.map(|d| d / self.h)
+    }
+
+    fn central(&self, y: &Block<N>) -> Option<Block<N>> {
+        let hierarchy = self.hierarchy()?;
+        let (mut rows, _) = self.apart(&hierarchy, y);
+        for (row, (_, mu)) in rows.iter_mut().zip(&hierarchy) {
+            let inverse = N::of(1.0) / square(row).sqrt();
+            let pull = (-self.h * *mu) * (inverse * (inverse * inverse));
+            row.iter_mut().for_each(|row| *row *= pull);
+        }
+        Some(self.gathered(&hierarchy, &rows, None))
+    }
+
+    fn drift(&self, share: f64, v: &Block<N>, y: &Block<N>) -> Option<[Block<N>; 2]> {
+        let hierarchy = self.hierarchy()?;
+        let h = if share == 1.0 { self.h } else { N::of(share) * self.h };
+        let ((places, _), (velocities, flight)) = (self.apart(&hierarchy, y), self.apart(&hierarchy, v));
+        let (mut dv, mut dy) = (Vec::with_capacity(hierarchy.len()), Vec::with_capacity(hierarchy.len()));
+        for ((y, v), (_, mu)) in places.iter().zip(&velocities).zip(&hierarchy) {
+            let [by_v, by_y] = kepler::moved(*mu, h, v, y);
+            dv.push(by_v);
+            dy.push(by_y);
+        }
+        let flight = flight.into_iter().map(|flight| h * flight).collect();
+        let (dv, dy) = (self.gathered(&hierarchy, &dv, None), self.gathered(&hierarchy, &dy, Some(flight)));
+        Some([v + dv, y + dy])
     }
 
     fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {

@@ -1,0 +1,247 @@
+"""Wisdom and Holman's method: Kepler's motion to rounding or NaN, errors of the masses squared, REBOUND's beside it."""
+
+from __future__ import annotations
+
+import math
+import types
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.reference import corrector, kepler
+
+#: The unit roundoff.
+U = 2.0**-53
+
+G = sw.orbits.gravity("au", "solar", "year")
+
+#: Jupiter, Saturn, Uranus and Neptune, more or less.
+MASSES = np.array([1.0, 1 / 1047.35, 1 / 3497.9, 1 / 22900, 1 / 19400])
+ELEMENTS: dict[str, Any] = {
+    "a": [5.2, 9.55, 19.2, 30.1],
+    "e": [0.0485, 0.0555, 0.046, 0.009],
+    "inclination": [0.02, 0.04, 0.013, 0.03],
+    "node": [1.7, 1.9, 1.3, 2.3],
+    "argument_of_periapsis": [4.7, 5.9, 1.7, 4.8],
+    "mean_anomaly": [0.3, 5.0, 2.5, 4.5],
+}
+
+#: Twenty steps for each of Jupiter's years.
+DT = 5.2**1.5 / 20.0
+
+
+def planets(masses: Any = MASSES, **elements: Any) -> sw.orbits.Start:
+    return sw.orbits.system(masses, G=G, **(ELEMENTS | elements))
+
+
+def energy_error(bodies: sw.NBody, v: Any, y: Any) -> float:
+    """The largest relative error of the energy of saved states, whose times come first."""
+    energy = bodies.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
+    return float(np.abs(energy / energy[0] - 1.0).max())
+
+
+# ---- Kepler's motion
+
+
+def follows_kepler(moved: Any) -> bool:
+    """Whether each change is that of the orbit, to rounding, or NaN; and whether it is there where it should be.
+
+    Of orbits of all kinds from all places, over steps of up to a revolution and many times the time of the periapsis.
+    """
+    rng = np.random.default_rng(7)
+    n = 4000
+    for low, high, most_steps, at_least in (
+        (0.0, 0.6, 0.2, 1.0),  # five steps a revolution
+        (0.6, 0.9, 0.01, 0.999),
+        (0.9, 1.1, 0.01, 0.9),
+        (1.1, 4.0, 0.02, 0.98),
+        (0.0, 4.0, 3.0, 0.0),
+    ):
+        e, mu = rng.uniform(low, high, n), rng.uniform(0.5, 2.0, n)
+        a = np.abs(1.0 / (1.0 - e))  # the periapsis is at 1
+        h = rng.uniform(0.0, most_steps, n) * 2.0 * math.pi * np.sqrt(a**3 / mu) * rng.choice([-1.0, 1.0], n)
+        before = rng.uniform(-0.5, 0.5, n) * 2.0 * math.pi * np.sqrt(a**3 / mu)
+        shape = {"periapsis": 1.0, "e": e, "argument_of_periapsis": rng.uniform(-3.0, 3.0, n), "time_of_periapsis": 0.0}
+        v, y = sw.orbits.state(mu, t=before, **shape)
+        true_v, true_y = sw.orbits.state(mu, t=before + h, **shape)
+        with np.errstate(all="ignore"):
+            dv, dy = moved(mu, h, v.T, y.T)
+        made = np.isfinite(dy).all(axis=1) & np.isfinite(dv).all(axis=1)
+        if made.mean() < at_least:
+            return False
+        # Roundings of the times are as those of the places, and grow as the orbit shears them, by the revolutions in h.
+        scale = np.sqrt((y * y).sum(axis=0)) + np.abs(h) * np.sqrt((v * v).sum(axis=0)) + 1.0
+        off_y = np.sqrt(((dy.T + y - true_y) ** 2).sum(axis=0)) / scale
+        off_v = np.sqrt(((dv.T + v - true_v) ** 2).sum(axis=0)) / (np.sqrt((true_v**2).sum(axis=0)) + np.sqrt((v**2).sum(axis=0)))
+        sheared = 1.0 + scale * np.sqrt((v * v).sum(axis=0)) * a
+        if not ((off_y[made] < 1e3 * U * sheared[made]) & (off_v[made] < 1e3 * U * sheared[made] ** 2)).all():
+            return False
+    return True
+
+
+def test_keplers_motion_is_exact_or_nan() -> None:
+    assert follows_kepler(kepler.moved)
+
+
+@pytest.mark.mutant
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("+ zeta * g3)) * per", "+ zeta * g2)) * per"),
+        ("range(3, 18, 2)", "range(4, 19, 2)"),
+        ("g3 = (g3 + change * g2) + half * g1", "g3 = g3"),
+        ("TERMS = (4, 6, 8)", "TERMS = (3, 4, 5)"),
+        ("SMALL = 2.0**-36", "SMALL = 1.0"),
+        ("MOST = 12.0", "MOST = 1e9"),
+        ("(inverse * per)", "(inverse * inverse)"),
+    ],
+)
+def test_a_mistake_in_keplers_motion_is_noticed(old: str, new: str) -> None:
+    with open(kepler.__file__, encoding="utf-8") as file:
+        text = file.read()
+    assert text.count(old) == 1, f"the mistake no longer fits: {old}"
+    wrong = types.ModuleType("mutant")
+    wrong.__package__ = kepler.__package__
+    exec(compile(text.replace(old, new), "mutant", "exec"), wrong.__dict__)
+    assert not follows_kepler(wrong.moved)
+
+
+# ---- the method
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("bodies", [1, 2, 3, 5])
+@pytest.mark.parametrize("fused", [False, True])
+def test_equals_the_reference(dim: int, bodies: int, fused: bool) -> None:
+    elements = {name: value[: bodies - 1] for name, value in ELEMENTS.items() if dim == 3 or name not in ("inclination", "node")}
+    if bodies == 1:
+        system, v, y = sw.NBody([1.0], force="newton"), np.full((1, dim), 0.3), np.ones((1, dim))
+    else:
+        system, v, y = sw.orbits.system(MASSES[:bodies], G=G, **elements)
+    for members in (1, 9):
+        arguments: dict[str, Any] = {"dt": DT, "steps": 7, "every": 3, "fused": fused, "record": ["energy"]}
+        arguments |= {"v": v[..., None] * np.linspace(1.0, 1.1, members), "y": y[..., None] * np.ones(members)}
+        run, other = (sw.integrate(system, "wisdom_holman", **arguments, backend=backend) for backend in ("rust", "numpy"))
+        for one, two in ((run.v, other.v), (run.y, other.y), (run.energy, other.energy), (run.carry, other.carry)):
+            assert np.array_equal(one, two)
+
+
+def test_two_bodies_move_exactly() -> None:
+    """Ten revolutions by any step, back and forth."""
+    bodies, v, y = sw.orbits.system([1.0, 0.3], a=1.0, e=0.5, mean_anomaly=1.0)
+    period = 2.0 * math.pi / math.sqrt(1.3)
+    for steps in (70, 1000):
+        run = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=10.0 * period / steps, steps=steps)
+        # Roundings of each step shear the phase by those of all later ones.
+        assert np.abs(run.y[-1] - y).max() < 100.0 * steps * U * math.sqrt(steps)
+        back = sw.integrate(bodies, "wisdom_holman", v=run.v[-1], y=run.y[-1], dt=-10.0 * period / steps, steps=steps)
+        assert np.abs(back.y[-1] - y).max() < 100.0 * steps * U * math.sqrt(steps)
+
+
+def test_the_error_falls_with_the_masses_and_the_step() -> None:
+    """As the first power of both in units of the star's, with a corrector as the second."""
+    errors = {}
+    for share in (1.0, 0.25):
+        bodies, v, y = planets(MASSES * np.r_[1.0, np.full(4, share)])
+        run = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=DT, steps=2000, every=7)
+        start = sw.orbits.corrected(bodies, v, y, dt=DT)
+        better = sw.integrate(bodies, "wisdom_holman", v=start[0], y=start[1], dt=DT, steps=2000, every=7)
+        errors[share] = energy_error(bodies, run.v, run.y), energy_error(bodies, *sw.orbits.uncorrected(better))
+        orbit = sw.orbits.elements(bodies, *sw.orbits.uncorrected(bodies, *start, dt=DT))
+        assert np.abs(orbit.a - ELEMENTS["a"]).max() < 1e-11
+    assert errors[1.0][0] < 5e-6
+    assert errors[1.0][1] < 5e-9
+    assert 3.0 < errors[1.0][0] / errors[0.25][0] < 5.5
+    assert 10.0 < errors[1.0][1] / errors[0.25][1] < 24.0
+
+
+def test_the_error_is_a_hundredth_of_leapfrogs() -> None:
+    bodies, v, y = planets()
+    runs = [sw.integrate(bodies, method, v=v, y=y, dt=DT, steps=2000, every=7) for method in ("leapfrog", "wisdom_holman")]
+    leapfrog, wisdom_holman = (energy_error(bodies, run.v, run.y) for run in runs)
+    assert wisdom_holman < leapfrog / 500.0
+
+
+@pytest.mark.parametrize("order", corrector.TIMES)
+def test_a_corrector_has_its_order(order: int) -> None:
+    """Σ 2·b·sinh(a·x) is half of ((x/2)·coth(x/2) − 1)/x up to that power of x, since each term is applied twice."""
+    mp = pytest.importorskip("mpmath")
+    with mp.workdps(60):
+
+        def off(x: Any) -> Any:
+            total = sum(2 * mp.mpf(b) * mp.sinh(mp.mpf(a) * x) for a, b in corrector.terms(order))
+            return abs(total - ((x / 2) * mp.coth(x / 2) - 1) / x / 2)
+
+        # At these x the next power is above the rounding of the coefficients to floats, which is 1e-16·x.
+        slope = mp.log(off(mp.mpf(1.2)) / off(mp.mpf(1.0))) / mp.log(mp.mpf(1.2))
+        assert order - 0.5 < slope < order + 1.2
+
+
+def test_a_wrong_step_is_nan_and_says_why() -> None:
+    """Not a step ends somewhere else without a word."""
+    bodies, v, y = sw.orbits.system([1.0, 1e-3], a=1.0, e=0.99)
+    with pytest.warns(
+        sw.DivergenceWarning, match="too long for Kepler's motion on an orbit there, so take shorter steps, or dop853"
+    ):
+        run = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=1.0, steps=20)
+    assert run.status == sw.Status.DIVERGED
+    with pytest.raises(sw.errors.ArgumentError, match="dt: expected a step over some of which"):
+        sw.orbits.corrected(bodies, v, y, dt=1.0)
+
+
+def test_what_it_is_not_for_is_refused() -> None:
+    bodies, v, y = planets()
+    with pytest.raises(sw.errors.UnsupportedError, match="carries v_half"):
+        sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=DT, steps=1, control=sw.EnergyControl(0.1))
+    many = sw.NBody(np.ones(200), force="newton", dim=2)
+    with pytest.raises(sw.errors.UnsupportedError, match="Kepler motions of so many bodies"):
+        sw.integrate(many, "wisdom_holman", v=0.0, y=np.random.default_rng(1).normal(size=(200, 2)), dt=0.1, steps=1)
+    run = sw.integrate(bodies, "leapfrog", v=v, y=y, dt=DT, steps=1)
+    with pytest.raises(sw.errors.UnsupportedError, match="expected a run by wisdom_holman"):
+        sw.orbits.uncorrected(run)
+    with pytest.raises(sw.errors.ArgumentError, match="order: expected one of 3, 5, 7, 11, 17, got 4"):
+        sw.orbits.corrected(bodies, v, y, dt=DT, order=4)
+
+
+def test_without_kepler_motions_it_is_leapfrog() -> None:
+    for system in (sw.Oscillator(), sw.NBody()):
+        state = {"v": 0.3, "y": 1.0} if isinstance(system, sw.Oscillator) else {"v": 0.0, "y": np.arange(6.0).reshape(3, 2) ** 2}
+        runs = [sw.integrate(system, method, **state, dt=0.01, steps=9, every=1) for method in ("leapfrog", "wisdom_holman")]
+        assert np.array_equal(runs[0].y, runs[1].y)
+        assert np.array_equal(runs[0].v, runs[1].v)
+
+
+def test_a_world_and_an_exported_step_have_the_same_bits() -> None:
+    bodies, v, y = planets()
+    run = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=DT, steps=20)
+    arrays = v.copy(), y.copy()
+    world = sw.World(bodies, "wisdom_holman", v=arrays[0], y=arrays[1], dt=DT)
+    world.step(20)
+    assert np.array_equal(arrays[1], run.y[-1])
+    assert np.array_equal(arrays[0], run.v[-1])
+    half = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=DT, steps=10)
+    assert np.array_equal(sw.integrate(bodies, "wisdom_holman", resume=half, steps=10).y[-1], run.y[-1])
+
+
+def test_errors_are_those_of_rebound() -> None:
+    """WHFast's, whose drifts are at the ends: half without a corrector, and the same with one."""
+    rebound = pytest.importorskip("rebound")
+    bodies, v, y = planets()
+    for order, low, high in ((0, 1.5, 2.5), (11, 0.5, 1.5)):
+        simulation = rebound.Simulation()
+        simulation.G = G
+        for mass, place, velocity in zip(MASSES, y, v, strict=True):
+            simulation.add(m=mass, **dict(zip("xyz", place, strict=True)), **dict(zip(("vx", "vy", "vz"), velocity, strict=True)))
+        simulation.integrator, simulation.dt = "whfast", DT
+        options = simulation.ri_whfast if hasattr(simulation, "ri_whfast") else simulation.integrator
+        options.corrector, options.safe_mode = order, 0
+        first, theirs = simulation.energy(), 0.0
+        for _ in range(2000 // 7):
+            simulation.steps(7)
+            simulation.synchronize()
+            theirs = max(theirs, abs(simulation.energy() / first - 1.0))
+        start = sw.orbits.corrected(bodies, v, y, dt=DT, order=order) if order else (v, y)
+        run = sw.integrate(bodies, "wisdom_holman", v=start[0], y=start[1], dt=DT, steps=2000, every=7)
+        ours = energy_error(bodies, *(sw.orbits.uncorrected(run, order=order) if order else (run.v, run.y)))
+        assert low < ours / theirs < high
