@@ -29,9 +29,7 @@ def terms(order: int) -> tuple[tuple[float, float], ...]:
     """Times and kicks as shares of the step: Σ 2·b·sinh(a·x) = ½·((x/2)·coth(x/2) − 1)/x + O(x^order)."""
     n = TIMES[order]
     # c = 2·a·b solves Σ c·(a²)ᵏ = ½·w·(2k + 1)!, w = B₂ₖ₊₂/(2k + 2)!: equations in whole multiples of FIRST_SQUARED.
-    rows = [
-        [FIRST_SQUARED**k * Fraction(i * i) ** k for i in range(1, n + 1)] + [BERNOULLI[k] / (2 * (2 * k + 2))] for k in range(n)
-    ]
+    rows = [[pow(FIRST_SQUARED * i * i, k) for i in range(1, n + 1)] + [BERNOULLI[k] / (2 * (2 * k + 2))] for k in range(n)]
     for p in range(n):  # by Gauss and Jordan; no pivot is zero
         rows[p] = [each / rows[p][p] for each in rows[p]]
         for q in range(n):

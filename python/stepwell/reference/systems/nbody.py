@@ -99,7 +99,7 @@ class NBody(Recorded):
         return d / self.h
 
     def central(self, y: Array) -> Array | None:
-        """H times the acceleration of Kepler's motions about the centres of the bodies before (Jacobi); None without these."""
+        """The acceleration, times h, of Kepler's motions about the centres of the bodies before (Jacobi); None without these."""
         if self.force != "newton" or len(y) < 2:
             return None
         shares, mu = self.hierarchy()

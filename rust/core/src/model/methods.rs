@@ -91,7 +91,7 @@ impl Method {
 
     /// How many numbers of a member the blocks have that it keeps.
     pub fn kept_numbers(&self, shape: Shape) -> usize {
-        self.kept.iter().map(|of_v| if *of_v { shape.v } else { shape.y }).sum()
+        self.kept.iter().map(|of_v| if *of_v { shape.v } else { shape.y }).sum::<usize>()
     }
 }
 
