@@ -26,7 +26,7 @@ from stepwell.model.methods import Method
 from stepwell.scenes import Scene
 from stepwell.scenes.table import tabled
 from stepwell.scenes.truth import with_truth
-from stepwell.studies.advice import Advice, Row
+from stepwell.studies.advice import Advice, Row, knows_motion
 
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
@@ -137,7 +137,7 @@ class Brute:
 
     def fixed(self, tolerance: float, most: float) -> Try | None:
         """The cheapest with fixed steps: runs are made in the order of their cost until one is good enough."""
-        able = [each for each in sw.methods() if self._able(each)]
+        able = [each for each in sw.methods() if self._able(each) and not knows_motion(each, self.scene.system)]
         ladders = [self._ladder(i, method, most) for i, method in enumerate(able)]
         for cost, i, dt, n in heapq.merge(*ladders):
             name = able[i].name

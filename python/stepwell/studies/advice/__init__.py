@@ -15,6 +15,7 @@ from ...base import checks
 from ...errors import ArgumentError, TooLargeError, UnsupportedError
 from ...model.compatibility import one_state
 from ...model.methods import Method, choice
+from ...model.systems import NBody, System
 from ...runs import float32
 from ...runs.integration import quietly
 from ...scenes import Scene
@@ -68,6 +69,11 @@ MOTION_SHARE, HINTS_SHARE = 0.15, 0.5
 _named = cache(find_scene)
 
 
+def knows_motion(method: Method, system: System) -> bool:
+    """Whether every step is exact, however long: Kepler's motion of two bodies alone."""
+    return method.splits and isinstance(system, NBody) and system.force == "newton" and len(system.masses) == 2
+
+
 def advise(
     scene: Scene | str,
     frame: float | None = 1 / 60,
@@ -93,7 +99,8 @@ def advise(
         tolerance: the largest allowed ``Scene.state_error``, above zero; at 1 the error is as large as the solution.
         budget: computing time in seconds that a frame may use; if None, the frame itself, with the second as the unit of time.
             Without a frame, seconds per unit of time, or no bound. If the cost of frames differs, the most expensive must fit.
-        methods: names, or what ``stepwell.method`` returns; all if None.
+        methods: names, or what ``stepwell.method`` returns; all if None, but ``wisdom_holman`` for two bodies alone, whose motion
+            it knows, so that its step says nothing.
         cost: ``"time"`` ranks by measured time, ``"evaluations"`` by function (rate) evaluations, which are repeatable. If the
             cost of frames differs, their mean counts. Of methods whose costs differ by less than the noise of the measurement the
             one with the smallest error comes first.
@@ -115,6 +122,8 @@ def advise(
         <advice for figure_eight: leapfrog, dt = 0.00833333, error 0.0039>
     """
     scene, chosen = _named(scene) if isinstance(scene, str) else find_scene(scene), choice(methods)
+    if methods is None:
+        chosen = [method for method in chosen if not knows_motion(method, scene.system)]
     tolerance = checks.number("tolerance", tolerance, positive=True)
     cost = checks.known("cost", cost, COSTS)
     fixed = checks.flag("fixed", fixed)
