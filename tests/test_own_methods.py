@@ -360,9 +360,10 @@ def test_explanations_name_what_is_kept() -> None:
     assert "at the start of a run, dv1, dy1 from v and y" in text
 
 
-def test_charts_and_sweeps_take_them() -> None:
+def test_charts_and_sweeps_take_them(tmp_path: Any) -> None:
     chart = sw.charts.work_precision(sw.scenes.oscillator(), methods=[midpoint, adams_bashforth_3, "rk4"])
     assert {"midpoint", "adams_bashforth_3", "rk4"} <= {row["method"] for row in chart.rows()}
+    chart.plot(tmp_path / "chart.png")
     pytest.importorskip("xarray")
     axes = {"beta": np.linspace(0.5, 2.0, 5)}
     swept = sw.sweep(duffing, axes, adams_bashforth_2, v=0.0, y=1.0, dt=0.02, steps=50, outcomes="last")

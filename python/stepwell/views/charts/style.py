@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 else:
     Axes = Figure = Any  # matplotlib is imported when something is drawn
 
-MARKERS: tuple[Any, ...] = (*"osD^vPh*<>pdX8H", (4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0), (3, 1, 180), (4, 1, 45), (3, 1, 90))
+MARKERS: tuple[Any, ...] = (
+    *"osD^vPh*<>pdX8H",
+    *((4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0), (3, 1, 180), (4, 1, 45), (3, 1, 90), (3, 1, 270), (5, 1, 180)),
+)
 #: A colour for each family of methods, the same in every chart. No two are alike in grey, in print, or to an eye without green
 #: cones: tests/test_looks.py measures them.
 FAMILIES = {
@@ -93,7 +96,8 @@ def _luminance(rgb: tuple[float, float, float]) -> float:
 
 def look(method: Method) -> dict[str, Any]:
     """Keywords for a line of that method."""
-    i = [m.name for m in every_method()].index(method.name)
+    names = [m.name for m in every_method()]
+    i = names.index(method.name) if method.name in names else len(names)  # a user's own, or the exact one
     return {
         "color": FAMILIES[family(method)],
         "marker": MARKERS[i % len(MARKERS)],
@@ -119,7 +123,7 @@ def apart(methods: Iterable[Method], method: Method) -> dict[str, Any]:
 
 def family(method: Method) -> str:
     """The one of ``FAMILIES`` to which a method belongs; the default is the Runge-Kutta methods."""
-    known = {"verlet": "leapfrog", "pefrl": "PEFRL", "dop853": "Dormand-Prince"}
+    known = {"verlet": "leapfrog", "wisdom_holman": "leapfrog", "pefrl": "PEFRL", "dop853": "Dormand-Prince"}
     last = method.name.rsplit("_", 1)[-1]
     return {"euler": "Euler", "heun": "Heun", "leapfrog": "leapfrog"}.get(last, known.get(method.name, "Runge-Kutta"))
 
