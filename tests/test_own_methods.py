@@ -272,14 +272,14 @@ def test_the_error_falls_with_the_order(method: sw.Method) -> None:
 
 @pytest.mark.parametrize("options", [{}, {"fused": True}, {"dtype": "float32"}], ids=str)
 def test_an_estimate_of_the_error_chooses_steps(options: dict[str, Any]) -> None:
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "at": np.linspace(0.5, 3.0, 4), "tolerance": 1e-5} | options
+    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "at": np.linspace(0.5, 2.0, 4), "tolerance": 1e-4} | options
     system = duffing(beta=np.linspace(0.5, 2.0, 7))
     core, reference = (sw.integrate(system, heun_euler, backend=backend, **given) for backend in ("rust", "numpy"))
     assert np.array_equal(core.y, reference.y)
     assert np.array_equal(core.v, reference.v)
     true = sw.integrate(system, "dop853", **{**given, "tolerance": 1e-11, "dtype": "float64", "fused": False})
-    assert np.abs(core.y - true.y).max() < 3e-4
-    looser = sw.integrate(system, heun_euler, **{**given, "tolerance": 1e-3})
+    assert np.abs(core.y - true.y).max() < 2e-3
+    looser = sw.integrate(system, heun_euler, **{**given, "tolerance": 1e-2})
     assert (np.asarray(looser.paces.accepted) < np.asarray(core.paces.accepted)).all()
 
 
