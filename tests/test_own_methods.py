@@ -354,6 +354,15 @@ def test_saved_runs_and_processes_know_them(tmp_path: Any) -> None:
     assert told.stdout.split() == [y.hex() for y in whole.y[-1].tolist()]
 
 
+def test_a_bounce_on_rods_is_refused_since_it_ends_what_is_kept() -> None:
+    """The core does not tell which points it changed."""
+    rods = sw.Rods([1.0, 0.5], [(0, 1)], 1.0, floor=sw.Floor(normal=[0.0, 1.0]))
+    given: dict[str, Any] = {"v": [[0.0, -1.0], [0.0, -1.0]], "y": [[0.0, 0.3], [0.8, 0.9]], "dt": 0.01, "steps": 60}
+    sw.integrate(rods, midpoint, **given)
+    with pytest.raises(UnsupportedError, match="which do not hold after a bounce"):
+        sw.integrate(rods, adams_bashforth_2, **given)
+
+
 def test_explanations_name_what_is_kept() -> None:
     text = str(sw.explain(sw.Pendulum(), adams_bashforth_2))
     assert "v'   = v − 1.5·a10 − 0.5·dv1\n" in text

@@ -11,6 +11,7 @@ from ..errors import ArgumentError, UnsupportedError
 from .controls import Control, EnergyControl, NormControl
 from .methods import Method
 from .systems import Sampled, System
+from .systems.rods import RodSystem
 
 
 def fits_together(system: System, method: Method) -> None:
@@ -22,6 +23,11 @@ def fits_together(system: System, method: Method) -> None:
         raise UnsupportedError(
             f"method: {method.name} needs the rate of every number of the state, and the algebraic equations of {system!r} give "
             f"none; take an implicit method, such as rodas5p"
+        )
+    if method.kept and isinstance(system, RodSystem) and system.contacts:
+        raise UnsupportedError(
+            f"method: {method.name} keeps {', '.join(method.kept)} of steps before, which do not hold after a bounce, and one on "
+            f"rods changes all points at once; take a method that keeps nothing, such as rk4"
         )
     if not method.needs_acceleration:
         return
