@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import types
 import warnings
 from typing import Any
 
@@ -17,6 +16,7 @@ from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
 from support.cases import assert_same
 from support.graphs import assert_one_graph
+from support.mistakes import mistaken
 
 ZERO = np.zeros(3)
 FREE: dict[str, Any] = {"damping": ZERO, "gains": ZERO, "controllers": False}
@@ -150,13 +150,7 @@ MUTANTS = [
 
 def mutant(old: str, new: str) -> Any:
     """The equations with one mistake."""
-    with open(aircraft_equations.__file__, encoding="utf-8") as file:
-        text = file.read()
-    assert text.count(old) == 1, f"the mistake no longer fits: {old}"
-    module = types.ModuleType("mutant")
-    module.__package__ = aircraft_equations.__package__
-    exec(compile(text.replace(old, new), "mutant", "exec"), module.__dict__)
-    return module
+    return mistaken(aircraft_equations, old, new)
 
 
 @pytest.mark.mutant

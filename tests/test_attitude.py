@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import types
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.model.systems import attitude
+from support.mistakes import mistaken
 
 #: Half a unit in the last place of 1.
 U = 2.0**-53
@@ -70,12 +70,7 @@ def test_angles_matrices_and_quaternions_are_the_same_rotations() -> None:
     ],
 )
 def test_a_mistake_is_noticed(old: str, new: str) -> None:
-    with open(attitude.__file__, encoding="utf-8") as file:
-        text = file.read()
-    assert text.count(old) == 1, f"the mistake no longer fits: {old}"
-    wrong = types.ModuleType("mutant")
-    wrong.__package__ = attitude.__package__
-    exec(compile(text.replace(old, new), "mutant", "exec"), wrong.__dict__)
+    wrong = mistaken(attitude, old, new)
     assert not agrees(wrong)
 
 

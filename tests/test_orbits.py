@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import types
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.analysis.orbits import kepler
+from support.mistakes import mistaken
 
 #: The unit roundoff.
 U = 2.0**-53
@@ -66,12 +66,7 @@ def test_keplers_equation_is_odd_and_keeps_the_revolution() -> None:
     ],
 )
 def test_a_mistake_in_keplers_equation_is_noticed(old: str, new: str) -> None:
-    with open(kepler.__file__, encoding="utf-8") as file:
-        text = file.read()
-    assert text.count(old) == 1, f"the mistake no longer fits: {old}"
-    wrong = types.ModuleType("mutant")
-    wrong.__package__ = kepler.__package__
-    exec(compile(text.replace(old, new), "mutant", "exec"), wrong.__dict__)
+    wrong = mistaken(kepler, old, new)
     assert not solves_kepler(wrong.eccentric_anomaly)
 
 
