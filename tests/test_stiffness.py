@@ -272,7 +272,14 @@ def test_the_method_to_take_is_one_that_is_stable(monkeypatch: pytest.MonkeyPatc
     assert all_methods.for_stiff(1e-6) is None
     (text,) = told(method="merson", tolerance=1e-4, **PROBLEMS["driven"])[1]
     assert text.endswith("(stiff equations); SciPy's Radau and LSODA are for them")
-    common = {"error_order": 3, "is_always_stable": True, "needs_acceleration": False, "has_series": False, "is_exact": False}
+    common = {
+        "error_order": 3,
+        "is_always_stable": True,
+        "needs_acceleration": False,
+        "has_series": False,
+        "is_exact": False,
+        "kept": (),
+    }
     loose, tight = (SimpleNamespace(name=f"implicit_{order}", order=order, **common) for order in (2, 5))
     fixed = SimpleNamespace(**{**vars(tight), "error_order": None, "order": 6})
     monkeypatch.setattr(all_methods, "methods", lambda: (*explicit, loose, tight, fixed))
