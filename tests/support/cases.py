@@ -168,6 +168,10 @@ SYSTEMS: dict[str, Make] = {
     "two bodies": lambda r, b: sw.NBody(r.uniform(0.1, 1.0, (2, b)), force="newton", softening=0.3),
     "eight bodies": lambda r, b: sw.NBody(r.uniform(0.0, 1.0, 8), softening=0.2, G=r.uniform(0.5, 1.0, b)),
     "thirty-five bodies in space, newton": lambda r, b: sw.NBody(r.uniform(0.0, 0.2, 35), force="newton", softening=0.3, dim=3),
+    "a pair and three without mass": lambda r, b: sw.NBody([0.0, 0.5, 0.0, 0.3, 0.0], softening=0.3, G=r.uniform(0.5, 1.0, b)),
+    "three of thirty with mass, in space": lambda r, b: sw.NBody(
+        np.where(np.arange(30) % 11 == 5, r.uniform(0.2, 1.0, 30), 0.0), softening=0.3, dim=3
+    ),
     "a pair in a bowl on a floor": lambda r, b: sw.NBody(
         [1.0, 0.5],
         softening=0.3,

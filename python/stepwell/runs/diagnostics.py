@@ -305,7 +305,8 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
             if any(encounters.may_meet(bodies, h, time, *(_lists(block, bodies.y_shape) for block in state)) for state in states)
             else []
         )
-    if evaluations < EVALUATIONS or evaluations * members * n * n < 2 * PAIRS or members * n * n > MOST_NUMBERS:
+    numbers = members * (n + 2 * bodies.pair_count)
+    if evaluations < EVALUATIONS or evaluations * numbers < 2 * PAIRS or numbers > MOST_NUMBERS:
         return []
     may = np.zeros(run.status.shape, dtype=bool)
     for v, y in (states[0], states[-1]):
@@ -391,7 +392,8 @@ def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
     evaluations = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
     if run.status.ndim == 0 and n <= FEW_BODIES:
         return _of_few(bodies, start, end) if evaluations >= FEW_EVALUATIONS else None
-    if evaluations < EVALUATIONS or evaluations * members * n * n < 2 * PAIRS or prod(end[1].shape) > MOST_NUMBERS or not members:
+    numbers = members * (n + 2 * bodies.pair_count)
+    if evaluations < EVALUATIONS or evaluations * numbers < 2 * PAIRS or prod(end[1].shape) > MOST_NUMBERS or not members:
         return None
     start = np.broadcast_to(start[0], end[0].shape), start[1]  # one number may have been given for all
     with np.errstate(all="ignore"):
@@ -438,12 +440,12 @@ def _summed(bodies: NBody, v: Any, y: Any) -> tuple[float, float]:
     strength = float(bodies.G)
     newton = bodies.force == "newton"
     try:
-        kinetic = sum(0.5 * m * sum(x * x for x in row) for m, row in zip(masses, v, strict=True))
-        potential = 0.0
-        for i, (m, place) in enumerate(zip(masses, y, strict=True)):
-            for j in range(i):
-                square = sum((a - b) * (a - b) for a, b in zip(place, y[j], strict=True)) + soft
-                potential += m * masses[j] * (-1.0 / math.sqrt(square) if newton else 0.5 * math.log(square))
+        kinetic = sum(0.5 * m * sum(x * x for x in row) for m, row in zip(masses, v, strict=True) if m)
+        potential, massive = 0.0, [(m, place) for m, place in zip(masses, y, strict=True) if m]
+        for i, (m, place) in enumerate(massive):
+            for its, other in massive[:i]:
+                square = sum((a - b) * (a - b) for a, b in zip(place, other, strict=True)) + soft
+                potential += m * its * (-1.0 / math.sqrt(square) if newton else 0.5 * math.log(square))
     except (ValueError, ZeroDivisionError):  # two bodies in one place, or numbers that are not finite
         return math.nan, math.nan
     return kinetic + strength * potential, kinetic

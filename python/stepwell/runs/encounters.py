@@ -76,8 +76,7 @@ def met_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], flo
     Returns:
         The number of the step, from 1 on, the two, and their least distance; or None.
     """
-    n = y.shape[1]
-    first, second = np.triu_indices(n, 1)
+    first, second = bodies.pairs()
     attraction = (bodies.G * (bodies.masses[first] + bodies.masses[second]))[np.newaxis]
     with np.errstate(all="ignore"):
         d = y[:, second] - y[:, first]
@@ -108,7 +107,7 @@ def met_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], flo
 
 def pieces(plan: engine.Plan, bodies: NBody, v: Array, y: Array, carried: bool, steps: int) -> Iterator[tuple[int, Array, Array]]:
     """All states of a run of one member, made again some at once: the number of earlier steps, velocities and coordinates."""
-    length = max(16, NUMBERS_AT_ONCE // (y.size * len(y)))
+    length = max(16, NUMBERS_AT_ONCE // (y.size + 2 * bodies.pair_count * y.shape[1]))
     done = 0
     while done < steps:
         number = min(length, steps - done)
@@ -219,7 +218,7 @@ def _pull(gravity: float, masses: Any, y: Any, k: int, i: int, soft2: float, new
 def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> Any:
     """``may_meet`` for every member of a batch, as an array of truths; blocks have the shape (bodies, dim, *batch)."""
     newton = bodies.force == "newton"
-    i, j = np.triu_indices(len(y), 1)
+    i, j = bodies.pairs()
 
     def potential(r2: Array) -> Array:
         return np.asarray(-strength / np.sqrt(r2) if newton else 0.5 * strength * np.log(r2))
@@ -243,7 +242,7 @@ def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> A
         # The pull of the others takes longest to compute, and few pairs need it.
         far = np.flatnonzero(may.reshape(len(i), -1).any(axis=1))
         i, j, by_others = i[far], j[far], np.zeros_like(d[far])
-        for k in range(len(y) if far.size else 0):
+        for k in bodies.massive if far.size else ():
             to_j, to_i = y[k] - y[j], y[k] - y[i]  # pairs, coordinates, batch
             for toward, sign in ((to_i, 1.0), (to_j, -1.0)):
                 square = (toward * toward).sum(axis=1, keepdims=True) + soft2

@@ -336,15 +336,15 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Task for Along<'_, D, LA
 }
 
 /// The law of that number: kernels are made for numbers.
-const fn law(number: u8) -> Law {
+pub(crate) const fn law(number: u8) -> Law {
     match number {
         LOGARITHMIC => Law::Logarithmic,
         NEWTON => Law::Newton,
         _ => Law::Printed,
     }
 }
-const LOGARITHMIC: u8 = 0;
-const NEWTON: u8 = 1;
+pub(crate) const LOGARITHMIC: u8 = 0;
+pub(crate) const NEWTON: u8 = 1;
 const PRINTED: u8 = 2;
 
 /// Which kernel meets the bodies: chosen once, called for each force.

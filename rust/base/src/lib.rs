@@ -11,4 +11,5 @@ pub mod functions;
 #[cfg(all(windows, target_env = "gnu"))]
 mod fused;
 pub mod isa;
+pub mod massless;
 pub mod number;

@@ -74,6 +74,12 @@ fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Signat
     signature("nbody", &[&[("force", force)], control].concat(), &[("dim", dim)], &rows, &[])
 }
 
+/// Bodies of which every so many-th alone has mass.
+fn with_massless(n: usize, every: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Signature {
+    let massless = (0..n as u32).filter(|i| *i as usize % every != 1).collect();
+    Signature { lists: vec![("massless".to_owned(), massless)], ..bodies(n, dim, force, control) }
+}
+
 /// A net in so many dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across,
 /// which do not. The first particle is fixed if there is more than one row.
 fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], control: &[(&str, &str)]) -> Signature {
@@ -127,6 +133,10 @@ fn systems() -> Vec<Signature> {
             all.extend(CONTROLS.map(|control| bodies(n, dim, force, control)));
         }
     }
+    for (n, every, dim, force) in [(9, 2, 2, "newton"), (23, 7, 3, "logarithmic"), (20, 30, 3, "printed")] {
+        all.extend(CONTROLS.map(|control| with_massless(n, every, dim, force, control)));
+    }
+    all.push(with_massless(11, usize::MAX, 2, "newton", &[]));
     all.extend(nets());
     all.extend(CONTROLS.map(|control| net(2, 5, 3, &[("masses", 10), ("gravity", 3)], control)));
     all.extend([bodies(35, 2, "newton", &[]), bodies(35, 3, "newton", CONTROLS[4]), bodies(66, 2, "logarithmic", CONTROLS[1])]);

@@ -148,6 +148,11 @@ fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Signat
     signature("nbody", &words, &[("dim", dim)], &rows, &[])
 }
 
+/// Bodies, some of which have no mass.
+fn with_massless(n: usize, massless: &[u32], dim: usize, force: &str, control: &[(&str, &str)]) -> Signature {
+    Signature { lists: vec![("massless".to_owned(), massless.into())], ..bodies(n, dim, force, control) }
+}
+
 const SINE_A: [(&str, usize); 3] = [("a.amplitude", 1), ("a.omega", 1), ("a.phase", 1)];
 const CONTROLS: [[(&str, &str); 2]; 4] = [
     [("control", "energy"), ("control.form", "limited")],
@@ -241,6 +246,8 @@ fn systems() -> Vec<Signature> {
         all.extend(CONTROLS.iter().flat_map(|control| [bodies(3, 2, force, control), bodies(10, 3, force, control)]));
     }
     all.push(bodies(35, 2, "newton", &[]));
+    all.extend([with_massless(4, &[0, 2], 2, "newton", &[]), with_massless(3, &[0, 1, 2], 3, "logarithmic", &[])]);
+    all.extend(CONTROLS.map(|control| with_massless(6, &[1, 3, 4], 3, "newton", &control)));
     all.extend(nets());
     all.extend(CONTROLS.map(|control| net(2, 5, 3, &[("masses", 10), ("gravity", 3)], &control)));
     all.extend(own());
@@ -499,6 +506,9 @@ fn what_cannot_be_made_is_refused() {
         &[],
     ));
     misshapen(signature("nbody", &[("force", "newton")], &[("dim", 2)], &[("softening", 1)], &[]));
+    for massless in [&[3][..], &[1, 0], &[2, 2], &[0, u32::MAX]] {
+        unknown(with_massless(3, massless, 2, "newton", &[]));
+    }
     misshapen(net(2, 3, 2, &[("masses", 5)], &[]));
     misshapen(net(2, 3, 2, &[("drag", 2)], &[]));
     misshapen(net(2, 3, 2, &[("stiffness", 2)], &[]));

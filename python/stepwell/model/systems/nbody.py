@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Shape
 from ...base.immutable import changed
-from ...errors import ShapeError
+from ...errors import ShapeError, UnsupportedError
 from ...reference.systems import nbody as reference
 from .. import surfaces
 from ..parameters import aligned
@@ -34,12 +34,16 @@ class NBody(System):
 
     Args:
         masses: one for each body, shape (bodies,) or (bodies, *batch), zero or more. A body without mass is attracted but does
-            not attract.
+            not attract. In an array of shape (bodies,) zeros make it cost no more than its pairs with bodies that have mass.
         force: the force and its potential, one of the table.
         G: gravitational constant, above zero; broadcasts over the batch.
         softening: length ε, which replaces distances r by √(r² + ε²) so that bodies may meet; broadcasts.
         floor: a ``Floor`` or ``Sphere`` that bodies meet, or a list of them; each body meets them by itself.
         dim: 2 or 3; if None, taken from the shape of the state.
+
+    Attributes:
+        massless: the numbers of the bodies without mass, which no other body meets for their sake; in an array of masses for each
+            member there are none, for whether a body has mass decides the operations of a step.
 
     Raises:
         ArgumentError: if an argument is wrong.
@@ -71,6 +75,8 @@ class NBody(System):
         self.masses = checks.not_negative("masses", masses)
         if self.masses.ndim == 0 or len(self.masses) == 0:
             raise ShapeError(f"masses: expected one for each body along the first axis, got shape {self.masses.shape}")
+        # Of a batch not by its numbers: the operations, and so the bits, of a member would depend on the others.
+        self.massless = np.flatnonzero(self.masses == 0.0) if self.masses.ndim == 1 else np.empty(0, dtype=np.intp)
         self.force = checks.known("force", force, FORCES)
         self.G = checks.numbers("G", G, positive=True)
         self.softening = checks.not_negative("softening", softening, "lengths")
@@ -122,15 +128,49 @@ class NBody(System):
         numbers = {"masses": one(self.masses, 1), "G": one(self.G), "softening": one(self.softening)}
         return changed(self, **numbers, batch=(), around=tuple(part.member(one) for part in self.around))
 
+    def with_arguments(self, arguments: dict[str, Any]) -> Self:
+        """These bodies with other numbers: those without mass stay so, since others do not meet them."""
+        other = super().with_arguments(arguments)
+        masses = other.masses[self.massless]
+        if masses.any():
+            body = int(self.massless[np.flatnonzero(masses.reshape(len(masses), -1).any(axis=1))[0]])
+            raise UnsupportedError(
+                f"masses: body {body} was without mass, so no other body is attracted by it, got a mass above zero; make another "
+                f"NBody with these masses"
+            )
+        return other
+
+    @property
+    def massive(self) -> Any:
+        """The numbers of the bodies that attract others."""
+        return np.delete(np.arange(len(self.masses)), self.massless)
+
+    def pairs(self) -> tuple[Any, Any]:
+        """The two of each pair of which one attracts the other, the lower number first."""
+        massive, massless = self.massive, self.massless
+        first, second = np.triu_indices(len(massive), 1)
+        one = np.concatenate([massive[first], np.repeat(massive, len(massless))])
+        other = np.concatenate([massive[second], np.tile(massless, len(massive))])
+        return np.minimum(one, other), np.maximum(one, other)
+
+    @property
+    def pair_count(self) -> int:
+        """How many pairs there are."""
+        return len(massive := self.massive) * (len(massive) - 1) // 2 + len(massive) * len(self.massless)
+
     def closest(self, y: Array) -> tuple[tuple[int, int], float]:
-        """The two bodies that are closest to each other in one state, and their distance."""
-        n, best = len(y), ((0, 0), np.inf)
-        for i in range(n - 1):
+        """The two bodies that are closest to each other in one state, and their distance; only pairs of which one has mass."""
+        massive, massless, best = self.massive, self.massless, ((0, 0), np.inf)
+        for i, body in enumerate(massive):
+            others = np.concatenate([massive[i + 1 :], massless])
+            if not len(others):
+                continue
             with np.errstate(all="ignore"):
-                distance = np.sqrt(((y[i + 1 :] - y[i]) ** 2).sum(axis=1))
+                distance = np.sqrt(((y[others] - y[body]) ** 2).sum(axis=1))
             j = int(np.argmin(np.where(np.isnan(distance), np.inf, distance)))
             if distance[j] < best[1]:
-                best = (i, i + 1 + j), float(distance[j])
+                first, second = sorted((int(body), int(others[j])))
+                best = (first, second), float(distance[j])
         return best
 
     def kinetic(self, v: Array) -> Array:
@@ -143,9 +183,11 @@ class NBody(System):
         return self.control is None and not self.contacts and self.force != "printed"
 
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
-        """The force, the dimension, masses, G·m and the softening."""
+        """The force, the dimension, masses, G·m, the softening and which bodies have no mass."""
         masses = aligned(self.masses, 1, batch)
-        sizes = {"force": self.force, "dim": self.y_shape[1]}
+        sizes: dict[str, Any] = {"force": self.force, "dim": self.y_shape[1]}
+        if len(self.massless):
+            sizes["massless"] = self.massless.astype("<u4").tobytes()
         return sizes | {"masses": masses, "strength": self.G * masses, "softening": self.softening}
 
     def named(self, name: str, index: Shape) -> str:

@@ -1,5 +1,7 @@
 """Bodies that attract each other (Appendix C, D), each pair computed once."""
 
+from typing import Any
+
 import numpy as np
 
 from ...base.arrays import Array
@@ -32,8 +34,15 @@ def partners(n: int) -> list[list[range]]:
     return slabs
 
 
+def numbers_of(indices: bytes | None) -> Any:
+    """A list of whole numbers."""
+    return np.frombuffer(indices or b"", "<u4").astype(np.intp)
+
+
 def total(values: Array) -> Array:
-    """The sum over the first axis: body i in part i mod LANES, then part after part."""
+    """The sum over the first axis: body i in part i mod LANES, then part after part; zero without bodies."""
+    if not len(values):
+        return np.zeros(values.shape[1:], values.dtype)
     parts = [values[lane] for lane in range(min(LANES, len(values)))]
     for i in range(LANES, len(values)):
         parts[i % LANES] = parts[i % LANES] + values[i]
@@ -74,10 +83,21 @@ def gathered(shares: Array, rows: Array, centre: Array | None) -> Array:
 class NBody(Recorded):
     """v̇ᵢ = Σⱼ G·mⱼ·(yⱼ − yᵢ)·f(r² + ε²), ẏ = v, with f = 1/r² (``logarithmic``, ``printed``) or 1/r³ (``newton``).
 
-    Blocks are of shape (bodies, dim, …), masses of shape (bodies, …).
+    Blocks are of shape (bodies, dim, …), masses of shape (bodies, …). Bodies that are ``massless`` attract no other: the rest
+    move as if these were not there, and each of these as if it were alone with the rest, which pull it one after the other. No
+    sum over bodies has a term of theirs.
     """
 
-    def __init__(self, h: float, force: str, dim: int, masses: Array, strength: Array, softening: Array) -> None:
+    def __init__(
+        self,
+        h: float,
+        force: str,
+        dim: int,
+        masses: Array,
+        strength: Array,
+        softening: Array,
+        massless: bytes | None = None,
+    ) -> None:
         self.h = h
         self.force = force
         self.masses = masses
@@ -85,6 +105,9 @@ class NBody(Recorded):
         self.strength = h * strength  # h·G·m
         self.soft = softening * softening
         self.half = (0.5 * h) * masses
+        self.massless = numbers_of(massless)
+        everyone: Any = slice(None)  # as a view, which takes no time
+        self.massive = np.delete(np.arange(len(masses)), self.massless) if len(self.massless) else everyone
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
         """h·v̇."""
@@ -130,7 +153,21 @@ class NBody(Recorded):
         return np.stack(shares), np.stack(strengths)
 
     def meet(self, y: Array, potential: Array | None) -> Array:
-        """h·v̇ from every pair once; adds h·G·Σⱼ mⱼ·φ to ``potential`` for each body, if it is there.
+        """h·v̇; adds h·G·Σⱼ mⱼ·φ to ``potential`` for each body with mass, if it is there."""
+        if not len(self.massless):
+            return self.among(y, self.strength, potential)
+        dv = np.full_like(y, -0.0)
+        strength = self.strength[self.massive]
+        dv[self.massive] = self.among(y[self.massive], strength, potential)
+        alone = dv[self.massless]
+        for j, own in zip(self.massive, strength, strict=True):
+            d = y[j] - y[self.massless]
+            alone = alone + d * (self.pull(square(d) + self.soft) * own)[:, np.newaxis]
+        dv[self.massless] = alone
+        return dv
+
+    def among(self, y: Array, strength: Array, potential: Array | None) -> Array:
+        """The same of bodies with mass, from every pair once.
 
         Body i pulls the partner after it, i + k, and is pulled by it; what bodies get from the partners after them and before
         them is summed apart, the latter over two rounds (body n + j is body j) so that no index wraps. These sums start from −0:
@@ -138,7 +175,7 @@ class NBody(Recorded):
         """
         n = len(y)
         dv = np.full_like(y, -0.0)  # of y's type, which may be objects
-        twice, strength = np.concatenate([y, y]), np.concatenate([self.strength, self.strength])
+        twice, strengths = np.concatenate([y, y]), np.concatenate([strength, strength])
         for slab in partners(n):
             after, before, wells = np.full_like(y, -0.0), np.full_like(twice, -0.0), np.full_like(y[:, 0], 0.0)
             for group in slab:
@@ -147,17 +184,22 @@ class NBody(Recorded):
                     m = k if 2 * k == n else n  # opposite bodies meet once
                     d = twice[k : k + m] - y[:m]
                     r2 = square(d) + self.soft
-                    pull = 1.0 / (r2 * np.sqrt(r2)) if self.force == "newton" else 1.0 / r2
-                    after[:m] = after[:m] + d * (pull * strength[k : k + m])[:, np.newaxis]
-                    pushes.append((k, m, d * (pull * self.strength[:m])[:, np.newaxis]))
+                    pull = self.pull(r2)
+                    after[:m] = after[:m] + d * (pull * strengths[k : k + m])[:, np.newaxis]
+                    pushes.append((k, m, d * (pull * strength[:m])[:, np.newaxis]))
                     if potential is not None:
-                        wells[:m] = wells[:m] + self.phi(r2, pull, strength[k : k + m])
+                        wells[:m] = wells[:m] + self.phi(r2, pull, strengths[k : k + m])
                 for k, m, push in reversed(pushes):
                     before[k : k + m] = before[k : k + m] + push
             dv = dv + (after - (before[:n] + before[n:]))
             if potential is not None:
                 potential += wells
         return dv
+
+    def pull(self, r2: Array) -> Array:
+        """f(r²)"""
+        pull: Array = 1.0 / (r2 * np.sqrt(r2)) if self.force == "newton" else 1.0 / r2
+        return pull
 
     def phi(self, r2: Array, pull: Array, strength: Array) -> Array:
         """The potential, per mass, that a partner makes: ln r, or −1/r (which ``printed`` has with the wrong force)."""
@@ -169,16 +211,17 @@ class NBody(Recorded):
 
     def energies(self, v: Array, y: Array) -> tuple[Array, Array, Array]:
         """h·v̇, h times the kinetic energy, and h times the whole energy, in one pass over the pairs."""
-        potential = np.full_like(y[:, 0], 0.0)
+        massive = self.massive
+        potential = np.full_like(y[massive, 0], 0.0)
         dv = self.meet(y, potential)
-        kinetic = total(self.half * square(v))
-        return dv, kinetic, kinetic + total(self.masses * potential)
+        kinetic = total(self.half[massive] * square(v[massive]))
+        return dv, kinetic, kinetic + total(self.masses[massive] * potential)
 
     def gradient(self, v: Array, y: Array, dv: Array) -> tuple[Array, Array, Array]:
         """The gradient of the energy, m·v in the velocities and −m·a in the coordinates, and the square of its length."""
-        masses = self.masses[:, np.newaxis]
+        masses, massive = self.masses[:, np.newaxis], self.massive
         along_v, along_y = masses * v, -(masses * (dv / self.h))
-        return along_v, along_y, total(square(along_v) + square(along_y))
+        return along_v, along_y, total(square(along_v[massive]) + square(along_y[massive]))
 
 
 def energy(s: NBody, v: Array, y: Array) -> Array:
@@ -188,22 +231,25 @@ def energy(s: NBody, v: Array, y: Array) -> Array:
 
 def momentum(s: NBody, v: Array, y: Array) -> Array:
     """Σ m·v."""
-    return total(s.masses[:, np.newaxis] * v)
+    return total(s.masses[s.massive, np.newaxis] * v[s.massive])
 
 
 def angular_momentum(s: NBody, v: Array, y: Array) -> Array:
     """Σ m·y × v about the origin."""
     pairs = [(0, 1)] if y.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
-    spin = [total(s.masses * (y[:, a] * v[:, b] - y[:, b] * v[:, a])) for a, b in pairs]
+    masses, v, y = s.masses[s.massive], v[s.massive], y[s.massive]
+    spin = [total(masses * (y[:, a] * v[:, b] - y[:, b] * v[:, a])) for a, b in pairs]
     return spin[0] if len(spin) == 1 else np.stack(spin)
 
 
 def closest(s: NBody, v: Array, y: Array) -> Array:
-    """The least distance of two bodies."""
+    """The least distance of two bodies, of which one has mass."""
     least = np.full(y.shape[2:], np.inf)
-    for i in range(len(y)):
-        for r2 in square(y[i + 1 :] - y[i]):
-            least = bits.where(bits.less(r2, least), r2, least)
+    massive, massless = y[s.massive], y[s.massless]
+    for i, place in enumerate(massive):
+        for others in (massive[i + 1 :], massless):
+            for r2 in square(others - place):
+                least = bits.where(bits.less(r2, least), r2, least)
     return np.asarray(np.sqrt(least))
 
 

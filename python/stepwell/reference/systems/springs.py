@@ -7,7 +7,7 @@ import numpy as np
 from ...base.arrays import Array
 from .. import bits
 from ..quantities import Quantity, Recorded
-from .nbody import square, total
+from .nbody import numbers_of, square, total
 
 
 class Ends(NamedTuple):
@@ -15,11 +15,6 @@ class Ends(NamedTuple):
 
     first: tuple[Any, Any]
     second: tuple[Any, Any]
-
-
-def numbers_of(indices: bytes | None) -> Any:
-    """A list of whole numbers."""
-    return np.frombuffer(indices or b"", "<u4").astype(np.intp)
 
 
 def in_order(pairs: Any, fixed: Any) -> list[Ends]:

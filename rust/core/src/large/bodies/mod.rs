@@ -1,5 +1,6 @@
 //! Many bodies ([`crate::model::systems::nbody`]), eight of them side by side, the forces on as many threads as there are.
 
+mod order;
 mod quantities;
 mod share;
 
@@ -8,11 +9,13 @@ use std::sync::atomic::Ordering::Relaxed;
 use stepwell_base::{
     bodies::{Law, partners},
     forces::{Distances, Kernel, Meeting, Round, Sums},
+    massless::Pulled,
 };
 
 use self::{
+    order::Order,
     quantities::{Quantity, Record, kinetic, total},
-    share::{Share, add, share},
+    share::{Share, add, share, share_massless},
 };
 use super::rates::{RateTraits, Rates, RatesRequest};
 use crate::{
@@ -20,23 +23,31 @@ use crate::{
     stage::Stop,
 };
 
-/// Bodies from which on threads are worthwhile. They are started anew for each force, which takes some hundredths of a
-/// millisecond.
+/// Bodies, all of which have mass, from which on threads are worthwhile. They are started anew for each force, which takes some
+/// hundredths of a millisecond.
 const MIN_BODIES_FOR_THREADS: usize = 1024;
 
 /// The bodies of one member, scaled to the step.
 struct Bodies {
+    /// How many have mass.
     n: usize,
+    order: Order,
     kernel: Kernel,
     h: f64,
     slabs: Vec<Vec<Distances>>,
     mass: Vec<f64>,
-    /// ½·h·m of each body.
+    /// Of each body with mass, that, ½·h·m and h·G·m.
+    own: Vec<f64>,
     half: Vec<f64>,
-    /// h times the potential of each body, if the forces were found with it.
+    strength: Vec<f64>,
+    /// h times the potential of each body with mass, if the forces were found with it.
     potential: Vec<f64>,
-    /// The bodies along the lanes.
+    /// The bodies with mass along the lanes.
     round: Round,
+    /// Threads that share the bodies without mass.
+    threads: usize,
+    /// Whether forces take so long that they are kept.
+    long: bool,
     /// Sums of forces and potentials, once for each thread.
     sums: Vec<Sums>,
     /// One for each slab, if there are several threads.
@@ -55,22 +66,30 @@ struct Bodies {
 
 /// The rates of many bodies.
 pub(crate) fn make(asked: &RatesRequest) -> Box<dyn Rates> {
-    let (n, dim, machine) = (asked.signature.count("masses"), asked.signature.whole("dim"), asked.machine);
+    let (order, dim, machine) = (Order::of(asked.signature), asked.signature.whole("dim"), asked.machine);
+    let (n, all) = (order.massive(), asked.signature.count("masses"));
     let law = nbody::law(asked.signature).unwrap_or(Law::Logarithmic);
     let ends = |group: Vec<usize>| Some((*group.first()?, *group.last()?));
     let slabs: Vec<Vec<Distances>> = partners(n).into_iter().map(|slab| slab.into_iter().filter_map(ends).collect()).collect();
     let round = Round::new(n, dim);
     let threads = if n < MIN_BODIES_FOR_THREADS { 1 } else { machine.threads_for(slabs.len(), true) };
+    let pulls = 2 * n * order.massless().len();
+    let enough = MIN_BODIES_FOR_THREADS * MIN_BODIES_FOR_THREADS;
     let shares = if threads > 1 { slabs.iter().map(|_| Share::new(n, dim)).collect() } else { Vec::new() };
     Box::new(Bodies {
         n,
         kernel: Kernel { law, dim, level: machine.level },
         h: asked.h,
-        mass: vec![0.0; n],
+        mass: vec![0.0; all],
+        own: vec![0.0; n],
         half: vec![0.0; n],
+        strength: vec![0.0; n],
         potential: vec![0.0; n],
         sums: (0..threads).map(|_| Sums::new(&round)).collect(),
         round,
+        threads: if pulls < enough { 1 } else { machine.threads_for(order.massless().len(), true) },
+        long: n * n + pulls >= enough,
+        order,
         shares,
         slabs,
         record: asked.record.iter().filter_map(|name| Quantity::named(name)).collect(),
@@ -85,6 +104,25 @@ pub(crate) fn make(asked: &RatesRequest) -> Box<dyn Rates> {
 impl Bodies {
     fn meet(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
         let out = &mut out[..y.len()];
+        if self.order.massless().is_empty() {
+            return self.among(energy, y, out);
+        }
+        let (Kernel { law, dim, level }, mut order) = (self.kernel, std::mem::take(&mut self.order));
+        order.take_places(dim, y);
+        let (places, pushes) = order.places_and_pushes();
+        if self.n > 0 {
+            self.among(energy, places, pushes);
+        }
+        let (strengths, soft, stop, places) = (&self.strength[..], self.round.soft, &*self.stop, order.places());
+        share_massless(self.threads, order.massless(), dim, out, |bodies, out, first| {
+            Pulled { bodies, y, places, strengths, soft, stop, out, first }.by(law, dim, level);
+        });
+        order.spread_pushes(dim, out);
+        self.order = order;
+    }
+
+    /// The forces of bodies with mass on each other.
+    fn among(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
         match self.kernel.dim {
             2 => self.round.fill::<2>(y),
             _ => self.round.fill::<3>(y),
@@ -122,7 +160,7 @@ impl Bodies {
         }
         self.has_potentials &= !energy;
         self.meet(energy, y, out);
-        if self.n >= MIN_BODIES_FOR_THREADS && !self.stop.load(Relaxed) {
+        if self.long && !self.stop.load(Relaxed) {
             self.dv.clear();
             self.dv.extend_from_slice(&out[..y.len()]);
             self.keep(energy, y);
@@ -136,13 +174,14 @@ impl Bodies {
         (self.has_forces, self.has_potentials) = (true, energy);
     }
 
-    fn gradient_in<const D: usize>(&self, v: &[f64], dv: &[f64], along_v: &mut [f64], along_y: &mut [f64]) -> f64 {
+    fn gradient_in<const D: usize>(&mut self, v: &[f64], dv: &[f64], along_v: &mut [f64], along_y: &mut [f64]) -> f64 {
         for (r, (v, dv)) in v.iter().zip(dv).enumerate() {
             let mass = self.mass[r / D];
             along_v[r] = mass * v;
             along_y[r] = -(mass * (dv / self.h));
         }
-        let ((v, _), (y, _)) = (along_v.as_chunks::<D>(), along_y.as_chunks::<D>());
+        let [v, y] = self.order.massive_of(D, [along_v, along_y]);
+        let ((v, _), (y, _)) = (v.as_chunks::<D>(), y.as_chunks::<D>());
         total(v, y, |_, v, y| quantities::square(v) + quantities::square(y))
     }
 }
@@ -155,11 +194,14 @@ impl Rates for Bodies {
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
         let row = |name: &str, i: usize| spec.signature.place(name).map_or(f64::NAN, |place| spec.rows[place + i].at(first));
         let softening = row("softening", 0);
-        self.round.take(self.n, |i| self.h * row("strength", i), softening * softening);
-        for i in 0..self.n {
-            self.mass[i] = row("masses", i);
-            self.half[i] = (0.5 * self.h) * self.mass[i];
+        self.mass.iter_mut().enumerate().for_each(|(i, mass)| *mass = row("masses", i));
+        for k in 0..self.n {
+            let i = self.order.number(k);
+            self.own[k] = self.mass[i];
+            self.half[k] = (0.5 * self.h) * self.mass[i];
+            self.strength[k] = self.h * row("strength", i);
         }
+        self.round.take(self.n, |k| self.strength[k], softening * softening);
         (self.has_forces, self.has_potentials) = (false, false);
     }
 
@@ -186,8 +228,9 @@ impl Rates for Bodies {
 
     fn energies(&mut self, v: &[f64], y: &[f64], dv: &mut [f64]) -> Option<[f64; 2]> {
         self.find(true, y, dv);
+        let [v] = self.order.massive_of(self.kernel.dim, [v]);
         let kinetic = kinetic(self.kernel.dim, &self.half, v);
-        Some([kinetic, kinetic + total(&self.mass, &self.potential, |_, mass, potential| mass * potential)])
+        Some([kinetic, kinetic + total(&self.own, &self.potential, |_, mass, potential| mass * potential)])
     }
 
     fn gradient(&mut self, v: &[f64], dv: &[f64], (along_v, along_y): (&mut [f64], &mut [f64])) -> Option<f64> {
@@ -199,7 +242,8 @@ impl Rates for Bodies {
 
     fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
         let (level, h, what, mass, half, potential) =
-            (self.kernel.level, self.h, &self.record[..], &self.mass[..], &self.half[..], &self.potential[..]);
+            (self.kernel.level, self.h, &self.record[..], &self.own[..], &self.half[..], &self.potential[..]);
+        let [v, y] = self.order.all_of(self.kernel.dim, [v, y]);
         let record = Record { level, h, what, mass, half, potential, v, y, rows };
         match self.kernel.dim {
             2 => record.fill::<2>(),

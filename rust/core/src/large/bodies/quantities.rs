@@ -94,10 +94,11 @@ pub(super) struct Record<'a> {
     pub(super) level: Level,
     pub(super) h: f64,
     pub(super) what: &'a [Quantity],
+    /// Of each body with mass: the mass, ½·h·m, and h times the potential at these places.
     pub(super) mass: &'a [f64],
     pub(super) half: &'a [f64],
-    /// h times the potential of each body, of these places.
     pub(super) potential: &'a [f64],
+    /// Of all bodies, those with mass first.
     pub(super) v: &'a [f64],
     pub(super) y: &'a [f64],
     pub(super) rows: &'a mut [f64],
@@ -107,7 +108,7 @@ impl Record<'_> {
     /// Does it, in so many directions.
     pub(super) fn fill<const D: usize>(self) {
         let Self { level, h, what, mass, half, potential, v, y, rows } = self;
-        let ((places, _), (speeds, _)) = (y.as_chunks::<D>(), v.as_chunks::<D>());
+        let (places, speeds) = (y.as_chunks::<D>().0, &v.as_chunks::<D>().0[..mass.len()]);
         let mut at = 0;
         for quantity in what {
             let rows = &mut rows[at..at + quantity.size(D)];
@@ -128,14 +129,18 @@ impl Record<'_> {
                         *row = total(mass, speeds, |i, m, v| m * (places[i][a] * v[b] - places[i][b] * v[a]));
                     }
                 }
-                Quantity::Closest => with_isa!(level, |isa| isa.run(Closest { bodies: places, least: &mut rows[0] })),
+                Quantity::Closest => {
+                    with_isa!(level, |isa| isa.run(Closest { massive: mass.len(), bodies: places, least: &mut rows[0] }))
+                }
             }
         }
     }
 }
 
-/// The least distance, eight partners at a time. The order of the pairs does not matter.
+/// The least distance of two bodies of which one has mass, eight partners at a time. The order of the pairs does not matter.
 struct Closest<'a, const D: usize> {
+    massive: usize,
+    /// Those with mass come first.
     bodies: &'a [[f64; D]],
     least: &'a mut f64,
 }
@@ -150,7 +155,7 @@ impl<const D: usize> Task for Closest<'_, D> {
         let row = |c: usize| -> Vec<f64> { (0..along).map(|i| bodies.get(i).map_or(f64::NAN, |body| body[c])).collect() };
         let rows: [Vec<f64>; D] = std::array::from_fn(row);
         let mut parts = [f64::INFINITY; SIDE];
-        for (i, body) in bodies.iter().enumerate() {
+        for (i, body) in bodies[..self.massive].iter().enumerate() {
             for start in (i + 1..n).step_by(SIDE) {
                 let mut r2 = [0.0; SIDE];
                 for c in 0..D {

@@ -56,3 +56,52 @@ pub(super) fn share(
         share.done = false;
     }
 }
+
+/// Some bodies without mass.
+struct Part<'a> {
+    bodies: &'a [u32],
+    /// The forces on the bodies from number `first` on.
+    out: &'a mut [f64],
+    first: usize,
+    done: bool,
+}
+
+/// Calls a function for parts of the bodies without mass, on so many threads: with the numbers of some, the forces on the bodies
+/// from a first one on, and the number of that one.
+pub(super) fn share_massless(
+    threads: usize,
+    bodies: &[u32],
+    dim: usize,
+    out: &mut [f64],
+    pull: impl Fn(&[u32], &mut [f64], usize) + Sync,
+) {
+    if threads < 2 {
+        return pull(bodies, out, 0);
+    }
+    let mut parts = Vec::with_capacity(threads);
+    let (mut left, mut first) = (out, 0);
+    for bodies in bodies.chunks(bodies.len().div_ceil(threads).max(1)) {
+        let end = bodies.last().map_or(first, |last| *last as usize + 1); // they ascend, so no other part is before it
+        let (out, others) = left.split_at_mut(dim * (end - first));
+        parts.push(Part { bodies, out, first, done: false });
+        (left, first) = (others, end);
+    }
+    let queue = Mutex::new(parts.iter_mut());
+    let take = || queue.lock().map_or(None, |mut queue| queue.next());
+    let work = || {
+        while let Some(part) = take() {
+            pull(part.bodies, part.out, part.first);
+            part.done = true;
+        }
+    };
+    let work = &work;
+    thread::scope(|scope| {
+        let start = |_| thread::Builder::new().spawn_scoped(scope, work).ok();
+        let helpers: Vec<_> = (1..threads).filter_map(start).collect();
+        work();
+        helpers.into_iter().for_each(|helper| drop(helper.join())); // as above
+    });
+    for part in parts.iter_mut().filter(|part| !part.done) {
+        pull(part.bodies, part.out, part.first);
+    }
+}

@@ -10,6 +10,9 @@
 //! and from those before it are summed separately, the latter over two rounds (body n + j is body j), so that no index wraps
 //! where bodies are taken side by side. The order of these sums depends on the number of bodies only, not on the code that
 //! computes them.
+//!
+//! Bodies without mass, if it is known which these are, attract no other: the rest move as if these were not there, and each of
+//! these as if it were alone with the rest, which pull it one after the other. No sum over bodies has a term of theirs.
 
 use stepwell_base::bodies::{LANES, Law, meeting, partners};
 
@@ -24,16 +27,8 @@ use crate::{
 };
 
 /// What the core knows of it. Given: the word `force`; the whole number `dim`; `masses` and `strength`, G·m, of the bodies;
-/// `softening`, ε.
-pub const KIND: Kind = Kind {
-    name: "nbody",
-    shape,
-    velocity_term: |_| None,
-    quantities,
-    controllable: true,
-    operations: |signature| 11 * signature.count("masses").pow(2),
-    make,
-};
+/// `softening`, ε; the list `massless` of bodies without mass, in ascending order, if there are any.
+pub const KIND: Kind = Kind { name: "nbody", shape, velocity_term: |_| None, quantities, controllable: true, operations, make };
 
 fn shape(signature: &Signature) -> Result<Shape, Error> {
     let dim = signature.whole("dim");
@@ -47,6 +42,10 @@ fn shape(signature: &Signature) -> Result<Shape, Error> {
     signature.expect("masses", n)?;
     signature.expect("strength", n)?;
     signature.expect("softening", 1)?;
+    let massless = signature.list("massless");
+    if massless.iter().any(|i| *i as usize >= n) || !massless.is_sorted_by(|one, other| one < other) {
+        return Err(Error::Options { system: signature.system.clone(), options: format!("massless of {n} bodies") });
+    }
     Ok(Shape { v: n * dim, y: n * dim })
 }
 
@@ -55,6 +54,18 @@ fn quantities(signature: &Signature) -> Vec<(String, usize)> {
     let spin = if dim == 2 { 1 } else { 3 };
     let sizes = [("energy", 1), ("momentum", dim), ("angular_momentum", spin), ("closest", 1)];
     sizes.map(|(name, numbers)| (name.to_owned(), numbers)).to_vec()
+}
+
+fn operations(signature: &Signature) -> usize {
+    let massless = signature.list("massless").len();
+    let massive = signature.count("masses").saturating_sub(massless);
+    11 * massive * (massive + 2 * massless)
+}
+
+/// The bodies with mass, in ascending order.
+pub(crate) fn massive(signature: &Signature) -> Vec<usize> {
+    let massless = signature.list("massless");
+    (0..signature.count("masses")).filter(|i| massless.binary_search(&(*i as u32)).is_err()).collect()
 }
 
 pub(crate) fn law(signature: &Signature) -> Option<Law> {
@@ -101,6 +112,9 @@ struct Bodies<N: Number> {
     soft: N,
     /// ½·h·m
     half: Vec<N>,
+    /// Bodies with mass, and those without.
+    massive: Vec<usize>,
+    massless: Vec<usize>,
 }
 
 pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
@@ -109,16 +123,36 @@ pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let strength = alone.iter().map(|strength| h * *strength).collect();
     let half = masses.iter().map(|mass| (N::of(0.5) * h) * *mass).collect();
     let law = law(p.signature).unwrap_or(Law::Logarithmic); // `shape` has seen that there is one
-    Box::new(Bodies { h, law, dim: p.signature.whole("dim"), masses, alone, strength, soft: softening * softening, half })
+    let massless = p.signature.list("massless").iter().map(|i| *i as usize).collect();
+    let (dim, soft, massive) = (p.signature.whole("dim"), softening * softening, massive(p.signature));
+    Box::new(Bodies { h, law, dim, masses, alone, strength, soft, half, massive, massless })
 }
 
 impl<N: Number> Bodies<N> {
-    /// h·v̇ from every pair once, and with `wells` h·G·Σⱼ mⱼ·φ for each body, else zeros.
+    /// h·v̇ from every pair once, and with `wells` h·G·Σⱼ mⱼ·φ for each body with mass, else zeros.
     fn meet(&self, y: &Block<N>, with_wells: bool) -> (Block<N>, Vec<N>) {
-        let (n, dim, zero) = (self.masses.len(), self.dim, N::of(0.0));
+        let dim = self.dim;
+        let (among, potential) = self.among(y, with_wells);
+        let mut dv = Block::from_element(dim * self.masses.len(), N::of(-0.0));
+        for (pushes, i) in among.chunks(dim).zip(&self.massive) {
+            pushes.iter().enumerate().for_each(|(c, push)| dv[dim * i + c] = *push);
+        }
+        for &i in &self.massless {
+            for &j in &self.massive {
+                let d: Vec<N> = (0..dim).map(|c| y[dim * j + c] - y[dim * i + c]).collect();
+                let to_i = self.law.pull(square(&d) + self.soft) * self.strength[j];
+                d.into_iter().enumerate().for_each(|(c, d)| dv[dim * i + c] += d * to_i);
+            }
+        }
+        (dv, potential)
+    }
+
+    /// The same of bodies with mass among each other.
+    fn among(&self, y: &Block<N>, with_wells: bool) -> (Vec<N>, Vec<N>) {
+        let (bodies, n, dim, zero) = (&self.massive, self.massive.len(), self.dim, N::of(0.0));
         // Sums of pushes start from −0, for x + −0 is x, also where x is a zero: the first term costs no operation.
         let none = N::of(-0.0);
-        let (mut dv, mut potential) = (Block::from_element(n * dim, none), vec![zero; n]);
+        let (mut dv, mut potential) = (vec![none; n * dim], vec![zero; n]);
         for slab in partners(n) {
             let (mut after, mut before, mut wells) = (vec![none; n * dim], vec![none; 2 * n * dim], vec![zero; n]);
             for group in slab {
@@ -126,17 +160,17 @@ impl<N: Number> Bodies<N> {
                 // it push from the farthest distance to the nearest, which is a single push in each round.
                 for i in 0..n {
                     for &k in group.iter().filter(|k| i < meeting(n, **k)) {
-                        let j = (i + k) % n;
-                        let d: Vec<N> = (0..dim).map(|c| y[dim * j + c] - y[dim * i + c]).collect();
+                        let (one, other) = (bodies[i], bodies[(i + k) % n]);
+                        let d: Vec<N> = (0..dim).map(|c| y[dim * other + c] - y[dim * one + c]).collect();
                         let r2 = square(&d) + self.soft;
                         let pull = self.law.pull(r2);
-                        let (to_i, to_j) = (pull * self.strength[j], pull * self.strength[i]);
+                        let (to_i, to_j) = (pull * self.strength[other], pull * self.strength[one]);
                         for (c, d) in d.into_iter().enumerate() {
                             after[dim * i + c] += d * to_i;
                             before[dim * (i + k) + c] += d * to_j;
                         }
                         if with_wells {
-                            wells[i] += self.law.potential(r2, pull, self.strength[j]);
+                            wells[i] += self.law.potential(r2, pull, self.strength[other]);
                         }
                     }
                 }
@@ -195,10 +229,10 @@ impl<N: Number> Bodies<N> {
         all
     }
 
-    /// What is said of each body in turn: its mass, its place and its velocity.
+    /// What is said of each body with mass in turn: its mass, its place and its velocity.
     fn each<'a>(&'a self, v: &'a Block<N>, y: &'a Block<N>) -> impl Iterator<Item = (N, &'a [N], &'a [N])> {
-        let (v, y) = (v.as_slice().chunks(self.dim), y.as_slice().chunks(self.dim));
-        self.masses.iter().zip(y.zip(v)).map(|(mass, (y, v))| (*mass, y, v))
+        let row = |block: &'a Block<N>, i: usize| &block.as_slice()[self.dim * i..][..self.dim];
+        self.massive.iter().map(move |&i| (self.masses[i], row(y, i), row(v, i)))
     }
 }
 
@@ -243,8 +277,9 @@ impl<N: Number> System<N> for Bodies<N> {
 
     fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
         let (dv, potential) = self.meet(y, true);
-        let kinetic = total(self.half.iter().zip(v.as_slice().chunks(self.dim)).map(|(half, v)| *half * square(v)));
-        let whole = kinetic + total(self.masses.iter().zip(potential).map(|(mass, potential)| *mass * potential));
+        let halves = self.massive.iter().map(|i| self.half[*i]);
+        let kinetic = total(halves.zip(self.each(v, y)).map(|(half, (_, _, v))| half * square(v)));
+        let whole = kinetic + total(self.each(v, y).zip(potential).map(|((mass, ..), potential)| mass * potential));
         Some(Energies { dv, kinetic, whole })
     }
 
@@ -253,8 +288,7 @@ impl<N: Number> System<N> for Bodies<N> {
         let of =
             |block: &Block<N>| Block::from_iterator(block.len(), (0..block.len()).map(|r| self.masses[r / self.dim] * block[r]));
         let (v, y) = (of(v), -of(&energies.dv.map(|dv| dv / self.h)));
-        let bodies = v.as_slice().chunks(self.dim).zip(y.as_slice().chunks(self.dim));
-        let square = total(bodies.map(|(v, y)| square(v) + square(y)));
+        let square = total(self.each(&v, &y).map(|(_, y, v)| square(v) + square(y)));
         Some(Gradient { v, y, square })
     }
 
@@ -271,9 +305,9 @@ impl<N: Number> System<N> for Bodies<N> {
             "closest" => {
                 let places: Vec<&[N]> = y.as_slice().chunks(self.dim).collect();
                 let mut least = N::of(f64::INFINITY);
-                for (i, from) in places.iter().enumerate() {
-                    for to in &places[i + 1..] {
-                        let d: Vec<N> = to.iter().zip(*from).map(|(to, from)| *to - *from).collect();
+                for (k, &i) in self.massive.iter().enumerate() {
+                    for &j in self.massive[k + 1..].iter().chain(&self.massless) {
+                        let d: Vec<N> = places[j].iter().zip(places[i]).map(|(to, from)| *to - *from).collect();
                         let r2 = square(&d);
                         least = N::choose(r2.below(least), r2, least);
                     }

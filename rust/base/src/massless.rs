@@ -1,0 +1,94 @@
+//! The forces on bodies without mass: several of them side by side, a lane each, which are pulled by one body after the other.
+
+#![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
+
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use crate::{
+    bodies::{LANES as SIDE, Law},
+    forces::{LOGARITHMIC, NEWTON, law},
+    isa::{Level, Task, with_isa},
+};
+
+/// Whether to stop is asked for after so many bodies.
+const STOPPED_AFTER: usize = 128 * SIDE;
+
+/// Some bodies without mass, and what pulls them.
+pub struct Pulled<'a> {
+    /// Their numbers, in ascending order.
+    pub bodies: &'a [u32],
+    /// The places of all bodies, one after the other.
+    pub y: &'a [f64],
+    /// The places of the bodies that pull, likewise.
+    pub places: &'a [f64],
+    /// h·G·m of those.
+    pub strengths: &'a [f64],
+    /// ε²
+    pub soft: f64,
+    /// When set, the kernel returns early.
+    pub stop: &'a AtomicBool,
+    /// h times the acceleration of the bodies from number `first` on, of which those without mass are set.
+    pub out: &'a mut [f64],
+    /// The number of the first body of `out`.
+    pub first: usize,
+}
+
+impl Pulled<'_> {
+    /// Computes the forces.
+    pub fn by(self, law: Law, dim: usize, level: Level) {
+        match (dim, law) {
+            (2, Law::Newton) => with_isa!(level, |isa| isa.run(Of::<2, NEWTON>(self))),
+            (2, _) => with_isa!(level, |isa| isa.run(Of::<2, LOGARITHMIC>(self))),
+            (_, Law::Newton) => with_isa!(level, |isa| isa.run(Of::<3, NEWTON>(self))),
+            (_, _) => with_isa!(level, |isa| isa.run(Of::<3, LOGARITHMIC>(self))),
+        }
+    }
+}
+
+struct Of<'a, const D: usize, const LAW: u8>(Pulled<'a>);
+
+impl<const D: usize, const LAW: u8> Task for Of<'_, D, LAW> {
+    #[inline(always)]
+    fn run(self) {
+        let Pulled { bodies, y, places, strengths, soft, stop, out, first } = self.0;
+        let ((y, _), (places, _), (out, _)) = (y.as_chunks::<D>(), places.as_chunks::<D>(), out.as_chunks_mut::<D>());
+        for some in bodies.chunks(STOPPED_AFTER) {
+            if stop.load(Relaxed) {
+                return;
+            }
+            for chunk in some.chunks(SIDE) {
+                let mut place = [[0.0; SIDE]; D];
+                for l in 0..SIDE {
+                    let body = &y[chunk[l.min(chunk.len() - 1)] as usize]; // what fills the last chunk is as the last body
+                    for c in 0..D {
+                        place[c][l] = body[c];
+                    }
+                }
+                let mut sums = [[-0.0; SIDE]; D];
+                for (from, strength) in places.iter().zip(strengths) {
+                    let (mut d, mut r2, mut pull) = ([[0.0; SIDE]; D], [0.0; SIDE], [0.0; SIDE]);
+                    for c in 0..D {
+                        for l in 0..SIDE {
+                            d[c][l] = from[c] - place[c][l];
+                            r2[l] = if c == 0 { d[c][l] * d[c][l] } else { r2[l] + d[c][l] * d[c][l] };
+                        }
+                    }
+                    for l in 0..SIDE {
+                        pull[l] = const { law(LAW) }.pull(r2[l] + soft) * strength;
+                    }
+                    for c in 0..D {
+                        for l in 0..SIDE {
+                            sums[c][l] += d[c][l] * pull[l];
+                        }
+                    }
+                }
+                for (l, body) in chunk.iter().enumerate() {
+                    let to = &mut out[*body as usize - first];
+                    for c in 0..D {
+                        to[c] = sums[c][l];
+                    }
+                }
+            }
+        }
+    }
+}
