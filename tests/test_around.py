@@ -37,7 +37,7 @@ def test_friction_is_around_a_force_and_a_force_around_surfaces() -> None:
 def test_the_core_has_the_same_order() -> None:
     listed = re.search(r"vec!\[(.*?)\]", CORE.read_text(encoding="utf-8"), re.DOTALL)
     assert listed is not None
-    names = {"contact": "surfaces", "controls": "control"}
+    names = {"contact": "surfaces", "controls": "control", "sampled": "controller"}
     assert tuple(names.get(name, name) for name in re.findall(r"(\w+)::part", listed[1])) == ORDER
 
 

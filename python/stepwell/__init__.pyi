@@ -31,6 +31,7 @@ from .interop.saving import load as load
 from .interop.solve_ivp import solve_ivp as solve_ivp
 from .model import equations as equations
 from .model import quaternion as quaternion
+from .model.controllers import controller as controller
 from .model.controls import Control as Control
 from .model.controls import EnergyControl as EnergyControl
 from .model.controls import LengthControl as LengthControl

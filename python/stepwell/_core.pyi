@@ -116,6 +116,12 @@ class World:
     def carry_on(self, carry: NDArray[Any]) -> None:
         """Go on with this carry, by rows, which belongs to what is in the arrays now."""
 
+    def memory(self) -> NDArray[Any]:
+        """What a sampled controller remembers, by rows."""
+
+    def remember(self, memory: NDArray[Any]) -> None:
+        """Let a sampled controller remember this, by rows."""
+
     def play(self, rows: tuple[int, int], seen: NDArray[Any], rewards: NDArray[Any], truths: NDArray[Any]) -> None:
         """One step of episodes, whose rows of y behind those that go on and those that are read go into the arrays.
 

@@ -109,6 +109,7 @@ def growth(
         or n * n > MOST_NUMBERS
         or system.contacts
         or system.stick_friction is not None
+        or system.controller is not None
         or isinstance(system, NBody)
     ):
         return None

@@ -18,6 +18,7 @@ from .. import errors
 from ..base import checks
 from ..base.immutable import FixedDict, Immutable
 from ..errors import ArgumentError
+from ..model.controllers import ControllerDefinition
 from ..model.equations.definition import Definition
 from ..model.equations.trace import Equations
 from ..model.methods import Method
@@ -82,6 +83,8 @@ class Writer:
                 return {KIND: "own method", "of": as_data(value)}
             case Method():
                 return {KIND: "method", "name": value.name}
+            case ControllerDefinition():
+                return {KIND: "controller", "module": value.__module__, "name": value.__qualname__}
             case Definition():
                 return {KIND: "function", "module": value.__module__, "name": value.__qualname__}
             case Equations():
@@ -126,6 +129,8 @@ class Writer:
         description = {KIND: type(value).__name__, "parts": self._parts(state, name)}
         if isinstance(value, OwnSystem) and not value.definition.__module__.startswith("stepwell."):
             description["operations"] = digest(value)
+        if isinstance(value, System) and value.controller is not None:
+            description["controller"] = value.controller.digest(value)
         return description
 
     def _array(self, value: Any, name: str) -> Any:
@@ -178,6 +183,8 @@ class Reader:
                 return of_data(part["of"])
             case "function":
                 return self._definition(part["module"], part["name"])
+            case "controller":
+                return self._definition(part["module"], part["name"], of_controller=True)
             case "of time":
                 return self._of_time(part["name"])
             case "bytes":
@@ -204,21 +211,27 @@ class Reader:
                 one = object.__new__(self._kinds[kind])
                 one.__setstate__(parts)
                 if "operations" in part:
-                    self._check(one, part["operations"])
+                    self._check(one.definition.name, digest(one), part["operations"])
+                if "controller" in part:
+                    controller = one.controller
+                    self._check(controller.definition.name, controller.digest(one), part["controller"])
                 return one
 
-    def _definition(self, module: str, name: str) -> Definition:
+    def _definition(self, module: str, name: str, *, of_controller: bool = False) -> Definition | ControllerDefinition:
         """The definition of ``system``, or else the one of that name in a module that is imported already."""
-        if isinstance(self.system, Definition):
+        if of_controller and isinstance(self.system, System) and self.system.controller is not None:
+            known: ControllerDefinition = self.system.controller.definition
+            return known
+        if isinstance(self.system, Definition) and not of_controller:
             return self.system
-        if isinstance(self.system, OwnSystem):
+        if isinstance(self.system, OwnSystem) and not of_controller:
             return self.system.definition
         if module.startswith("stepwell."):
             kinds()
         place: Any = sys.modules.get(module)
         for each in name.split("."):
             place = vars(place).get(each) if hasattr(place, "__dict__") else None
-        if not isinstance(place, Definition):
+        if not isinstance(place, ControllerDefinition if of_controller else Definition):
             raise ArgumentError(
                 f"system: the run is of equations of your own, {module}.{name}, which are not in the file and not imported; give "
                 f"them, system={name.rpartition('.')[2]}"
@@ -234,10 +247,10 @@ class Reader:
             )
         return parameters[name]
 
-    def _check(self, system: Any, operations: str) -> None:
-        if digest(system) != operations:
+    def _check(self, name: str, now: str, then: str) -> None:
+        if now != then:
             raise ArgumentError(
-                f"system: {system.definition.name} makes other operations now than when the run was saved, so it is another "
+                f"system: {name} makes other operations now than when the run was saved, so it is another "
                 f"system, or another version of stepwell; numpy.load or zarr.open read the numbers of the file by their names"
             )
 

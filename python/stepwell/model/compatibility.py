@@ -91,6 +91,24 @@ def not_with_exact(method: Method, **options: Any) -> None:
             raise UnsupportedError(f"{name}: does not go with exact: {reasons[name]}")
 
 
+def goes_with_a_controller(system: System, method: Method, **options: Any) -> None:
+    """Raise if a method or an option does not work with the sampled controller of a system, if it has one."""
+    if system.controller is None:
+        return
+    if method.carry is not None:
+        raise UnsupportedError(
+            f"method: {method.name} carries {method.carry} from the middle of a step to that of the next, and what a sampled "
+            f"controller sets changes between them; take a method that carries v, such as false_euler or rk4"
+        )
+    reasons = {
+        "tolerance": "a controller samples at whole numbers of steps of one length; give dt= and steps=",
+        "events": "an event within a step is located by shorter steps, of which a period has another number",
+    }
+    for name, option in options.items():
+        if option is not None:
+            raise UnsupportedError(f"{name}: does not go with a sampled controller: {reasons[name]}")
+
+
 def one_state(what: str, method: Method) -> None:
     """Raise if a step of the method goes on from more than v and y, so that it is no map from states to states."""
     if method.kept:

@@ -52,9 +52,16 @@ def _of_control(system: System) -> dict[str, tuple[str, float]]:
     return {name: row for name, row in mine.items() if name not in system.arguments()}
 
 
+def _of_controller(system: System) -> dict[str, tuple[str, float]]:
+    """The parameters of the system's sampled controller."""
+    controller = system.controller
+    return {} if controller is None else {name: (f"controller.{name}", checks.ANY) for name in controller.definition.parameters}
+
+
 def known_names(system: System) -> tuple[str, ...]:
     """The names of all parameters that can be set: numbers, inputs and surfaces."""
-    return (*(name for name, value in system.arguments().items() if _is_set(value)), *_of_control(system))
+    own = (name for name, value in system.arguments().items() if _is_set(value))
+    return (*own, *_of_control(system), *_of_controller(system))
 
 
 def _is_set(value: Any) -> bool:
@@ -84,8 +91,11 @@ def with_parameters(system: System, values: dict[str, Any]) -> System:
     for name in values:
         check_name(system, name)
     of_control = _of_control(system)
-    own = {name: value for name, value in values.items() if name not in of_control}
+    of_controller = {name: value for name, value in values.items() if name in _of_controller(system)}
+    own = {name: value for name, value in values.items() if name not in of_control and name not in of_controller}
     fresh = system.with_arguments(own) if own else system
+    if of_controller:
+        fresh = fresh.with_operations(fresh.controller.with_values(of_controller))
     kept = {name: value for name, value in values.items() if name in of_control}
     return _with_control(fresh, system.keeper, kept) if kept else fresh
 
@@ -135,7 +145,7 @@ def direct(system: System, batch: Shape) -> dict[str, Direct]:
     rows = {name: value for name, value in system.parameters(batch) if isinstance(value, np.ndarray)}
     all_of_them = system.all_parameters(batch)
     result = {}
-    for name, (row, least) in (system.direct() | _of_control(system)).items():
+    for name, (row, least) in (system.direct() | _of_control(system) | _of_controller(system)).items():
         if row not in rows:
             continue  # an input that changes with the time
         value = all_of_them.get(row)

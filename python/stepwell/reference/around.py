@@ -14,6 +14,7 @@ ORDER = (
     "control",
     "force",
     "friction",
+    "controller",
 )
 
 #: A part, and its parameters by name: numbers, or symbols.

@@ -105,26 +105,54 @@ class Tracer:
 
     def scaled(self, h: Any) -> Any:
         """The system and all that is around it, scaled to the step h."""
+        self.system.not_in_a_loop("system")
+        return self._wrapped(h)
+
+    def _wrapped(self, h: Any) -> Any:
         return wrapped(self.system.reference(h, **self._own()), h, self._parts())
 
+    def _looped(self, h: Any, memory: list[Any], *state: Any) -> tuple[Any, list[Any]]:
+        """The system with what a sampled controller sets, and what that remembers after a step from a time and a state.
+
+        Without a state it is what the controller holds between two steps.
+        """
+        own, parts, controller = self._own(), self._parts(), self.system.controller
+        of_part = next(parameters for part, parameters in parts if part is controller)
+        timing = {name: self._numbers(numbers, 0) for name, numbers in controller.in_steps().items()}
+        loop = controller.loop(self.system, of_part, {name: numbers[()] for name, numbers in timing.items()})
+        out, remembered = loop.step(*state, memory) if state else (loop.held(memory), memory)
+        return wrapped(self.system.reference(h, **controller.put(self.system, own, out)), h, parts), remembered
+
+    def _memory(self, more: Any) -> list[Any]:
+        """The symbols of what a sampled controller remembers."""
+        controller = self.system.controller
+        return [next(more) for _ in range(controller.remembers(self.system))] if controller is not None else []
+
     def step(self, method: Any, choice: int = 0) -> list[Any]:
-        """The state after a step, and what a control has added up by then."""
+        """The state after a step, what the method keeps, what a controller remembers, and what a control has added up by then."""
         h = self.tape.step()
-        s, (v, y, more) = self.scaled(h), self.state()
+        v, y, more = self.state()
         shapes = self.system.y_shape, self.system.v_shape
         kept = [_array(shapes[of_v], more) for of_v in method.kept_of_v]
+        memory = self._memory(more)
+        s, memory = self._looped(h, memory, self.tape.time(), v, y) if memory else (self.scaled(h), memory)
         if hasattr(s, "work"):
             s.work = next(more)
         blocks = contact.step(method.steps, s, choice, self.tape.time(), h, v, y, *kept)
-        return self.flat(*blocks) + ([s.work] if hasattr(s, "work") else [])
+        return self.flat(*blocks, *memory) + ([s.work] if hasattr(s, "work") else [])
 
     def slot(self, method: Any, which: str, choice: int) -> list[Any]:
         """The state after a method's ``start`` or ``finish``."""
         h, t = self.tape.step(), self.tape.time()
-        s, (v, y, _) = self.scaled(h), self.state()
+        v, y, more = self.state()
+        shapes = self.system.y_shape, self.system.v_shape
+        for of_v in method.kept_of_v:
+            _array(shapes[of_v], more)
+        memory = self._memory(more)
+        s = self._looped(h, memory)[0] if memory else self.scaled(h)
         with over(of_slot(t, h)):
             if method.kept:
-                return self.flat(v, y, *method.steps.start(s, choice, t, h, v, y))
+                return self.flat(v, y, *method.steps.start(s, choice, t, h, v, y), *memory)
             return self.flat(getattr(method.steps, which)(s, choice, t, v, y), y)
 
     def attempted(self, *, backward: bool = False) -> adaptive.Attempted:
@@ -177,7 +205,7 @@ class Tracer:
 
     def record(self, names: Sequence[str]) -> list[Any]:
         """Quantities of a state."""
-        s, (v, y, _) = self.scaled(self.tape.step()), self.state()
+        s, (v, y, _) = self._wrapped(self.tape.step()), self.state()
         return self.flat(*(s.record(name, v, y) for name in names))
 
     def matrix(self, nodes: Sequence[float], n: int, inputs: list[Any], carries: bool = False) -> list[Any]:

@@ -36,6 +36,7 @@ class Continuation(NamedTuple):
         first_bad_step: the step at which each member diverged, −1 for none; None if no member did.
         changed_by: names of the events that changed the state.
         adaptive: whether its steps are adaptive.
+        memory: what a sampled controller remembers, rows of one number for each member; None without one.
     """
 
     system: System
@@ -47,11 +48,26 @@ class Continuation(NamedTuple):
     first_bad_step: Whole | None = None
     changed_by: tuple[str, ...] = ()
     adaptive: bool = False
+    memory: Array | None = None
 
     @property
     def batch(self) -> Shape:
         """The shape of its batch."""
         return self.y.shape[len(self.system.y_shape) :]
+
+    def remembered(self, system: System, batch: Shape) -> Array | None:
+        """What the controller of a system remembers, if it is the one of this system, with the same period and delay in steps.
+
+        Its parameters, the system's and the state may be others.
+        """
+        before, now = self.system.controller, system.controller
+        if self.memory is None or now is None:
+            return None
+        before = before.over_steps(self.options["dt"])
+        if (before.definition, before.sets, before.timing) != (now.definition, now.sets, now.timing):
+            return None
+        memory = self.memory.reshape(len(self.memory), *(1,) * (len(batch) - self.memory.ndim + 1), *self.memory.shape[1:])
+        return np.array(np.broadcast_to(memory, (len(memory), *batch)), dtype=np.float64)
 
     def holds(self, system: System, batch: Shape, v: Array, y: Array, force: Array | None = None) -> bool:
         """Whether the carry holds for a system and a state, which it does if all of their bits are the same as here.
@@ -105,7 +121,16 @@ def _of_run(run: Run) -> Continuation:
         return Continuation(run.system, run.method, v, y, options | state.options, state, None, run.changed_by, adaptive=True)
     options |= {"start_step": run.start_step + run.steps, "dt": run.dt, "start": run.start}
     bad = run.first_bad_step if run.status.any() else None
-    return Continuation(run.system, run.method, v, y, options, carry, bad, run.changed_by)
+    carry, memory = _parted(run.system, run.method, run.dt, carry)
+    return Continuation(run.system, run.method, v, y, options, carry, bad, run.changed_by, memory=memory)
+
+
+def _parted(system: System, method: Method, dt: float, carry: Array | None) -> tuple[Array | None, Array | None]:
+    """What a method carries, and what a sampled controller remembers behind it."""
+    if carry is None or system.controller is None:
+        return carry, None
+    numbers = system.controller.over_steps(dt).remembers(system)
+    return (carry[:-numbers] if method.begins else None), carry[-numbers:]
 
 
 def _bits_of(system: System, batch: Shape, v: Array, y: Array, force: Array | None) -> Iterator[Any]:

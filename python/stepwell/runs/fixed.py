@@ -44,7 +44,7 @@ def fixed_run(request: Request) -> Run:
         # Status.OK is 0 and Status.DIVERGED 1
         status=np.asarray(out.first_bad >= 0).view(np.int8) if out.diverged else np.zeros(plan.batch, np.int8),
         first_bad_step=out.first_bad,
-        carry=out.slot if method.begins else None,
+        carry=out.slot if plan.begins else None,
         system=request.system,
         method=method,
         dt=plan.dt,

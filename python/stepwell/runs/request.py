@@ -21,6 +21,7 @@ from ..model.compatibility import (
     forced,
     goes_back,
     goes_on_by_a_rule,
+    goes_with_a_controller,
     not_with_exact,
     one_state,
     samples_meet_steps,
@@ -223,13 +224,17 @@ class Request(NamedTuple):
         stepped = system.over_steps(method, checks.once_of(t0) if isinstance(t0, np.ndarray) else t0, dt)
         carried = False
         if before is not None and before.carry is not None and (carried := before.holds(system, batch, v, y)):
-            v = spread(np.asarray(before.carry, np.float64), plan.slot_shape[: plan.slot_axes], batch)
+            of_slot = (plan.slot_numbers,) if method.kept else system.v_shape
+            v = spread(np.asarray(before.carry, np.float64), of_slot, batch)
         if bad is not None:
             bad = checks.diverged_before(bad, v, y, batch)
         if force is not None:
             plan = plan._replace(force=spread(force, system.v_shape, batch))
         if record or stepped is not plan.system:
             plan = plan._replace(system=stepped, record=while_stepping)
+        if stepped.controller is not None:
+            goes_with_a_controller(stepped, method, events=events)
+            plan = plan._replace(memory=_memory(stepped, batch, before))
         started = method.starts[choice] if method.starts else None
         return cls(plan, system, v, y, carried, bad, record, watched, started, checks.flag("progress", progress))
 
@@ -242,6 +247,7 @@ class Request(NamedTuple):
         fused, single = arithmetic(options.fused, options.dtype)
         if before is not None:
             continuation.changes_on(before, options.events)
+        goes_with_a_controller(system, method, tolerance=True)
         adaptive_options.check_adaptive(options, before)
         watched = None if options.events is None else event_list(options.events, "direct")
         control = a_control(options.control)
@@ -434,6 +440,7 @@ class Request(NamedTuple):
             wide_v, wide_y = np.asarray(v, np.float64), np.asarray(y, np.float64)
             stepped = controlled(system, method, control, wide_v, wide_y, dt).stepped_by(method)
         slot = None
+        goes_with_a_controller(stepped, method, events=events)
         if before is not None and before.carry is not None and before.holds(stepped, batch, v, y):
             slot = np.array(before.carry, dtype=kind).reshape(-1)
         if single:
@@ -445,6 +452,10 @@ class Request(NamedTuple):
             check_algebraic(stepped, y, t0)
         seen = stepped.over_steps(method, t0, dt)
         plan = engine.Plan(seen, method, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
+        if seen.controller is not None:
+            plan = plan._replace(memory=_memory(seen, batch, before))
+            if slot is not None and plan.memory is not None:
+                slot = np.concatenate([slot, plan.memory.reshape(-1).astype(kind)])
         watched = None if events is None else event_list(events, "direct")
         return cls(plan, stepped, v, y, slot is not None, events=watched, start=start, slot=slot)
 
@@ -497,3 +508,9 @@ class Request(NamedTuple):
         first = np.arange(1.0, 1.0 + prod(system.y_shape)).reshape(system.y_shape)
         v = spread(np.zeros(system.v_shape), system.v_shape, batch) if v is None else v
         return cls(plan, system, v, spread(first, system.y_shape, batch) if y is None else y)
+
+
+def _memory(system: System, batch: Shape, before: Continuation | None) -> Array:
+    """What the sampled controller of a system remembers at the start of a run."""
+    known = None if before is None else before.remembered(system, batch)
+    return system.controller.at_start(system, batch) if known is None else known

@@ -116,6 +116,8 @@ class World:
         # Views: the core knows rows, not axes.
         force = None if plan.force is None else plan.force.reshape(-1)
         self._core = loop = _core.World(engine.model(plan), plan, v.reshape(-1), y.reshape(-1), request.slot, force)
+        if plan.memory is not None and request.slot is None:
+            loop.remember(plan.memory.astype(y.dtype).reshape(-1))
         self._frames = None
         self._live: dict[str, Live] = {}
         #: The control as it was given, without a target of its own: members that are reset aim at that of their new state.
@@ -256,11 +258,13 @@ class World:
         system.check_time(abs(plan.t0) + self.step_number * abs(plan.dt))
         new = plan._replace(system=system.over_steps(plan.method, plan.t0, plan.dt))
         setting.same_operations(plan.system.parameters(batch), new.system.parameters(batch), names)
-        carry = None
+        carry, memory = None, None if plan.memory is None else self._core.memory()
         if plan.method.begins:
             one, other = (list(bits_of_parameters(each.system, batch)) for each in (plan, new))
             carry = self._core.carry() if one == other else None  # the same numbers, written otherwise
         self._core.take(engine.model(new), new)
+        if memory is not None:
+            self._core.remember(memory)
         if carry is not None:
             self._core.restart([], carry)
         for name, direct in setting.direct(system, batch).items():
@@ -381,6 +385,11 @@ class World:
         if self._control is not None:
             self._aim(index)
         self._core.read()
+        if plan.memory is not None:
+            memory = self._core.memory().reshape(plan.memory_numbers, plan.members)
+            begun = self._plan.system.controller.at_start(self._plan.system, batch)
+            memory[:, index] = begun.reshape(memory.shape)[:, index]
+            self._core.remember(memory.reshape(-1))
         self._core.restart(index.tolist(), carry)
 
     def _aim(self, index: Any) -> None:
@@ -417,9 +426,13 @@ class World:
         options |= {"fused": plan.fused, "dtype": str(self._y.dtype), "control": system.keeper}
         options["force"] = None if plan.force is None else plan.force.copy()
         carry = self._core.carry() if plan.method.begins else None
-        carry = None if carry is None else carry.reshape(plan.slot_shape)
+        memory = None
+        if plan.memory is not None:
+            memory = self._core.memory().reshape(plan.memory_numbers, *plan.batch)
+            carry = None if carry is None else carry[: plan.slot_numbers * plan.members]
+        carry = None if carry is None else carry.reshape(-1, *plan.batch) if plan.method.kept else carry.reshape(plan.slot_shape)
         names = tuple(each.name for each in self._events or () if each.then)
-        return Continuation(system, plan.method, self._v.copy(), self._y.copy(), options, carry, changed_by=names)
+        return Continuation(system, plan.method, self._v.copy(), self._y.copy(), options, carry, changed_by=names, memory=memory)
 
     def __repr__(self) -> str:
         members = self._y.shape[len(self._system.y_shape) :]

@@ -53,6 +53,7 @@ fn signature(
         tables: tables.iter().map(|name| (name.to_string(), false)).collect(),
         equations: None,
         watched: None,
+        controller: None,
     }
 }
 

@@ -133,6 +133,7 @@ fn signature(
         tables: tables.iter().map(|name| (name.to_string(), true)).collect(),
         equations: None,
         watched: None,
+        controller: None,
     }
 }
 

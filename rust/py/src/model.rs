@@ -23,6 +23,8 @@ use stepwell_core::{
 
 /// The name of quantities whose changes of sign are noticed.
 const WATCHED: &str = "watched()";
+/// The name of what a sampled controller computes.
+const CONTROLLER: &str = "controller()";
 /// The name of a step that is given as operations.
 const STEP: &str = "step()";
 
@@ -205,6 +207,7 @@ impl ModelSpec {
                 }
                 Value::Equations(quantities) if name == WATCHED => names.watched = Some(quantities),
                 Value::Equations(next) if name == STEP => step = Some(next),
+                Value::Equations(controller) if name == CONTROLLER => names.controller = Some(controller),
                 Value::Equations(rates) => names.equations = Some(rates),
                 Value::Samples((start, interval, array)) => {
                     let common = array.bind(py).shape()[1] == 1;

@@ -528,6 +528,28 @@ impl World {
         })
     }
 
+    /// What a sampled controller remembers, by rows.
+    fn memory<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.alone(|loops| {
+            Ok(match loops {
+                Loops::Double(own) => own.world.memory().into_pyarray(py).into_any(),
+                Loops::Single(own) => own.world.memory().into_pyarray(py).into_any(),
+            })
+        })
+    }
+
+    /// Lets a sampled controller remember this, by rows.
+    fn remember(&self, memory: &Bound<'_, PyAny>) -> PyResult<()> {
+        fn of<T: Of>(own: &mut Loop<T>, memory: &Bound<'_, PyAny>) -> PyResult<()> {
+            own.world.remember(memory.extract::<PyReadonlyArray1<'_, T>>()?.as_slice()?);
+            Ok(())
+        }
+        self.alone(|loops| match loops {
+            Loops::Double(own) => of(own, memory),
+            Loops::Single(own) => of(own, memory),
+        })
+    }
+
     /// The time at which the world stands.
     #[getter]
     fn t(&self) -> f64 {

@@ -119,6 +119,7 @@ def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobi
     """
     system = a_system(system).for_state_shapes(v, y)
     v = checks.block("v", velocities(system, v), system.v_shape, system.axes)
+    system.not_in_a_loop("jacobian")
     y = checks.block("y", y, system.y_shape, system.axes)
     t = checks.number("t", t, unit="units of time")
     n = sum(maps.size(system))

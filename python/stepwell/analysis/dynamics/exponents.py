@@ -333,6 +333,7 @@ def _start(system: System, method: Method, v: Any, y: Any) -> tuple[System, Arra
     system = a_system(system).for_state_shapes(v, y)
     fits_together(system, method)
     one_state("lyapunov", method)
+    system.not_in_a_loop("lyapunov")
     v = checks.block("v", velocities(system, v), system.v_shape, system.axes)
     return system, v, checks.block("y", y, system.y_shape, system.axes)
 

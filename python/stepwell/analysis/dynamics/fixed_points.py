@@ -177,6 +177,7 @@ def equilibria(
         ['centre', 'saddle']
     """
     system = a_system(system).for_state_shapes(*(near if isinstance(near, (tuple, list)) else ()))
+    system.not_in_a_loop("equilibria")
     if system.batch:
         raise ShapeError(f"system: expected one member to find the equilibria of, got a batch of shape {system.batch}")
     v, y = state("near", system, near)

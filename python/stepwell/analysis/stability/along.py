@@ -141,6 +141,7 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
     system = run.system.uncontrolled
     fits_together(system, method)
     one_state("stability_along", method)
+    system.not_in_a_loop("stability_along")
     n = sum(maps.size(system))
     checks.fits("the matrices", 8 * n * n * len(run.t), run.status.shape, "save fewer states")
     A = _linearised(system, run)

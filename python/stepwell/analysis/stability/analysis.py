@@ -272,6 +272,7 @@ def analyse(
     system = a_system(system).for_state_shapes(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, method)
     one_state("analyse", method)
+    system.not_in_a_loop("analyse")
     if isinstance(at, Run):
         if type(at.system) is not type(system):
             raise ShapeError(f"at: expected a run of {system!r}, got one of {at.system!r}")

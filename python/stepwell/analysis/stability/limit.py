@@ -91,6 +91,7 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     system = a_system(system).for_state_shapes(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, method)
     one_state("stability_limit", method)
+    system.not_in_a_loop("stability_limit")
     t = checks.number("t", t)
     if at is None and not system.linear:
         bound = ", or ask its safe_step for a bound" if isinstance(system, Springs) else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import inf
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
@@ -23,6 +23,7 @@ from ..parameters import CoreParameters, flat, of_shape
 if TYPE_CHECKING:
     from ...reference.mass import Mass
     from ...reference.quantities import Quantity
+    from ...reference.sampled import Loop
     from ..controls import AnyControl, ConstraintControl, EnergyControl, Projection
     from ..inputs import Input
     from ..methods import Method
@@ -108,6 +109,11 @@ class System(Immutable, ValueEquality, ABC):
         return control
 
     @property
+    def controller(self) -> Any:
+        """The sampled controller around it, or None."""
+        return self.part("controller") if self.around else None
+
+    @property
     def stick_friction(self) -> Array | None:
         """The deceleration of each velocity by friction that sticks, or None; broadcasts over the batch."""
         friction = self.part("friction")
@@ -182,8 +188,31 @@ class System(Immutable, ValueEquality, ABC):
         """The NumPy reference of its equations and all parts around them, scaled to the step h, for that batch shape.
 
         ``force`` is added to v̇.
+
+        Raises:
+            UnsupportedError: if there is a sampled controller, which sets parameters from step to step.
         """
+        self.not_in_a_loop("system")
         return wrapped(self.reference_at_step(h, batch), h, self.parts(batch, force))
+
+    def not_in_a_loop(self, what: str) -> None:
+        """Raise if there is a sampled controller."""
+        if self.controller is not None:
+            raise UnsupportedError(
+                f"{what}: {self!r} has a sampled controller, which remembers, so that a step goes on from more than v and y, and "
+                f"is another one at each sample. What is asked for is that of a map from one state to the next"
+            )
+
+    def looped(self, h: float, batch: Shape, force: Array | None = None) -> tuple[Loop, Callable[[list[Array]], Any]]:
+        """The controller in the loop of the reference, and a function from what it sets to what ``scaled`` returns."""
+        parts = self.parts(batch, force)
+        own = next(parameters for part, parameters in parts if part.kind == "controller")
+        loop = self.controller.loop(self, own, self.controller.in_steps())
+
+        def scaled(numbers: list[Array]) -> Any:
+            return wrapped(self.reference(h, **self.controller.put(self, self.own_parameters(batch), numbers)), h, parts)
+
+        return loop, scaled
 
     def own_parameters(self, batch: Shape) -> dict[str, Any]:
         """The parameters of its equations by name; those of its members, if it is for some members of a batch."""
@@ -244,6 +273,11 @@ class System(Immutable, ValueEquality, ABC):
             complex_step=False,
             velocity_term=self.velocity_term if self.velocity_term is not None else part.velocity_term,
         )
+
+    def with_operations(self, part: Part) -> Self:
+        """This system with another part of the same kind and the same operations."""
+        batch = checks.batch_shape({"system": self.batch, part.kind: part.batch})
+        return changed(self, **self.operations(), around=self._around_with(part), batch=batch)
 
     def _around_with(self, part: Part) -> tuple[Part, ...]:
         parts = [each for each in self.around if each.kind != part.kind]
@@ -434,6 +468,14 @@ class System(Immutable, ValueEquality, ABC):
         sampled = [each for each in self.all_inputs().values() if isinstance(each, Sampled)]
         # Methods that carry something in place of v evaluate rates in the middle of the span of a step.
         first = t0 if method.carry is None else t0 - 0.5 * dt
+        if self.controller is not None and self.controller.timing is None:
+            timed = self.controller.over_steps(dt)
+            whole = self.over_steps_of_inputs(first, dt, sampled)
+            return changed(whole, **whole.operations(), around=whole._around_with(timed))
+        return self.over_steps_of_inputs(first, dt, sampled)
+
+    def over_steps_of_inputs(self, first: Any, dt: float, sampled: list[Sampled]) -> Self:
+        """The same without a controller."""
         if all(each.over_steps(first, dt) is each for each in sampled):
             return self
 

@@ -117,6 +117,8 @@ class OwnSystem(System):
 
     def operations(self) -> dict[str, Any]:
         """Its operations, and the caches of them."""
+        if self._core is None and self.equations is not None:
+            self._trace()
         caches = {name: vars(self).get(name) for name in ("_core", "_with_functions", "_digest")}
         return caches | {"_single": self._single, "_bounds": {}, "_met": {}}
 
@@ -415,11 +417,11 @@ class OwnSystem(System):
     @property
     def quantities(self) -> dict[str, Shape]:
         """The invariants, each one number. One with a parameter that changes with the time is not constant and is left out."""
-        values = self.parameters_given
+        values, changing = self.parameters_given, () if self.controller is None else self.controller.sets
         constant = (
             name
             for name, each in self.definition.invariants.items()
-            if all(isinstance(values[parameter], np.ndarray) for parameter in each.parameters)
+            if all(isinstance(values[parameter], np.ndarray) and parameter not in changing for parameter in each.parameters)
         )
         return dict.fromkeys(constant, ())
 

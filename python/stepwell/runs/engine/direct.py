@@ -39,15 +39,33 @@ def first_bad_steps(plan: Plan, before: Whole | None) -> Whole:
 
 
 def _run_by_reference(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
-    steps, s = plan.method.steps, plan.scaled()
+    steps, remembered = plan.method.steps, None
+    if plan.system.controller is not None:
+        loop, of_loop = plan.system.looped(plan.dt, plan.batch, plan.force)
+        remembered = [row.astype(plan.dtype) for row in plan.memory]  # type: ignore[union-attr]  # there is one
+        s = of_loop(loop.held(remembered))
+    else:
+        s = plan.scaled()
     if plan.single:
         v, y = v.astype(plan.dtype), y.astype(plan.dtype)
 
     def plain(t: float, v: Array, y: Array, kept: list[Array]) -> Any:
         return contact.step(steps, s, plan.choice, t, plan.dt, v, y, *kept)
 
-    make = evaluated_step(plan, s) if plan.by_tape else plain
+    def in_loop(t: float, v: Array, y: Array, kept: list[Array]) -> Any:
+        work, memory = getattr(s, "work", None), kept[len(plan.method.kept) :]
+        out, memory = loop.step(t, v, y, memory)
+        now = of_loop(out)
+        if work is not None:
+            now.work = work
+        stepped = contact.step(steps, now, plan.choice, t, plan.dt, v, y, *kept[: len(plan.method.kept)])
+        if work is not None:
+            s.work = now.work
+        return *stepped, *memory
+
+    make = evaluated_step(plan, s) if plan.by_tape else plain if remembered is None else in_loop
     slot, *kept = to_blocks(plan, v if carried else to_slot(plan, v, y))
+    kept += remembered or []
 
     def step(t: float, v: Array, y: Array) -> Blocks:
         nonlocal kept
@@ -56,7 +74,7 @@ def _run_by_reference(plan: Plan, v: Array, y: Array, before: Whole, carried: bo
 
     slot, y, saved, first_bad = looped(plan, step, slot, y, before, plan.block_axes, to_velocity(plan))
     out = finished(plan, slot, saved, first_bad)
-    if plan.method.kept:
+    if plan.keeps:
         out = out._replace(slot=_joined(plan, [slot, *kept]))
     with np.errstate(all="ignore"):
         recorded = {
@@ -80,6 +98,7 @@ def to_blocks(plan: Plan, slot: Array) -> list[Array]:
 def _joined(plan: Plan, blocks: list[Any]) -> Array:
     """V and the blocks that the method keeps, as rows: undoes ``to_blocks``."""
     shapes = [plan.system.v_shape, *((plan.system.y_shape, plan.system.v_shape)[of_v] for of_v in plan.method.kept_of_v)]
+    shapes += [()] * (len(blocks) - len(shapes))  # what a controller remembers
     wide = [np.broadcast_to(block, (*shape, *plan.batch)) for block, shape in zip(blocks, shapes, strict=True)]
     return np.concatenate([block.reshape((prod(shape), *plan.batch)) for block, shape in zip(wide, shapes, strict=True)])
 
@@ -140,16 +159,26 @@ def to_slot(plan: Plan, v: Array, y: Array) -> Array:
     with np.errstate(all="ignore"):
         if plan.method.kept:
             if plan.by_tape:
-                rows = evaluated(plan, "start")(rows_of(plan, v, y), t)
+                memory = [] if plan.memory is None else list(plan.memory)
                 n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
-                return np.concatenate([rows[:n_v], rows[n_v + n_y :]])
+                before = [*rows_of(plan, v, y), *[np.zeros(plan.batch)] * (plan.slot_numbers - n_v), *memory]
+                rows = evaluated(plan, "start")(before, t)
+                return np.concatenate([rows[:n_v], rows[n_v + n_y : n_y + plan.slot_numbers]])
             with over(of_slot(t, plan.dt)):
                 begun: Any = plan.method.steps
-                return _joined(plan, [v, *begun.start(plan.scaled(), plan.choice, t, plan.dt, v, y)])
+                return _joined(plan, [v, *begun.start(_begun(plan), plan.choice, t, plan.dt, v, y)])
         if plan.by_tape:
             return evaluated_slot(plan, "start")(t, v, y)
         with over(of_slot(t, plan.dt)):
             return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
+
+
+def _begun(plan: Plan) -> Any:
+    """The system as it is before the first step."""
+    if plan.memory is None:
+        return plan.scaled()
+    loop, of_loop = plan.system.looped(plan.dt, plan.batch, plan.force)
+    return of_loop(loop.held(list(plan.memory)))
 
 
 def finished(plan: Plan, slot: Array, saved: Blocks, first_bad: Any) -> Outcome:
@@ -167,13 +196,13 @@ def finished(plan: Plan, slot: Array, saved: Blocks, first_bad: Any) -> Outcome:
 def run_by_core(
     plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
-    """The run by the core. ``carries`` is whether it returns a carry, as the method does if None."""
-    carries = plan.method.begins if carries is None else carries
+    """The run by the core. ``carries`` is whether it returns a carry, as the plan does if None."""
+    carries = plan.begins if carries is None else carries
     count = plan.save_count
     empty = np.empty if count * (v.size + y.size) < buffer_pool.LEAST_POOLED // 8 else buffer_pool.empty
-    shape_of_v = (*plan.system.v_shape, *plan.batch) if plan.method.kept else v.shape
+    shape_of_v = (*plan.system.v_shape, *plan.batch) if plan.keeps else v.shape
     saved_v, saved_y = empty((count, *shape_of_v), plan.dtype), empty((count, *y.shape), plan.dtype)
-    carry = np.empty(plan.slot_shape if plan.method.kept else v.shape, plan.dtype) if carries else None
+    carry = np.empty(plan.slot_shape if plan.keeps else v.shape, plan.dtype) if carries else None
     recorded = None
     if plan.record:
         shapes = {name: plan.system.quantities[name] for name in plan.record}
@@ -185,6 +214,12 @@ def run_by_core(
         sums = np.full((before_it + plan.watched.number + 1, *plan.batch), np.nan)
         tally, noticed, work = sums.reshape(-1), sums[before_it:], None
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
+    if plan.memory is not None:
+        members = plan.members if rows_v.shape[1] != 1 or plan.batch else 1
+        of_v, memory = (
+            np.broadcast_to(each, (len(each), members)) for each in (rows_v, plan.memory.reshape(len(plan.memory), -1))
+        )
+        rows_v = np.ascontiguousarray(np.concatenate([of_v, memory]))
     diverged = _core.run(
         model, plan.of_core(), Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
     )

@@ -34,7 +34,8 @@ class Plan(NamedTuple):
 
     ``t0`` is the time of step 0, or that of each member, shape (*batch), which the core takes as a parameter: see ``of_core``.
     ``single`` is whether steps are computed in float32. With adaptive steps ``order`` is that of a series, ``acceptance`` what a
-    step must satisfy, and ``backward`` whether the time of the system is the negated time of the run.
+    step must satisfy, and ``backward`` whether the time of the system is the negated time of the run. ``memory`` is what a
+    sampled controller remembers at the start, rows of one number for each member.
     """
 
     system: System
@@ -58,6 +59,7 @@ class Plan(NamedTuple):
     single: bool = False
     acceptance: Acceptance = Acceptance()  # it is immutable
     backward: bool = False
+    memory: Array | None = None
 
     def t0_of(self, members: Any) -> Any:
         """The time of step 0 of these members of one batch axis, or of all."""
@@ -98,16 +100,37 @@ class Plan(NamedTuple):
 
     @property
     def slot_shape(self) -> Shape:
-        """The shape of the slot of v; behind the numbers of v, in one axis, stand those that the method keeps, if it does."""
-        if not self.method.kept:
+        """The shape of the slot of v; behind the numbers of v, in one axis, stand those that are kept."""
+        if not self.keeps:
             return (*self.system.v_shape, *self.batch)
+        return (self.slot_numbers + self.memory_numbers, *self.batch)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether more than the slot of v is kept beside y: blocks of the method, or what a sampled controller remembers."""
+        return bool(self.method.kept) or self.system.controller is not None
+
+    @property
+    def begins(self) -> bool:
+        """Whether a run begins with more than its state."""
+        return self.method.begins or self.keeps
+
+    @property
+    def slot_numbers(self) -> int:
+        """How many numbers of a member the slot of v has, with those that the method keeps."""
         n_v, n_y = prod(self.system.v_shape), prod(self.system.y_shape)
-        return (n_v + self.method.kept_numbers(n_v, n_y), *self.batch)
+        return n_v + self.method.kept_numbers(n_v, n_y)
+
+    @property
+    def memory_numbers(self) -> int:
+        """How many a sampled controller remembers."""
+        controller = self.system.controller
+        return 0 if controller is None else int(controller.remembers(self.system))
 
     @property
     def slot_axes(self) -> int:
         """The number of axes of the slot of a member."""
-        return 1 if self.method.kept else len(self.system.v_shape)
+        return 1 if self.keeps else len(self.system.v_shape)
 
     @property
     def members(self) -> int:
@@ -172,6 +195,10 @@ def model(plan: Plan) -> _core.ModelSpec:
         parameters.append((BEGINS, rows(plan.t0, plan.batch, 0)))
     if plan.force is not None:
         parameters.append((FORCE, rows(np.asarray(plan.force, np.float64), plan.batch, len(plan.system.v_shape))))
+    if plan.system.controller is not None:
+        if plan.memory is None:
+            plan.system.scaled(plan.dt, plan.batch)  # raises
+        parameters += plan.system.controller.for_core(plan.system, _places(parameters), single=plan.single)
     if plan.watched is not None:
         parameters.append(("watched()", plan.watched.quantities))
     options: Any = {}
@@ -187,6 +214,15 @@ def model(plan: Plan) -> _core.ModelSpec:
                 checks.fits_single(name, value)
         options["single"] = True
     return _core.ModelSpec(plan.system.kernel, plan.method.key, parameters, **options)
+
+
+def _places(parameters: Any) -> dict[str, int]:
+    """The number of the first row of each parameter among all."""
+    places, rows = {}, 0
+    for name, value in parameters:
+        if isinstance(value, np.ndarray):
+            places[name], rows = rows, rows + len(value)
+    return places
 
 
 def per_step(plan: Plan, work: Array | None) -> Array | None:

@@ -88,6 +88,7 @@ def explain(
           y' = y + Φ·v'
     """
     method, system = find_method(method), a_system(system).for_state_shapes()
+    system.not_in_a_loop("explain")
     if attempt := checks.flag("attempt", attempt):
         _attempted(system, method, a_control(control), dtype, form)
     own = prod(system.batch)

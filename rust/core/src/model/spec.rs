@@ -72,6 +72,8 @@ pub struct Signature {
     pub equations: Option<Arc<Equations>>,
     /// Quantities whose changes of sign are noticed, each with its direction as its name.
     pub watched: Option<Arc<Equations>>,
+    /// What a sampled controller computes: the parameters that it sets, and its next state.
+    pub controller: Option<Arc<Equations>>,
 }
 
 fn find<'a, T>(list: &'a [(String, T)], name: &str) -> Option<&'a T> {

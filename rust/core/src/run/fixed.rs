@@ -157,7 +157,7 @@ pub fn run<T: Steppable>(plan: &FixedRun, arrays: Arrays<T>, monitor: &mut dyn F
     let (p, q) = (traced.shape.v, traced.shape.y);
     let kept = kept(plan.steps, plan.every);
     let kept_numbers = traced.kept;
-    expect("v", p + if plan.carried { kept_numbers } else { 0 }, plan.v.len())?;
+    expect("v", p + if plan.carried { kept_numbers } else { traced.memory }, plan.v.len())?;
     expect("y", q, plan.y.len())?;
     if plan.steps > 0 {
         expect("saved_v", kept * p * b, arrays.saved_v.len())?;
@@ -360,6 +360,10 @@ impl<T: Real> Job<'_, '_, T> {
                 kept_rows = others;
             }
         } else {
+            if let Some(block) = self.group.kept_mut().last_mut() {
+                let first = block.len() - kept_rows.len() * lanes;
+                fill(kept_rows, &mut block[first..]);
+            }
             self.group.start(plan.first);
         }
         self.remember(plan.first);

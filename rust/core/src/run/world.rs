@@ -48,8 +48,10 @@ pub struct World<T = f64> {
     sizes: (usize, usize),
     /// Whether the method has a carry, or keeps blocks beside the state.
     carries: bool,
-    /// How many numbers all members have that it keeps.
+    /// How many numbers all members have that it keeps, and that a sampled controller remembers.
     kept: usize,
+    /// How many of a member the controller remembers.
+    memory: usize,
     /// The arrays as last written, if the method has a carry: if they differ now, the caller changed the state.
     written: (Vec<T>, Vec<T>),
     /// Whether the slots belong to the arrays as last written.
@@ -117,6 +119,7 @@ impl<T: Steppable> World<T> {
             sizes,
             carries,
             kept,
+            memory: traced.memory,
             written,
             is_written: false,
             step,
@@ -177,6 +180,25 @@ impl<T: Steppable> World<T> {
             members.iter().for_each(|member| row[*member] = started[*member]);
         }
         self.carry_on(carry, v, y);
+    }
+
+    /// What a sampled controller remembers, as rows of one number per member.
+    pub fn memory(&self) -> Vec<T> {
+        self.held().split_off(self.sizes.0 + self.kept - self.memory * self.members)
+    }
+
+    /// Lets a sampled controller remember this, as rows of one number per member.
+    pub fn remember(&mut self, memory: &[T]) {
+        if memory.len() != self.memory * self.members {
+            return;
+        }
+        for share in &mut self.shares {
+            let lanes = share.group.lanes();
+            if let Some(block) = share.group.kept_mut().last_mut() {
+                let first = block.len() - self.memory * lanes;
+                load(memory, self.members, (share.first, share.count), &mut block[first..], lanes);
+            }
+        }
     }
 
     /// Whether these arrays are not what the slots hold.

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     error::Error,
     model::{
-        around::{self, controls},
+        around::{self, controls, sampled},
         methods::method,
         system::Shape,
     },
@@ -60,8 +60,11 @@ pub struct Traced {
     key: TapeKey,
     /// How large the blocks are.
     pub shape: Shape,
-    /// How many numbers of the state stand behind v and y: those that the method keeps.
+    /// How many numbers of the state stand behind v and y: those that the method keeps, and those that a sampled controller
+    /// remembers.
     pub kept: usize,
+    /// How many of these a sampled controller remembers; they come last.
+    pub memory: usize,
     /// How many stand behind these: a sum over the steps, the tally, if the system has one; what is watched.
     pub tally: usize,
     /// How many numbers are recorded.
@@ -119,12 +122,13 @@ impl TapeKey {
             if self.precision == Precision::Single {
                 self.fits_single(operations.1)?;
             }
-            let (mut tally, mut kept, mut carries) = (0, 0, false);
+            let (mut tally, mut kept, mut memory, mut carries) = (0, 0, 0, false);
             if let StepKind::Method { name, .. } = &self.how {
                 watch::check(&self.signature, shape)?;
                 tally = usize::from(controls::is_given(&self.signature)) + watch::numbers(&self.signature);
                 let method = method(name)?;
-                (kept, carries) = (method.kept_numbers(shape), method.carries);
+                memory = sampled::numbers(&self.signature);
+                (kept, carries) = (method.kept_numbers(shape) + memory, method.carries);
             }
             if let StepKind::Attempts { name, .. } = &self.how {
                 around::only_fixed(&self.signature)?;
@@ -133,6 +137,7 @@ impl TapeKey {
             let traced = Traced {
                 shape,
                 kept,
+                memory,
                 tally,
                 carries,
                 series,
@@ -227,7 +232,7 @@ impl TapeKey {
             let method = method(name)?;
             for (slot, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
                 if let Some(program) = program {
-                    let (tape, next) = trace_slot(new(), &self.signature, program)?;
+                    let (tape, next) = trace_slot(new(), &self.signature, &method, program)?;
                     *slot = Some(fused(tape, next));
                 }
             }

@@ -14,6 +14,7 @@ use crate::{
         around::{
             self,
             contact::{self, Contacts},
+            sampled,
         },
         methods::Method,
         methods::method,
@@ -92,11 +93,13 @@ fn series_order(program: &Program, asked: u32) -> Option<u32> {
 fn step(kind: &Kind, signature: &Signature, shape: Shape, method: &Method, choice: usize) -> Vec<Id> {
     let (h, t) = (Symbol::new(Op::Step), time(signature));
     let (v0, y0) = (block(0, shape.v), block(shape.v, shape.y));
-    let p = parameters(signature, h);
+    let mut p = parameters(signature, h);
     let before = kept(method, shape);
-    let behind = shape.v + shape.y + method.kept_numbers(shape);
+    let memory = memory(signature, method, shape);
+    let remembered = sampled::next(&mut p, t, &v0, &y0, &memory);
+    let behind = shape.v + shape.y + method.kept_numbers(shape) + memory.len();
     let tally = Symbol::new(Op::State(behind as u32));
-    let s = around::wrap(&p, (kind.make)(&p), tally);
+    let s = sampled::held(&p, around::wrap(&p, (kind.make)(&p), tally));
     let mut made = method.program().run_with(s.as_ref(), t, h, &v0, &y0, &before).into_iter();
     let (new_v, new_y) = (made.next().unwrap_or_else(|| v0.clone()), made.next().unwrap_or_else(|| y0.clone()));
     let (mut v, mut y) = s.project(s.bring_to_rest(t, (&v0, &y0), new_v), new_y);
@@ -107,6 +110,7 @@ fn step(kind: &Kind, signature: &Signature, shape: Shape, method: &Method, choic
     }
     let mut next = ids([&v, &y]);
     next.extend(ids(&kept));
+    next.extend(remembered.into_iter().map(|symbol| symbol.0));
     next.extend(s.tally().map(|tally| tally.0));
     let first = next.len();
     next.extend(watch::next(kind, &p, method, choice, t, [&v0, &y0], first));
@@ -123,6 +127,11 @@ fn kept(method: &Method, shape: Shape) -> Vec<Block<Symbol>> {
             block(behind - numbers, numbers)
         })
         .collect()
+}
+
+/// What a sampled controller remembers, which stands behind these.
+fn memory(signature: &Signature, method: &Method, shape: Shape) -> Block<Symbol> {
+    block(shape.v + shape.y + method.kept_numbers(shape), sampled::numbers(signature))
 }
 
 /// Traces the second part of an attempt of float32, onto a tape of float64 that may hold something already; and where its rows are.
@@ -201,17 +210,25 @@ fn matrix(signature: &Signature, shape: Shape, nodes: &[u64], fused: bool) -> Ve
     made.into_iter().map(|symbol| symbol.0).collect()
 }
 
-/// Traces a program that changes the block v alone, and makes the blocks that are kept, if there are any.
-pub(super) fn trace_slot(tape: Tape, signature: &Signature, program: &Program) -> Result<(Tape, Vec<Id>), Error> {
+/// Traces a program of a method that changes the block v alone, and makes the blocks that are kept, if there are any.
+pub(super) fn trace_slot(
+    tape: Tape,
+    signature: &Signature,
+    method: &Method,
+    program: &Program,
+) -> Result<(Tape, Vec<Id>), Error> {
     let kind = kind(signature)?;
     let shape = (kind.shape)(signature)?;
     Ok(record(tape, || {
         let (h, t) = (Symbol::new(Op::Step), time(signature));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-        let p = parameters(signature, h);
+        let mut p = parameters(signature, h);
+        let memory = memory(signature, method, shape);
+        sampled::set(&mut p, &memory);
         let made = || program.run(around::wrap_for_carry(&p, (kind.make)(&p)).as_ref(), t, h, &v, &y);
         let mut made = window::over(signature, || window::of_slot(t, h), made);
         made.insert(1, y);
+        made.push(memory);
         ids(&made)
     }))
 }
@@ -249,8 +266,11 @@ pub fn trace(tape: Tape, signature: &Signature, how: &StepKind, what: &str) -> R
         }
         "judged" => trace_judged(tape, signature, how).map(|(tape, next, _)| (tape, next)),
         "begin" => trace_begin(tape, signature, how),
-        "start" => trace_slot(tape, signature, method(name)?.start(choice).ok_or_else(unknown)?),
-        "finish" => trace_slot(tape, signature, method(name)?.finish(choice).ok_or_else(unknown)?),
+        "start" | "finish" => {
+            let method = method(name)?;
+            let program = if what == "start" { method.start(choice) } else { method.finish(choice) };
+            trace_slot(tape, signature, &method, program.ok_or_else(unknown)?)
+        }
         "record" => trace_record(tape, signature, &[which.to_owned()]),
         _ => Err(unknown()),
     }

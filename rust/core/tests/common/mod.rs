@@ -27,6 +27,7 @@ pub(crate) fn spec<'a>(system: &str, of: Of<'a, '_>) -> Spec<'a> {
         tables: of.tables.iter().map(|(name, t)| (name.to_string(), t.samples.iter().all(Row::is_common))).collect(),
         equations: None,
         watched: None,
+        controller: None,
     };
     let rows = of.rows.iter().flat_map(|(_, rows)| rows.clone()).collect();
     Spec { signature: signature.into(), rows, tables: of.tables.into_iter().map(|(_, table)| table).collect() }

@@ -7,6 +7,7 @@ pub mod controls;
 pub mod force;
 pub(crate) mod friction;
 mod part;
+pub(crate) mod sampled;
 
 use self::part::{Attempts, Part};
 use super::{
@@ -23,7 +24,8 @@ pub(crate) fn parts<N: Number>() -> Vec<Part<N>> {
         contact::part(),
         controls::part(),
         force::part(),
-        friction::part(), //
+        friction::part(),
+        sampled::part(), //
     ]
 }
 
