@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.model.around import FORCE, StickFriction
-from stepwell.reference.around import ORDER, Forced, Rubbing, wrapped
+from stepwell.reference.around import ORDER, Forced, wrapped
 from stepwell.reference.contact import Touching
+from stepwell.reference.friction import Rubbing
 
 CORE = Path(__file__).resolve().parents[1] / "rust" / "core" / "src" / "model" / "around" / "mod.rs"
 
@@ -21,7 +22,8 @@ def test_parts_are_in_order_however_they_came() -> None:
     assert [part.kind for part in system.around] == ["surfaces", "control", "friction"]
     again = system.surrounded(StickFriction(np.array(0.3)))
     assert [part.kind for part in again.around] == ["surfaces", "control", "friction"]
-    assert again.stick_friction == 0.3
+    assert again.part("friction").limit == 0.3
+    assert again.has_stick_friction
     assert not system.linear
     assert list(system.all_parameters(()))[-4:] == ["control.form", "control.gain", "control.target", "friction.limit"]
 

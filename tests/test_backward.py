@@ -28,7 +28,7 @@ def goes_back(system: sw.System) -> bool:
     """Whether it has a past: it has no friction that sticks, nothing bounces, and no control drives it."""
     control = system.keeper
     drives = control is not None and not isinstance(control, (sw.Projection, sw.LengthControl))
-    return system.stick_friction is None and all(each.way == "spring" for each in system.contacts) and not drives
+    return not system.has_stick_friction and all(each.way == "spring" for each in system.contacts) and not drives
 
 
 def quietly(case: Case, **options: Any) -> sw.Run:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, UnsupportedError
-from stepwell.reference import around, bits
+from stepwell.reference import bits, friction
 from stepwell.views import charts
 from stepwell.views.charts.verlet_friction import secant_verlet
 
@@ -218,40 +218,40 @@ def test_core_and_reference_alone_and_in_company() -> None:
 # ---- what is wrong would be noticed
 
 
-class ByTheSignOfV(around.Rubbing):
+class ByTheSignOfV(friction.Rubbing):
     """Friction against v, whatever the step does: it chatters."""
 
     def dv(self, t: Any, v: Any, y: Any) -> Any:
-        return self.s.dv(t, v, y) - self.limit * np.sign(v)
+        return self.s.dv(t, v, y) - self.common.limit * np.sign(v)
 
     def bring_to_rest(self, t: Any, v: Any, y: Any, new_v: Any) -> Any:
         return new_v
 
 
-class NeverAtRest(around.Rubbing):
+class NeverAtRest(friction.Rubbing):
     """The increments alone: several stages only divide v."""
 
     def bring_to_rest(self, t: Any, v: Any, y: Any, new_v: Any) -> Any:
         return new_v
 
 
-class HoldsEverything(around.Rubbing):
+class HoldsEverything(friction.Rubbing):
     """At rest it stays, whatever the force."""
 
     def bring_to_rest(self, t: Any, v: Any, y: Any, new_v: Any) -> Any:
         f = self.s.dv(t, v, y)
-        return bits.where(self._within(v + f) | (np.asarray(v) == 0.0), 0.0, new_v)
+        return bits.where(self.common._within(v + f) | (np.asarray(v) == 0.0), 0.0, new_v)
 
 
-class WithoutTheStep(around.Rubbing):
+class WithoutTheStep(friction.Rubbing):
     def __init__(self, s: Any, h: float, deceleration: Any) -> None:
         super().__init__(s, 1.0, deceleration)
 
 
-class Forward(around.Rubbing):
+class Forward(friction.Rubbing):
     def __init__(self, s: Any, h: float, deceleration: Any) -> None:
         super().__init__(s, h, deceleration)
-        self.limit = -self.limit
+        self.common.limit = -self.common.limit
 
 
 def rests_at(method: str) -> tuple[float, bool]:
@@ -266,7 +266,7 @@ def test_the_reference_is_right() -> None:
 
 @pytest.mark.parametrize("wrong", [ByTheSignOfV, NeverAtRest, HoldsEverything, WithoutTheStep, Forward])
 def test_a_wrong_friction_does_not_rest_there(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(around, "Rubbing", wrong)
+    monkeypatch.setattr(friction, "Rubbing", wrong)
     with np.errstate(all="ignore"):
         assert rests_at("rk4") != (-0.04, True)
 

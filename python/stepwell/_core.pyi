@@ -244,11 +244,14 @@ class Tape:
         kept: tuple[Symbol, list[Symbol], list[Symbol], Symbol] | None = None,
         functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]], tuple[float, float] | None]] = ...,
         mass: list[list[tuple[int, float]]] | None = None,
+        friction: tuple[list[Symbol], int, tuple[int, list[Symbol]] | None] | None = None,
     ) -> Equations:
         """These values as the rates of a system; without ``dy``, ẏ is v.
 
         ``functions`` are values with, for each that they depend on, the derivative by it; and, of one branch of several, its
-        bounds. ``mass`` is the mass matrix: of each row the columns and entries that are not zero.
+        bounds. ``mass`` is the mass matrix: of each row the columns and entries that are not zero. ``friction`` that sticks has
+        its decelerations, the length of the vectors that it acts on, and, if it acts on one number, its place and by how much
+        others change with it.
 
         ``kept`` is an invariant that a projection keeps: its value, its derivatives by v and by y, the square of their length.
         """

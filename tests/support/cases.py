@@ -248,13 +248,16 @@ SYSTEMS: dict[str, Make] = {
     "own: a choice": lambda r, b: own.bouncing(gravity=r.uniform(0.5, 1.0, b)).for_state_shapes(),
     "own: a matrix": lambda r, b: own.network(weights=r.normal(size=(3, 3, b))).for_state_shapes(),
     "own: as SciPy has it": lambda r, b: own.scipys().for_state_shapes(),
+    "own: friction, a slope": lambda r, b: own.sloping(mu=r.uniform(0.0, 0.5, b)).for_state_shapes(),
+    "own: friction, pucks": lambda r, b: own.pucks(mu=r.uniform(0.0, 0.3, b)).for_state_shapes(),
+    "own: friction, a cart": lambda r, b: own.cart(mu=r.uniform(0.0, 0.2, b)).for_state_shapes(np.zeros(2), np.zeros(2)),
     "linear, seventeen states": lambda r, b: sw.LinearSystem(0.5 * _gentle(r, 17), r.normal(size=17), x=_sine(r, b)),
 }
 
 
 def _adaptive(system: sw.System) -> bool:
     """Whether it works with adaptive steps: friction depends on the step, and a step that meets a surface is no estimate."""
-    return system.stick_friction is None and all(surface.way == "spring" for surface in system.contacts)
+    return not system.has_stick_friction and all(surface.way == "spring" for surface in system.contacts)
 
 
 ADAPTIVE = [name for name, make in SYSTEMS.items() if _adaptive(make(np.random.default_rng(0), 1))]

@@ -105,3 +105,42 @@ def scipys(t, y):  # type: ignore[no-untyped-def]
     """As ``solve_ivp`` takes it."""
     a, b = y
     return [b, -a]
+
+
+@sw.system
+def sloping(t: Any, v: Any, y: Any, *, slope: Any = 0.3, mu: Any = 0.2, g: Any = 1.0) -> Any:
+    """A block on a slope that turns to and fro."""
+    return -g * np.sin(slope * np.cos(t))
+
+
+@sloping.friction
+def on_the_slope(t: Any, v: Any, y: Any, *, slope: Any, mu: Any, g: Any) -> Any:
+    """The normal force depends on the time."""
+    return mu * g * np.cos(slope * np.cos(t))
+
+
+@sw.system(shape=(3, 2))
+def pucks(t: Any, v: Any, y: Any, *, k: Any = 1.0, mu: Any = 0.1) -> Any:
+    """Bodies on a table, each on a spring to the middle."""
+    return -k * y
+
+
+@pucks.friction(of="row")
+def on_the_table(t: Any, v: Any, y: Any, *, mu: Any) -> Any:
+    """Against the direction of each body."""
+    return mu
+
+
+@sw.system
+def cart(t: Any, v: Any, y: Any, *, mu: Any = 0.05, pole: Any = 0.1, length: Any = 0.5, g: Any = 1.0) -> Any:
+    """A cart of mass 1 with a pole on a hinge, as of Barto, Sutton and Anderson but for the pole's inertia: place and angle."""
+    sine, cosine = np.sin(y[1]), np.cos(y[1])
+    forward = pole * sine * (length * v[1] ** 2 - g * cosine) / (1.0 + pole * sine * sine)
+    return np.stack([forward, (g * sine - forward * cosine) / length])
+
+
+@cart.friction(component=0)
+def on_the_rail(t: Any, v: Any, y: Any, *, mu: Any, pole: Any, length: Any, g: Any) -> Any:
+    """The pole goes with the cart."""
+    sine = np.sin(y[1])
+    return mu * (1.0 + pole) * g / (1.0 + pole * sine * sine), np.stack([1.0, -np.cos(y[1]) / length])

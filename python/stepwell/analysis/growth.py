@@ -108,7 +108,7 @@ def growth(
         not many.any()
         or n * n > MOST_NUMBERS
         or system.contacts
-        or system.stick_friction is not None
+        or system.has_stick_friction
         or system.controller is not None
         or isinstance(system, NBody)
     ):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from ..base.arrays import Array, Shape
 from ..base.immutable import Immutable, ValueEquality, changed
 from ..reference import around as reference
 from .inputs import Input, Sampled, Sinusoid
+
+if TYPE_CHECKING:
+    from .equations.definition import Definition
 
 
 class Part(Immutable, ValueEquality, ABC):
@@ -140,4 +143,32 @@ class StickFriction(Part):
 
     def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> Any:
         """The system with friction around all other forces."""
-        return reference.Rubbing(s, h, parameters["friction.limit"])
+        return _rubbing(s, h, parameters["friction.limit"])
+
+
+class OwnFriction(Part):
+    """Friction that sticks, as the definition of own equations declares it, with the parameters of the system."""
+
+    kind = "friction"
+    velocity_term = "friction"
+
+    def __init__(self, definition: Definition) -> None:
+        self.definition = definition
+
+    def repr_arguments(self) -> list[str]:
+        """None, because it belongs to the equations."""
+        return []
+
+    def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
+        """None, because they are those of the system."""
+        return {}
+
+    def wrap(self, s: Any, h: Any, parameters: dict[str, Any]) -> Any:
+        """The system with friction around all other forces."""
+        return _rubbing(s, h)
+
+
+def _rubbing(s: Any, h: Any, *deceleration: Any) -> Any:
+    from ..reference import friction  # a run by the core does without
+
+    return friction.Rubbing(s, h, *deceleration)

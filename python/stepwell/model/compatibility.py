@@ -158,7 +158,7 @@ def fits_own_times(system: System, single: bool) -> None:
 
 def goes_back(system: System, control: Any) -> None:
     """Raise if a system has no unique past, so that steps back in time have no meaning."""
-    if system.stick_friction is not None:
+    if system.has_stick_friction:
         raise UnsupportedError(
             f"dt: a negative step needs a unique past, and friction that sticks has none: {system!r} at rest may have had any "
             f"speed before; use dt above zero"

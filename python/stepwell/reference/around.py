@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array, Scaled
-from . import bits
 
 #: The kinds of parts, from the inside out: friction resists all other forces, so it comes last.
 ORDER = (
@@ -61,35 +60,6 @@ class Forced(Around):
         if len(fixed := getattr(self.s, "fixed", ())):
             pushed[fixed] = dv[fixed]
         return pushed
-
-
-class Rubbing(Around):
-    """Coulomb's friction that sticks (§8): v + f is reduced by the limit towards zero, where it stays if it gets there.
-
-    f is h·v̇ without friction, and the limit is h times the deceleration by friction.
-    """
-
-    def __init__(self, s: Scaled, h: float, deceleration: Array) -> None:
-        super().__init__(s)
-        self.limit = h * deceleration
-
-    def dv(self, t: float, v: Array, y: Array) -> Array:
-        """The change of v, which is −v where friction stops it."""
-        f, limit = self.s.dv(t, v, y), self.limit
-        moved = v + f
-        forward = bits.where(bits.less(limit, moved), f - limit, -v)
-        return np.asarray(bits.where(bits.less(moved, -limit), f + limit, forward))
-
-    def bring_to_rest(self, t: float, v: Array, y: Array, new_v: Array) -> Array:
-        """The velocity after a step from v and y: zero if the first stage stops it, and friction can hold it there.
-
-        A method of several stages mixes their increments, so by itself it would only divide v by some number in each step.
-        """
-        f = self.s.dv(t, v, y)
-        return np.asarray(bits.where(self._within(v + f) & self._within(f), 0.0, new_v))
-
-    def _within(self, x: Array) -> Any:
-        return bits.at_most(-self.limit, x) & bits.at_most(x, self.limit)
 
 
 def whole_step(step: Callable[..., Any], s: Any, t: float, h: float, v: Array, y: Array, *kept: Array) -> Any:

@@ -52,7 +52,7 @@ def check_estimates(system: System, method: Method, control: Any, options: Optio
     if method.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"tolerance: {method.name} does not estimate its error, so it cannot choose its steps; use {able}")
-    if system.stick_friction is not None:
+    if system.has_stick_friction:
         raise UnsupportedError(
             f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
             f"estimated; use dt= and steps="

@@ -142,7 +142,7 @@ def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
     """
     if scene.exact is not None:
         return scene
-    if scene.system.contacts or scene.system.stick_friction is not None:
+    if scene.system.contacts or scene.system.has_stick_friction:
         what = "surfaces" if scene.system.contacts else "friction that sticks"
         raise ArgumentError(
             f"exact: needed by {scene.name}, whose system has {what}, got None: the reference solution of other scenes is a run "
@@ -159,7 +159,7 @@ def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
 
 def method_for(scene: Scene) -> str:
     """The method of the reference solution: an implicit one where an explicit one would take far more steps."""
-    if scene.v.size + scene.y.size > MOST_STIFF_NUMBERS or scene.system.contacts or scene.system.stick_friction is not None:
+    if scene.v.size + scene.y.size > MOST_STIFF_NUMBERS or scene.system.contacts or scene.system.has_stick_friction:
         return METHOD
     explicit = _attempts(scene, METHOD, math.inf)
     if explicit < MANY or _attempts(scene, METHOD_IF_STIFF, explicit / STIFF) * STIFF > explicit:

@@ -12,7 +12,7 @@ use stepwell_core::{
     step::trace,
     tape::{
         self, Id, OPERATIONS, Op,
-        equations::{self, Invariant},
+        equations::{self, Friction, Invariant, On},
         fuse::fuse,
         mass::Mass,
         print,
@@ -63,6 +63,10 @@ pub struct Symbol {
 
 /// An invariant: its value, its derivatives by v and by y, and the square of their length.
 type Kept<'py> = (PyRef<'py, Symbol>, Vec<PyRef<'py, Symbol>>, Vec<PyRef<'py, Symbol>>, PyRef<'py, Symbol>);
+
+/// Friction that sticks: decelerations, the length of the vectors that each is for, or the number that it is for and by how much
+/// others change with it.
+type Sticking<'py> = (Vec<PyRef<'py, Symbol>>, usize, Option<(usize, Vec<PyRef<'py, Symbol>>)>);
 
 /// A value that is a function of others: with each of these its derivative by it.
 type Function<'py> = (PyRef<'py, Symbol>, Vec<(PyRef<'py, Symbol>, PyRef<'py, Symbol>)>, Option<[f64; 2]>);
@@ -352,8 +356,10 @@ impl Tape {
     /// The rates of a user's own system: of v, and of y unless they are v itself; quantities of a state by name; and of the
     /// invariant that a projection keeps its value, its derivatives by v and by y, and the square of their length. `functions`
     /// are values with, for each that they depend on, the derivative by it; and, of one branch of several, its bounds. `mass` is
-    /// the mass matrix: of each row the columns and entries that are not zero.
-    #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None, functions=Vec::new(), mass=None))]
+    /// the mass matrix: of each row the columns and entries that are not zero. `friction` that sticks has its decelerations, the
+    /// length of the vectors that it acts on, and, if it acts on one number, its place and by how much others change with it.
+    #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None, functions=Vec::new(), mass=None, friction=None))]
+    #[allow(clippy::too_many_arguments, reason = "in Python they have names")]
     fn equations(
         &self,
         dv: Vec<PyRef<'_, Symbol>>,
@@ -362,6 +368,7 @@ impl Tape {
         kept: Option<Kept<'_>>,
         functions: Vec<Function<'_>>,
         mass: Option<Vec<Vec<(u32, f64)>>>,
+        friction: Option<Sticking<'_>>,
     ) -> PyResult<Equations> {
         let tape = lock(&self.0);
         let known = |symbol: &PyRef<'_, Symbol>| -> PyResult<Id> {
@@ -382,7 +389,14 @@ impl Tape {
             Ok((known(&value)?, by, bounds.map(|bounds| bounds.map(f64::to_bits))))
         });
         let made = made.with_functions(functions.collect::<PyResult<Vec<_>>>()?);
-        let made = made.with_mass(mass.map(|rows| Mass::new(&rows)));
+        let friction = friction.map(|(limit, length, one)| -> PyResult<Friction> {
+            let on = match one {
+                None => On::Vectors(length),
+                Some((at, along)) => On::One(at, all(&along)?),
+            };
+            Ok(Friction { limit: all(&limit)?, on })
+        });
+        let made = made.with_mass(mass.map(|rows| Mass::new(&rows))).with_friction(friction.transpose()?);
         Ok(Equations(Arc::new(made.without_the_rest())))
     }
 

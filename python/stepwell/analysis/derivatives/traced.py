@@ -113,7 +113,7 @@ def _roots(tracer: Tracer, what: str, method: Method | None) -> list[Symbol]:
                 f"rates: the algebraic equations of {tracer.system!r} give no rate for what they determine, so there is no "
                 f"matrix of rates; steps by implicit methods and consistent_start go without"
             )
-        if tracer.system.stick_friction is not None:
+        if tracer.system.has_stick_friction:
             raise UnsupportedError(
                 f"rates: {tracer.system!r} has friction that sticks; what it does depends on the step, so there are no rates "
                 f"without one"

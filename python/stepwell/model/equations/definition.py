@@ -16,6 +16,7 @@ from ...base.arrays import Shape
 from ...base.immutable import frozen
 from ...errors import ArgumentError, DTypeError, ShapeError, UnknownNameError
 from ..inputs import Sampled, Sinusoid
+from .friction import Friction, FrictionOf, friction, place_of
 from .invariants import Invariant, invariant
 from .mass import MassMatrix, mass_matrix
 
@@ -38,6 +39,7 @@ class Definition:
         parameters: names and defaults.
         own_axes: how many axes of its own each parameter has: as many as its default.
         invariants: the declared invariants, by name.
+        stick_friction: the declared friction that sticks, or None.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Definition:
         self.parameters = _parameters(function, 3 if self.has_v else 2)
         self.own_axes = {name: 0 if _changes(default) else np.ndim(default) for name, default in self.parameters.items()}
         self.invariants: dict[str, Invariant] = {}
+        self.stick_friction: Friction | None = None
 
     @property
     def has_v(self) -> bool:
@@ -108,6 +111,54 @@ class Definition:
         declared = invariant(self.name, ("v", "y") if self.has_v else ("y",), self.parameters, function)
         self.invariants[declared.name] = declared
         return function
+
+    @overload
+    def friction(self, function: Callable[..., Any], /) -> Callable[..., Any]: ...
+    @overload
+    def friction(
+        self, function: None = None, /, *, of: FrictionOf = "component", component: int | tuple[int, ...] | None = None
+    ) -> Callable[[Callable[..., Any]], Callable[..., Any]]: ...
+    def friction(self, function: Any = None, /, *, of: FrictionOf = "component", component: Any = None) -> Any:
+        """Declare Coulomb's friction that sticks, beside the forces in the rates; a decorator, above where systems are made.
+
+        The function returns the deceleration of a sliding motion, μN/m, in the unit of v̇; the normal force N may depend on the
+        time, the state and the parameters. A negative deceleration is none. What sticks stays until other forces exceed it.
+
+        Args:
+            function: ``f(t, v, y, *, parameters)``; parameters are those of the system, by name. It returns a number or an array
+                of the shape of v; with ``of="row"`` one number for each row; with ``component`` one number, or the pair of it
+                and an array of the shape of v that says by how much each velocity changes where that component changes by 1.
+            of: ``"component"`` for friction on each number of v; ``"row"`` for friction against the direction of vectors, which
+                are along the last axis of v, as of bodies on a table.
+            component: the place of the only number of v that has friction: an index, or a tuple of them.
+
+        Returns:
+            The function.
+
+        Raises:
+            ArgumentError: if the system is of first order, has friction already, or has no such parameter.
+
+        Example:
+            >>> @sw.system
+            ... def block(t, v, y, *, slope=0.3, mu=0.5, g=9.81):
+            ...     return -g * np.sin(slope)
+            >>> @block.friction
+            ... def sliding(t, v, y, *, slope, mu, g):
+            ...     return mu * g * np.cos(slope)
+        """
+        if not self.has_v:
+            raise ArgumentError(f"{self.name}: friction acts on velocities, and a system of first order has none")
+        if self.stick_friction is not None:
+            known = self.stick_friction.function.__name__
+            raise ArgumentError(f"{self.name}: expected one function for friction, and {known} is declared already")
+
+        place = place_of(of, component)
+
+        def declare(function: Any) -> Any:
+            self.stick_friction = friction(self.name, self.parameters, function, of, place)
+            return function
+
+        return declare if function is None else declare(function)
 
     def __repr__(self) -> str:
         return f"<system {self.name}({', '.join(f'{name}={value!r}' for name, value in self.parameters.items())})>"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import count
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -134,15 +135,16 @@ class MarkedReplay(Replay):
         return on_tape
 
 
-class Rates:
-    """The operations of a user's function, carried out on series.
+class OnSeries:
+    """The operations of a user's function of the time and the state, carried out on series.
 
     Args:
-        equations: the function.
+        equations: the system.
+        function: of the time, both blocks and parameters by name; it returns blocks, and None for one that is not there.
         values: the parameters by name.
     """
 
-    def __init__(self, equations: TracedFunction, values: dict[str, Any]) -> None:
+    def __init__(self, equations: TracedFunction, function: Callable[..., Sequence[Any]], values: dict[str, Any]) -> None:
         self.equations = equations
         tape, marks = _core.Tape(), Marks()
         numbers, state = map(tape.param, count()), map(tape.state, count())
@@ -162,12 +164,13 @@ class Rates:
                 parameters[name] = value if callable(value) else symbols(own, numbers)
         v, y = symbols(equations.v_shape, state), symbols(equations.y_shape, state)
         with recording(marks):
-            rates = equations.rates(tape.time(), v, y, parameters)
-        roots = [each if isinstance(each, _core.Symbol) else tape.number(float(each)) for block in rates for each in block.flat]
+            blocks = [block for block in function(tape.time(), v, y, parameters) if block is not None]
+        self.shapes = [np.shape(block) for block in blocks]
+        roots = [each if isinstance(each, _core.Symbol) else tape.number(float(each)) for block in blocks for each in block.flat]
         self.operations = MarkedReplay(tape, roots, marks)
 
-    def __call__(self, t: Any, v: Any, y: Any, values: dict[str, Any]) -> tuple[Any, Any]:
-        """v̇ and ẏ of arrays of series whose last axes are those of a batch."""
+    def __call__(self, t: Any, v: Any, y: Any, values: dict[str, Any]) -> list[Any]:
+        """The blocks for arrays of series whose last axes are those of a batch."""
         equations = self.equations
         v, y, t = (np.asarray(each, dtype=object) for each in (v, y, t))
         rows: list[Any] = []
@@ -180,6 +183,7 @@ class Rates:
         state = [block[index] for block, own in ((v, equations.v_shape), (y, equations.y_shape)) for index in np.ndindex(own)]
         state = [np.asarray(each, dtype=object) for each in state]
         batch = np.broadcast_shapes(t.shape, *(each.shape for each in (*rows, *state)))
-        rates = np.array(self.operations(state, rows, t), dtype=object).reshape((-1, *batch))
-        n_v = len(state) - int(np.prod(equations.y_shape))
-        return rates[:n_v].reshape((*equations.v_shape, *batch)), rates[n_v:].reshape((*equations.y_shape, *batch))
+        results = np.array(self.operations(state, rows, t), dtype=object).reshape((-1, *batch))
+        ends = np.cumsum([prod(shape) for shape in self.shapes])
+        blocks = zip(np.split(results, ends[:-1]), self.shapes, strict=True)
+        return [block.reshape((*shape, *batch)) for block, shape in blocks]

@@ -27,7 +27,7 @@ from ...reference.tape.replay import Replay
 from .series import Line
 
 if TYPE_CHECKING:
-    from .series import Rates
+    from .series import OnSeries
 
 #: A condition that switches more often than this within a run is not searched: steps cannot miss all of its pulses.
 MOST_PERIODS = 4096
@@ -125,7 +125,7 @@ class Switches:
         numbers: the numbers of the parameters, one after the other; None is an input, which knows its own jumps.
     """
 
-    def __init__(self, rates: Rates, numbers: Sequence[Array | None]) -> None:
+    def __init__(self, rates: OnSeries, numbers: Sequence[Array | None]) -> None:
         self.tape = [Operation(name, tuple(of), extra) for name, of, extra in rates.operations.lines]
         self.functions = rates.operations.functions
         #: For each line whether it depends on the time; None if it depends on the state or an input, too.

@@ -14,6 +14,7 @@ import numpy as np
 from ...base.arrays import Array as Numbers
 from ...base.arrays import Shape
 from ...errors import REFUSED, TraceError
+from ...reference.bits import less, where
 from ...reference.mass import Mass, combined
 from ...reference.series import among
 from .arrays import QUICK_SINES
@@ -24,8 +25,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from .definition import Definition
+    from .friction import Friction
     from .invariants import Invariant, Traced
-    from .series import Rates
+    from .series import OnSeries
     from .switching import Switches
 
 #: The most frames of a traceback that are searched for the user's function.
@@ -46,12 +48,15 @@ class Equations:
         kept: the name of the invariant that a control or a projection keeps, or None.
         limited: whether that is a control in the limited form.
         pushed: whether it is a control, which pushes, and not a projection.
+        rubs: whether the friction that its definition declares is around it.
     """
 
     kept: str | None = None
     limited = False
     pushed = False
-    _series: Rates | None = None
+    rubs = False
+    _series: OnSeries | None = None
+    _friction_series: OnSeries | None = None
     _switches: Switches | None = None
 
     def __init__(self, definition: Definition, v_shape: Shape, y_shape: Shape, own_shapes: dict[str, Any]) -> None:
@@ -96,7 +101,7 @@ class Equations:
         return equations
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_invariants": {}, "_series": None, "_switches": None}
+        return {**vars(self), "_invariants": {}, "_series": None, "_friction_series": None, "_switches": None}
 
     @property
     def name(self) -> str:
@@ -115,7 +120,7 @@ class Equations:
         return hash(self._key())
 
     def _key(self) -> tuple[Any, ...]:
-        return self.definition, self.v_shape, self.y_shape, self.kept, self.limited, self.pushed
+        return self.definition, self.v_shape, self.y_shape, self.kept, self.limited, self.pushed, self.rubs
 
     def __deepcopy__(self, memo: Any) -> Equations:
         return self  # it is immutable
@@ -123,25 +128,66 @@ class Equations:
     def rates(self, t: Any, v: Numbers, y: Numbers, values: dict[str, Any]) -> tuple[Numbers, Numbers]:
         """v̇ and ẏ: symbols from symbols, arrays over all members from numbers. Where ẏ is v, it is not computed."""
         if among((t, v, y)):
-            return self._of_series(values)(t, v, y, values)
-        batch = np.broadcast_shapes(np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :], np.shape(t))
-        with np.errstate(all="ignore"):
-            parameters = {name: self._parameter(name, value, t, batch) for name, value in values.items()}
-            state = [scalars(y, len(self.y_shape))]
-            if self.definition.has_v:
-                state.insert(0, scalars(v, len(self.v_shape)))
-            result = self._called(Scalar(t), state, parameters)
+            dv, dy = self._of_series(values)(t, v, y, values)
+            return dv, dy
+        batch = np.broadcast_shapes(*self.batches(v, y), np.shape(t))
+        result = self._result(self.definition.function, self.name, t, v, y, values)
         dv, dy = self._checked(result)
         v_dot = np.empty((*self.v_shape, *batch)) if dv is None else _numbers(dv, self.v_shape, batch)
         return v_dot, v if dy is None else _numbers(dy, self.y_shape, batch)
 
-    def _of_series(self, values: dict[str, Any]) -> Rates:
+    def friction(self, t: Any, v: Numbers, y: Numbers, values: dict[str, Any]) -> tuple[Numbers, Numbers | None]:
+        """The decelerations by friction, and by how much others change with the one number that it acts on, or None.
+
+        A negative deceleration is zero here.
+        """
+        on = self.friction_on
+        assert on is not None
+        values = {each: values[each] for each in on.parameters}
+        if among((t, v, y)):
+            limit, *others = self._friction_of_series(values)(t, v, y, values)
+            return limit, others[0] if others else None
+        name = f"{self.name}: {on.function.__name__}"
+        batch = np.broadcast_shapes(*self.batches(v, y), np.shape(t))
+        result = self._result(on.function, name, t, v, y, values)
+        along = None
+        if on.component is not None and isinstance(result, tuple):
+            if len(result) != 2:
+                raise TraceError(f"{name}: expected a deceleration, or a pair (deceleration, along), got {len(result)} values")
+            result, along = result[0], _numbers(_items(name, "along", result[1], self.v_shape), self.v_shape, batch)
+        shape = on.shape(name, self.v_shape)
+        return _not_negative(_numbers(_items(name, "a deceleration", result, shape), shape, batch)), along
+
+    @property
+    def friction_on(self) -> Friction | None:
+        """The friction that sticks, or None."""
+        return self.definition.stick_friction if self.rubs else None
+
+    def _result(self, function: Callable[..., Any], name: str, t: Any, v: Numbers, y: Numbers, values: dict[str, Any]) -> Any:
+        """What a function of the time, the state and parameters returns."""
+        batch = np.broadcast_shapes(*self.batches(v, y), np.shape(t))
+        with np.errstate(all="ignore"):
+            parameters = {each: self._parameter(each, value, t, batch) for each, value in values.items()}
+            state = [scalars(y, len(self.y_shape))]
+            if self.definition.has_v:
+                state.insert(0, scalars(v, len(self.v_shape)))
+            return self._run(rebound(function), name, Scalar(t), *state, **parameters)
+
+    def _of_series(self, values: dict[str, Any]) -> OnSeries:
         """The rates of series, traced on first use."""
-        from .series import Rates
+        from .series import OnSeries
 
         if self._series is None:
-            self._series = Rates(self, values)
+            self._series = OnSeries(self, self.rates, values)
         return self._series
+
+    def _friction_of_series(self, values: dict[str, Any]) -> OnSeries:
+        """The friction of series, traced on first use."""
+        from .series import OnSeries
+
+        if self._friction_series is None:
+            self._friction_series = OnSeries(self, self.friction, values)
+        return self._friction_series
 
     @property
     def constant_switching_times(self) -> Numbers | None:
@@ -178,9 +224,6 @@ class Equations:
         if hasattr(value, "at"):
             return Scalar(value.at(t))
         return scalars(value, self.own_axes(name))
-
-    def _called(self, t: Scalar, state: list[Any], parameters: dict[str, Any]) -> Any:
-        return self._run(rebound(self.definition.function), self.name, t, *state, **parameters)
 
     def _run(self, function: Callable[..., Any], name: str, /, *arguments: Any, **parameters: Any) -> Any:
         return run_function(function, name, self.definition.quick_sines, *arguments, **parameters)
@@ -250,6 +293,17 @@ def kind_of(value: Any) -> str:
     return "nothing: is there a return?" if value is None else type(value).__name__
 
 
+def _items(name: str, what: str, value: Any, shape: Shape) -> Any:
+    """What a function returned as an array of objects; one number serves all."""
+    try:
+        items = array(value).items
+    except TraceError as error:
+        raise TraceError(f"{name}: expected {what} of shape {shape}, got {kind_of(value)} ({error})") from None
+    if items.shape not in ((), shape):
+        raise of_shape(f"{name}: expected {what} of shape {shape}, or one number, got shape {items.shape}")
+    return np.broadcast_to(items, shape)
+
+
 def scalars(numbers: Any, axes: int) -> Any:
     """Numbers or symbols as scalars: the first axes are the array's own, the others those of a batch."""
     numbers = np.asarray(numbers)
@@ -273,6 +327,14 @@ def _numbers(items: Any, shape: Shape, batch: Shape) -> Numbers:
     for i, value in enumerate(values):
         numbers[i] = value
     return numbers.reshape((*shape, *batch))
+
+
+def _not_negative(numbers: Any) -> Any:
+    """Numbers, or symbols and numbers, with zero in place of negative ones."""
+    if numbers.dtype != object:
+        return where(less(numbers, 0.0), 0.0, numbers)
+    one = np.frompyfunc(lambda x: where(x < 0.0, 0.0, x) if hasattr(x, "xor_bits") else max(x, 0.0), 1, 1)
+    return np.asarray(one(numbers), dtype=object)
 
 
 def _in_words(error: BaseException) -> str:

@@ -114,10 +114,9 @@ class System(Immutable, ValueEquality, ABC):
         return self.part("controller") if self.around else None
 
     @property
-    def stick_friction(self) -> Array | None:
-        """The deceleration of each velocity by friction that sticks, or None; broadcasts over the batch."""
-        friction = self.part("friction")
-        return None if friction is None else friction.limit
+    def has_stick_friction(self) -> bool:
+        """Whether friction that sticks acts on its velocities."""
+        return self.part("friction") is not None
 
     @property
     def contacts(self) -> tuple[Surface, ...]:

@@ -13,7 +13,7 @@ from .base import System
 
 
 def digest(system: System) -> str:
-    """A hash of the operations of an own system: of its rates, its invariants, and the gradient of one that is projected onto."""
+    """A hash of the operations of an own system: rates, friction, invariants, and the gradient of one that is kept."""
     known: Any = system
     if known.equations is None:
         known = known.for_state_shapes()
@@ -26,7 +26,10 @@ def digest(system: System) -> str:
         values += tracer.flat(s.record(name, v, y))
     if isinstance(known.keeper, Projection):
         values += tracer.flat(*s.gradient(v, y))
+    values += [each for block in known.friction_operations(tracer, s, v, y) for each in block]
     operations = repr(tape.operations(values))
+    if known.friction_on is not None:
+        operations += repr((known.friction_on.of, known.friction_on.component))
     if known.mass_matrix is not None:
         operations += repr(known.mass_matrix.rows)
     return hashlib.sha256(operations.encode()).hexdigest()

@@ -19,8 +19,10 @@ from ...reference.marks import Marks, recording
 from ...reference.mass import Mass
 from ...reference.systems.equations import Equations as Reference
 from ...reference.traced import Tracer
+from ..around import OwnFriction
 from ..controls import WAYS, AnyControl, ConstraintControl, Control, EnergyControl, Projection
 from ..equations.definition import Definition, fits
+from ..equations.friction import Friction
 from ..equations.recognised import Unknown, identity
 from ..equations.series import derivatives_of_functions
 from ..equations.trace import Equations
@@ -64,6 +66,8 @@ class OwnSystem(System):
         self.batch = checks.batch_shape(batches)
         self.second_order = definition.order == 2 and definition.blocks == 1
         self.equations: Equations | None = None
+        if definition.stick_friction is not None:
+            self.around = (OwnFriction(definition),)
         #: The operations of the function, and those in float32.
         self._core: Any = None
         self._single: dict[bool, Any] = {}
@@ -235,6 +239,7 @@ class OwnSystem(System):
             for name, value in self.parameters_given.items()
         }
         equations = Equations(definition, v_shape, y_shape, shapes)
+        equations.rubs = self.friction_on is not None
         bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _single={}, _bounds={}, _met={})
         bound._trace_once()
         self._bounds[v_shape, y_shape] = bound
@@ -260,7 +265,9 @@ class OwnSystem(System):
             invariants = tuple((each.name, each.parameters, identity(each.function)) for each in definition.invariants.values())
             function = identity(definition.function)
             mass = None if definition.mass is None else definition.mass.matrix.tobytes()
-            key = definition.order, definition.blocks, definition.quick_sines, self.v_shape, self.y_shape, mass
+            on = self.friction_on
+            friction = None if on is None else (identity(on.function), *on[1:])
+            key = definition.order, definition.blocks, definition.quick_sines, self.v_shape, self.y_shape, mass, friction
             return *key, function, parameters, invariants, definition.name
         except Unknown:
             return None
@@ -280,7 +287,14 @@ class OwnSystem(System):
 
     def _take(self, operations: Any) -> None:
         self._core = operations
-        complete(self, velocity_term="forces that do" if operations.reads_v else None)
+        friction = None if self.friction_on is None else OwnFriction.velocity_term
+        complete(self, velocity_term=friction or ("forces that do" if operations.reads_v else None))
+
+    @property
+    def friction_on(self) -> Friction | None:
+        """The friction that sticks, as it was declared."""
+        part = self.part("friction")
+        return None if part is None else part.definition.stick_friction
 
     def _rates(self, marks: Marks | None = None, *, single: bool = False) -> Any:
         """The rates as operations; with ``marks`` also the derivatives of elementary functions in them.
@@ -299,13 +313,14 @@ class OwnSystem(System):
             with nullcontext() if marks is None else recording(marks):
                 s = tracer.scaled(tape.step())
                 dv, dy = s.rates(tape.time(), v, y)
-            traced.append((tracer.flat(dv), tracer.flat(dy)))
+                friction = self.friction_operations(tracer, s, v, y)
+            traced.append((tracer.flat(dv), tracer.flat(dy), *friction))
         if [each.id for block in traced[0] for each in block] != [each.id for block in traced[-1] for each in block]:
             raise TraceError(
                 f"{definition.name}: expected the same operations at every call, got others: a function of a step may not draw "
                 f"random numbers or count its calls"
             )
-        dv, dy = traced[0]
+        dv, dy, *friction = traced[0]
         quantities = [(name, *tracer.flat(s.record(name, v, y))) for name in self.quantities if not single]
         projected = None
         if equations.kept is not None and not equations.pushed:
@@ -315,7 +330,24 @@ class OwnSystem(System):
         own_dv, own_dy = dv if equations.v_shape != (0,) else [], None if equations.second_order else dy
         functions = [] if marks is None else derivatives_of_functions(tape, marks)
         rows = None if equations.mass_matrix is None else equations.mass_matrix.rows
-        return tape.equations(own_dv, own_dy, quantities, projected, functions, rows)
+        return tape.equations(own_dv, own_dy, quantities, projected, functions, rows, self._sticking(*friction))
+
+    def friction_operations(self, tracer: Tracer, s: Any, v: Array, y: Array) -> list[list[Any]]:
+        """The operations of friction: decelerations, and by how much velocities change with the one that it acts on."""
+        if self.friction_on is None:
+            return []
+        assert self.equations is not None
+        limit, along = self.equations.friction(tracer.tape.time(), v, y, s.parameters)
+        return [tracer.flat(limit), [] if along is None else tracer.flat(along)]
+
+    def _sticking(self, *friction: list[Any]) -> Any:
+        """Friction as the core takes it, or None."""
+        if (on := self.friction_on) is None:
+            return None
+        limit, along = friction
+        if on.component is None:
+            return limit, self.v_shape[-1] if on.of == "row" else 1, None
+        return limit, 1, (int(np.ravel_multi_index(on.component, self.v_shape)), along)
 
     def _known(self) -> OwnSystem:
         """This system with known shapes of its blocks."""
@@ -468,6 +500,10 @@ class OwnSystem(System):
             raise UnsupportedError(
                 f"control: {control!r} moves the state along the gradient of an invariant, and the algebraic equations of "
                 f"{self!r} do not hold there"
+            )
+        if self.has_stick_friction:
+            raise UnsupportedError(
+                f"control: {control!r} keeps an invariant of {self!r}, from which friction takes energy for good; leave one out"
             )
         known = self._known().uncontrolled  # a control replaces another
         assert isinstance(known, OwnSystem)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ..bits import where
+from ..friction import OnOne, OnVectors, Separate
 
 
 class Equations:
@@ -76,6 +77,14 @@ class Equations:
         along_v, along_y, square = self._invariant().gradient(v, y, self.parameters)
         (own_v, own_y), (batch_v, batch_y) = self.equations.shapes, self.equations.batches(v, y)
         return stacked(along_v, own_v, batch_v), stacked(along_y, own_y, batch_y), square
+
+    def friction(self, t: float, v: Array, y: Array) -> Separate:
+        """The friction that sticks, with h times its decelerations."""
+        limit, along = self.equations.friction(t, v, y, self.parameters)
+        limit, on = self.h * limit, self.equations.friction_on
+        if on.component is not None:
+            return OnOne(limit, on.component, along)
+        return Separate(limit) if on.of == "component" else OnVectors(limit, len(self.equations.v_shape) - 1)
 
     def record(self, name: str, v: Array, y: Array) -> Array:
         """An invariant of a state."""

@@ -124,7 +124,7 @@ def _attempted(system: System, method: Method, control: AnyControl | None, dtype
     if method.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"attempt: {method.name} does not estimate its error, so it cannot choose its steps; use {able}")
-    if system.stick_friction is not None:
+    if system.has_stick_friction:
         raise UnsupportedError(f"attempt: adaptive steps do not work with friction that sticks, which {system!r} has")
     if form != "direct":
         raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")

@@ -146,7 +146,7 @@ class ByScipy(ValueEquality):
     def __call__(self, scene: Scene, times: Array, tolerance: float) -> Solved:
         """The states at these times."""
         solver = _need("scipy.integrate", "scipy")
-        if scene.system.stick_friction is not None:
+        if scene.system.has_stick_friction:
             raise UnsupportedError(
                 f"SciPy is given rates, and {scene.system!r} has friction that sticks, which depends on the step"
             )

@@ -119,7 +119,7 @@ def work_precision(
     reasons = {method.name: measure.refusal(scene, method) or _left_out(scene, method, methods) for method in chosen}
     refused = {name: reason for name, reason in reasons.items() if reason is not None}
     able = [method for method in chosen if reasons[method.name] is None]
-    paced = wanted and scene.system.stick_friction is None and not scene.system.contacts  # adaptive steps do not work with these
+    paced = wanted and not scene.system.has_stick_friction and not scene.system.contacts  # adaptive steps do not work with these
     adaptive = [method for method in able if method.error_order is not None and not method.has_series and paced]
     curves: list[Curve] = []
 

@@ -68,6 +68,11 @@ pub trait System<N: Number> {
         self.inner()?.record(quantity, v, y)
     }
 
+    /// The friction that sticks on velocities, with h times its decelerations, if the equations have some.
+    fn friction(&self, t: N, v: &Block<N>, y: &Block<N>) -> Option<Friction<N>> {
+        self.inner()?.friction(t, v, y)
+    }
+
     /// The velocities after a step from `before` at time `t`, if the step may have missed that they come to rest.
     fn bring_to_rest(&self, t: N, before: (&Block<N>, &Block<N>), v: Block<N>) -> Block<N> {
         match self.inner() {
@@ -117,6 +122,24 @@ pub struct Gradient<N: Number> {
     pub y: Block<N>,
     /// The square of the length of both together.
     pub square: N,
+}
+
+/// The result of [`System::friction`]: the most that it takes from velocities in a step.
+#[derive(Clone, Debug)]
+pub struct Friction<N: Number> {
+    /// For each vector, or for one number.
+    pub limit: Block<N>,
+    /// What these are.
+    pub on: On<N>,
+}
+
+/// The velocities that friction acts on.
+#[derive(Clone, Debug)]
+pub enum On<N: Number> {
+    /// Vectors of so many numbers each.
+    Vectors(usize),
+    /// The number at that place, and by how much others change where it changes by 1; nothing if they do not.
+    One(usize, Block<N>),
 }
 
 /// How many numbers the blocks of a system have.

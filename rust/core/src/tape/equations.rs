@@ -20,6 +20,43 @@ pub struct Invariant {
     pub square: Id,
 }
 
+/// Friction that sticks: the most by which it decelerates, and which velocities it acts on.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Friction {
+    /// The decelerations, one for each vector, or one in all.
+    pub limit: Vec<Id>,
+    /// What each is for.
+    pub on: On,
+}
+
+/// The velocities that friction acts on.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum On {
+    /// Vectors of so many numbers each, one after the other: all of v.
+    Vectors(usize),
+    /// One number of v at that place; of the others, by how much each changes where that one changes by 1, or nothing if none does.
+    One(usize, Vec<Id>),
+}
+
+impl Friction {
+    /// Whether it is for a block of so many numbers.
+    fn fits(&self, v: usize) -> bool {
+        match &self.on {
+            On::Vectors(length) => *length > 0 && self.limit.len() * length == v,
+            On::One(at, along) => *at < v && self.limit.len() == 1 && (along.is_empty() || along.len() == v),
+        }
+    }
+
+    /// All its values.
+    fn values(&self) -> impl Iterator<Item = &Id> {
+        let along = match &self.on {
+            On::Vectors(_) => &[][..],
+            On::One(_, along) => along,
+        };
+        self.limit.iter().chain(along)
+    }
+}
+
 /// A value that is a function of others: pairs of a value and the derivative by it; and, if it is one branch of several, the bits
 /// of its bounds.
 pub(crate) type Marked = (Id, Vec<(Id, Id)>, Option<[u64; 2]>);
@@ -40,6 +77,8 @@ pub struct Equations {
     pub(crate) functions: Vec<Marked>,
     /// The mass matrix, if the rates are those of M·ẏ = f.
     pub(crate) mass: Option<Mass>,
+    /// Friction that sticks, if there is some.
+    pub(crate) friction: Option<Friction>,
     /// A digest that distinguishes it from others, computed once: traced steps are found by it.
     digest: u64,
 }
@@ -47,7 +86,8 @@ pub struct Equations {
 impl PartialEq for Equations {
     fn eq(&self, other: &Equations) -> bool {
         let parts = |e: &Equations| (e.dv.clone(), e.dy.clone(), e.quantities.clone(), e.kept.clone(), e.functions.clone());
-        self.digest == other.digest && self.ops == other.ops && parts(self) == parts(other) && self.mass == other.mass
+        let more = |e: &Equations| (e.mass.clone(), e.friction.clone());
+        self.digest == other.digest && self.ops == other.ops && parts(self) == parts(other) && more(self) == more(other)
     }
 }
 
@@ -70,7 +110,7 @@ impl Equations {
     ) -> Equations {
         let mut hasher = DefaultHasher::new();
         (&ops, &dv, &dy, &quantities, &kept).hash(&mut hasher);
-        Equations { ops, dv, dy, quantities, kept, functions: Vec::new(), mass: None, digest: hasher.finish() }
+        Equations { ops, dv, dy, quantities, kept, functions: Vec::new(), mass: None, friction: None, digest: hasher.finish() }
     }
 
     /// The same with values that are known as functions of others, for methods that need the series of a solution.
@@ -88,6 +128,15 @@ impl Equations {
         let mut hasher = DefaultHasher::new();
         (self.digest, &mass).hash(&mut hasher);
         Equations { mass: Some(mass), digest: hasher.finish(), ..self }
+    }
+
+    /// The same with friction that sticks.
+    #[must_use]
+    pub fn with_friction(self, friction: Option<Friction>) -> Equations {
+        let Some(friction) = friction else { return self };
+        let mut hasher = DefaultHasher::new();
+        (self.digest, &friction).hash(&mut hasher);
+        Equations { friction: Some(friction), digest: hasher.finish(), ..self }
     }
 
     /// The same without operations whose result is not used.
@@ -113,7 +162,15 @@ impl Equations {
         let functions = functions
             .map(|(value, by, bounds)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect(), bounds));
         let functions = functions.collect();
-        Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept).with_functions(functions).with_mass(self.mass)
+        let friction = self.friction.map(|friction| Friction {
+            limit: all(friction.limit),
+            on: match friction.on {
+                On::Vectors(length) => On::Vectors(length),
+                On::One(at, along) => On::One(at, all(along)),
+            },
+        });
+        let plain = Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept);
+        plain.with_functions(functions).with_mass(self.mass).with_friction(friction)
     }
 
     /// The quantities by name.
@@ -129,7 +186,9 @@ impl Equations {
     /// All values that are needed.
     fn roots(&self) -> impl Iterator<Item = Id> {
         let kept = self.kept.iter().flat_map(|kept| kept.along_v.iter().chain(&kept.along_y).chain([&kept.value, &kept.square]));
-        self.dv.iter().chain(self.dy.iter().flatten()).chain(self.quantities.iter().map(|(_, id)| id)).chain(kept).copied()
+        let friction = self.friction.iter().flat_map(Friction::values);
+        let quantities = self.quantities.iter().map(|(_, id)| id);
+        self.dv.iter().chain(self.dy.iter().flatten()).chain(quantities).chain(kept).chain(friction).copied()
     }
 
     /// How many operations the rates, quantities and gradients have.
@@ -219,7 +278,7 @@ impl Equations {
     }
 
     /// Whether each operation comes after what it reads, no leaf is beyond so many parameters, tables and numbers of the state,
-    /// an invariant has a derivative by each number of the blocks, and a mass matrix works with y alone.
+    /// an invariant has a derivative by each number of the blocks, a mass matrix works with y alone, and friction fits v.
     pub(crate) fn is_sound(&self, parameters: usize, tables: usize, states: usize) -> bool {
         let is_read = |(id, op): (usize, &Op)| {
             let (operands, n) = op.operands();
@@ -235,7 +294,12 @@ impl Equations {
         let whole = self.kept.as_ref().is_none_or(|kept| [kept.along_v.len(), kept.along_y.len()] == self.blocks());
         let [v, y] = self.blocks();
         let mass_fits = self.mass.as_ref().is_none_or(|mass| v == 0 && mass.fits(y));
-        whole && mass_fits && self.ops.iter().enumerate().all(is_read) && self.roots().all(|id| (id as usize) < self.ops.len())
+        let friction_fits = self.friction.as_ref().is_none_or(|friction| friction.fits(v));
+        whole
+            && mass_fits
+            && friction_fits
+            && self.ops.iter().enumerate().all(is_read)
+            && self.roots().all(|id| (id as usize) < self.ops.len())
     }
 }
 

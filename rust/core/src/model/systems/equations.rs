@@ -8,11 +8,11 @@ use crate::{
     error::Error,
     model::{
         spec::{Parameters, Signature},
-        system::{Block, Energies, Gradient, Kind, Shape, System},
+        system::{self, Block, Energies, Friction, Gradient, Kind, Shape, System},
     },
     tape::{
         Id, Op,
-        equations::Equations,
+        equations::{Equations, On},
         eval,
         mass::Mass,
         number::{Number, Symbol},
@@ -214,6 +214,17 @@ impl<N: Operand> System<N> for Own<N> {
         let kept = self.equations.kept.as_ref()?;
         let along = |roots: &[Id]| self.of_state(roots, v, y);
         Some(Gradient { v: along(&kept.along_v), y: along(&kept.along_y), square: along(&[kept.square])[0] })
+    }
+
+    fn friction(&self, t: N, v: &Block<N>, y: &Block<N>) -> Option<Friction<N>> {
+        let friction = self.equations.friction.as_ref()?;
+        let values = |roots: &[Id]| self.values(&self.equations.needed(roots), roots, t, v, y);
+        let limit = values(&friction.limit) * self.h;
+        let on = match &friction.on {
+            On::Vectors(length) => system::On::Vectors(*length),
+            On::One(at, along) => system::On::One(*at, values(along)),
+        };
+        Some(Friction { limit, on })
     }
 
     fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {

@@ -1,0 +1,413 @@
+"""Friction that sticks, of own equations: against closed forms and built-in friction, with all options, and what is refused."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.errors import ArgumentError, DTypeError, StepwellError, TraceError, UnsupportedError
+from stepwell.reference import friction as reference
+from support import own_systems as own
+
+ABLE = [method.name for method in sw.methods() if not method.needs_acceleration]
+G = 9.81
+
+
+@sw.system
+def block(t: Any, v: Any, y: Any, *, slope: Any = 0.0, mu: Any = 0.5) -> Any:
+    """On a plane, which may slope."""
+    return -G * np.sin(slope)
+
+
+@block.friction
+def sliding(t: Any, v: Any, y: Any, *, slope: Any, mu: Any) -> Any:
+    return mu * G * np.cos(slope)
+
+
+@sw.system(shape=(2,))
+def puck(t: Any, v: Any, y: Any, *, mu: Any = 0.5) -> Any:
+    """On a table."""
+    return np.zeros(2)
+
+
+@puck.friction(of="row")
+def table(t: Any, v: Any, y: Any, *, mu: Any) -> Any:
+    return mu * G
+
+
+@sw.system
+def bead(t: Any, v: Any, y: Any, *, mu: Any = 0.3, g: Any = 1.0) -> Any:
+    """On an upright hoop of radius 1, by its angle from below: it is pressed on the hoop by its weight and its turning."""
+    return -g * np.sin(y)
+
+
+@bead.friction
+def on_the_hoop(t: Any, v: Any, y: Any, *, mu: Any, g: Any) -> Any:
+    return mu * np.abs(v * v + g * np.cos(y))
+
+
+@sw.system
+def bead_while_it_rises(t: Any, v: Any, y: Any, *, mu: Any = 0.3, g: Any = 1.0) -> Any:
+    """The same while its angle grows."""
+    return -g * np.sin(y) - mu * np.abs(v * v + g * np.cos(y))
+
+
+@sw.system
+def lifted(t: Any, v: Any, y: Any) -> Any:
+    """Nothing pushes it."""
+    return np.zeros(())
+
+
+@lifted.friction
+def of_no_weight(t: Any, v: Any, y: Any) -> Any:
+    return -1.0
+
+
+# ---- closed forms
+
+
+@pytest.mark.parametrize(("method", "stop"), [("false_euler", 0.8926), ("standard_euler", 0.9426)])
+def test_a_block_stops_where_the_built_in_one_does(method: str, stop: float) -> None:
+    run = sw.integrate(block(), method, v=3.0, y=0.0, dt=1 / 60, steps=60, every=1)
+    assert round(float(run.y[-1]), 4) == stop
+    built_in = sw.Oscillator(0.0, friction=0.5 * G, form="physical")
+    same = sw.integrate(built_in, method, v=3.0, y=0.0, dt=1 / 60, steps=60, every=1)
+    np.testing.assert_array_equal(run.v, same.v)
+    np.testing.assert_array_equal(run.y, same.y)
+
+
+@pytest.mark.parametrize("method", ABLE)
+def test_a_slope_holds_a_block_up_to_its_angle_of_friction(method: str) -> None:
+    """tan slope ≤ μ holds; steeper, v = −g(sin − μ·cos)t, which every method has but for roundings, here below 1000 · 2⁻⁵²."""
+    slope = np.arctan(0.5) * np.array([-0.99, 0.99, 1.01, 1.5])
+    run = sw.integrate(block(slope=slope), method, v=np.zeros(4), y=0.0, dt=0.01, steps=100)
+    assert (run.v[-1, :2] == 0.0).all()
+    assert (run.y[-1, :2] == 0.0).all()
+    fast = -G * (np.sin(slope) - 0.5 * np.cos(slope))[2:]
+    np.testing.assert_allclose(run.v[-1, 2:], fast, rtol=1e-11)
+
+
+@pytest.mark.parametrize("method", ["false_euler", "rk4", "merson"])
+def test_a_puck_slides_straight_in_every_direction(method: str) -> None:
+    """It stops after v²/2μg, but for a way of 6lh, or by Euler's method the half step ½hv more; see test_friction."""
+    h, angles = 0.01, np.linspace(0.0, 2.0 * np.pi, 13)
+    v = 3.0 * np.stack([np.cos(angles), np.sin(angles)])
+    run = sw.integrate(puck(), method, v=v, y=np.zeros((2, 13)), dt=h, steps=100)
+    assert (run.v[-1] == 0.0).all()
+    way = np.hypot(*run.y[-1])
+    assert (abs(way - 9.0 / G) < 0.5 * h * 3.0 * (method == "false_euler") + 6 * 0.5 * G * h * h).all()
+    across = run.y[-1, 0] * np.sin(angles) - run.y[-1, 1] * np.cos(angles)
+    assert (abs(across) < 1e-14).all()
+
+
+def test_a_normal_force_may_depend_on_the_state() -> None:
+    """While the bead rises, friction is one more force; then it turns, slides back and sticks."""
+    options: dict[str, Any] = {"v": 1.5, "y": 0.0, "dt": 0.001, "every": 1}
+    run = sw.integrate(bead(), "rk4", steps=20000, **options)
+    rising = int(np.argmax(run.v <= 0.01))
+    smooth = sw.integrate(bead_while_it_rises(), "rk4", steps=rising, **options)
+    np.testing.assert_allclose(run.y[:rising], smooth.y[:rising], rtol=1e-12)
+    assert (run.v[-100:] == 0.0).all()
+    angle = float(run.y[-1])
+    assert 0.0 < abs(np.tan(angle)) <= 0.3  # within its angle of friction
+
+
+def test_a_negative_deceleration_is_none() -> None:
+    run = sw.integrate(lifted(), "rk4", v=[1.0, -1.0, 0.0], y=0.0, dt=0.125, steps=8)
+    np.testing.assert_array_equal(run.v[-1], [1.0, -1.0, 0.0])
+
+
+# ---- one number, with which others change
+
+
+def test_a_pole_swings_on_a_cart_that_sticks() -> None:
+    """θ̈ = (g/l)·sin θ of a hinge that rests; the terms of the cart cancel but for roundings."""
+    run = sw.integrate(own.cart(mu=50.0), "rk4", v=[0.0, 0.0], y=[0.5, 0.3], dt=0.01, steps=300, every=1)
+    assert (run.v[:, 0] == 0.0).all()
+    assert (run.y[:, 0] == 0.5).all()
+    pole = sw.integrate(own.pendulum(omega=np.sqrt(2.0)), "rk4", v=0.0, y=0.3 - np.pi, dt=0.01, steps=300, every=1)
+    np.testing.assert_allclose(run.y[:, 1], pole.y + np.pi, rtol=0, atol=1e-11)
+
+
+def test_without_friction_a_cart_and_its_pole_go_on() -> None:
+    """Friction of zero changes no bit but for the sign of a zero, and the energy stays; with some it only falls."""
+
+    def energy(run: Any) -> Any:
+        (x, w), angle = np.moveaxis(run.v, 1, 0), run.y[:, 1]
+        tip = 0.05 * ((x + 0.5 * np.cos(angle) * w) ** 2 + (0.5 * np.sin(angle) * w) ** 2)
+        return 0.5 * x * x + tip + 0.1 * 0.5 * np.cos(angle)
+
+    options: dict[str, Any] = {"v": [0.3, 0.0], "y": [0.0, 0.3], "dt": 0.005, "steps": 2000, "every": 1}
+    free = energy(sw.integrate(own.cart(mu=0.0), "rk4", **options))
+    assert np.ptp(free) < 1e-9
+    rubbed = energy(sw.integrate(own.cart(mu=0.02), "rk4", **options))
+    assert (np.diff(rubbed) < 1e-9).all()
+    assert rubbed[-1] < rubbed[0] - 0.01
+
+
+def test_a_number_alone_changes_no_other() -> None:
+    @sw.system
+    def two(t: Any, v: Any, y: Any) -> Any:
+        return -y
+
+    @two.friction(component=1)
+    def second(t: Any, v: Any, y: Any) -> Any:
+        return 0.4
+
+    run = sw.integrate(two(), "rk4", v=[0.0, 0.0], y=[1.0, 1.0], dt=0.01, steps=2000, every=1)
+    built_in = [
+        sw.integrate(sw.Oscillator(1.0, friction=mu), "rk4", v=0.0, y=1.0, dt=0.01, steps=2000, every=1) for mu in (0.0, 0.4)
+    ]
+    np.testing.assert_allclose(run.y, np.stack([each.y for each in built_in], axis=1), rtol=0, atol=1e-11)
+    assert (run.v[-1] != 0.0).tolist() == [True, False]
+
+
+# ---- bits, with all options
+
+
+CASES: dict[str, tuple[Callable[[Any], Any], tuple[int, ...]]] = {
+    "slope": (lambda mu: own.sloping(mu=mu), ()),
+    "pucks": (lambda mu: own.pucks(mu=mu), (3, 2)),
+    "cart": (lambda mu: own.cart(mu=mu), (2,)),
+}
+
+
+def started(name: str, members: int) -> tuple[Any, dict[str, Any]]:
+    make, shape = CASES[name]
+    rng = np.random.default_rng(7)
+    state = {each: rng.normal(size=(*shape, members)) for each in "vy"}
+    return make(np.linspace(0.0, 0.3, members)), {**state, "dt": 0.05}
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("method", ABLE)
+def test_core_and_reference_have_equal_bits(method: str, name: str) -> None:
+    system, start = started(name, 5)
+    run = sw.integrate(system, method, **start, steps=40, every=10)
+    reference = sw.integrate(system, method, **start, steps=40, every=10, backend="numpy")
+    np.testing.assert_array_equal(run.v, reference.v)
+    np.testing.assert_array_equal(run.y, reference.y)
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("options", [{}, {"fused": True}, {"dtype": "float32"}, {"fused": True, "dtype": "float32"}])
+def test_options_have_equal_bits(options: dict[str, Any], name: str) -> None:
+    """In precision, fused, on two threads, in parts, in a world."""
+    system, start = started(name, 37)
+    run = sw.integrate(system, "rk4", **start, steps=60, **options)
+    reference = sw.integrate(system, "rk4", **start, steps=60, backend="numpy", **options)
+    np.testing.assert_array_equal(run.v, reference.v)
+    threads = sw.integrate(system, "rk4", **start, steps=60, threads=2, **options)
+    np.testing.assert_array_equal(run.v, threads.v)
+    half = sw.integrate(system, "rk4", **start, steps=30, **options)
+    np.testing.assert_array_equal(run.v, sw.integrate(system, "rk4", resume=half, steps=30).v)
+    kind = options.get("dtype", "float64")
+    blocks = {each: start[each].astype(kind) for each in "vy"}
+    world = sw.World(system, "rk4", **blocks, dt=0.05, **options)
+    world.step(60)
+    np.testing.assert_array_equal(run.v[-1], world.v)
+
+
+def test_a_world_takes_another_coefficient() -> None:
+    world = sw.World(block(), "rk4", v=np.array([1.0]), y=np.zeros(1), dt=0.01)
+    world.step(100)
+    assert world.v[0] == 0.0
+    world.set(slope=0.6)  # steeper than its friction holds
+    world.step(100)
+    assert world.v[0] < -0.5
+    world.set(mu=2.0)
+    world.step(100)
+    assert world.v[0] == 0.0
+
+
+def test_a_sweep_over_the_coefficient() -> None:
+    rows = sw.sweep(lambda mu: block(mu=mu), {"mu": [0.2, 0.5, 1.0]}, "rk4", v=3.0, y=0.0, dt=0.01, steps=400)
+    np.testing.assert_allclose(rows["y_last"], 4.5 / G / np.array([0.2, 0.5, 1.0]), rtol=2e-3)
+
+
+def test_it_is_pickled_and_has_its_own_digest() -> None:
+    again = pickle.loads(pickle.dumps(own.cart(mu=0.1)))
+    options: dict[str, Any] = {"v": [0.0, 0.0], "y": [0.0, 0.3], "dt": 0.01, "steps": 50}
+    np.testing.assert_array_equal(sw.integrate(again, "rk4", **options).y, sw.integrate(own.cart(mu=0.1), "rk4", **options).y)
+
+    @sw.system
+    def plain(t: Any, v: Any, y: Any, *, slope: Any = 0.0, mu: Any = 0.5) -> Any:
+        return -G * np.sin(slope)
+
+    assert plain().digest != block().digest
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_an_exported_step_has_its_bits(name: str) -> None:
+    _, start = started(name, 1)
+    v, y = (start[each][..., 0] for each in "vy")
+    one = CASES[name][0](0.1)
+    space: dict[str, Any] = {}
+    exec(sw.export(one, "rk4", "python", v=v, y=y, dt=0.05, name="one").source, space)
+    m = space["One"]()
+    s = m.start(v.ravel().tolist(), y.ravel().tolist())
+    for _ in range(60):
+        m.step(s)
+    run = sw.integrate(one, "rk4", v=v, y=y, dt=0.05, steps=60)
+    assert (s.y, s.v) == (run.y[-1].ravel().tolist(), run.v[-1].ravel().tolist())
+
+
+# ---- what is wrong would be noticed
+
+
+class ByComponents(reference.OnVectors):
+    """Each component on its own: a puck does not go straight."""
+
+    def reduced(self, v: Any, f: Any) -> Any:
+        return reference.Separate(np.expand_dims(self.limit, self.axis)).reduced(v, f)
+
+
+class LongerVectors(reference.OnVectors):
+    """The first number alone, for the length."""
+
+    def _lengths(self, x: Any) -> Any:
+        return np.abs(np.moveaxis(x, self.axis, 0)[0])
+
+
+def test_friction_by_components_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from stepwell.reference.systems import equations
+
+    def is_right() -> bool:
+        v = np.array([1.0, 2.0])
+        run = sw.integrate(puck(), "false_euler", v=v, y=np.zeros(2), dt=0.01, steps=100, backend="numpy")
+        straight = abs(run.y[-1, 0] * v[1] - run.y[-1, 1] * v[0]) < 1e-14
+        return bool(straight and abs(np.hypot(*run.y[-1]) - 5.0 / G) < 0.02)
+
+    assert is_right()
+    for wrong in (ByComponents, LongerVectors):
+        monkeypatch.setattr(equations, "OnVectors", wrong)
+        assert not is_right()
+
+
+def test_a_pole_left_behind_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from stepwell.reference.systems import equations
+
+    def off(method: str) -> float:
+        start: dict[str, Any] = {"y": [0.5, 0.3], "dt": 0.01, "steps": 100}
+        run = sw.integrate(own.cart(mu=50.0), method, v=[0.0, 0.0], **start, backend="numpy")
+        pole = sw.integrate(own.pendulum(omega=np.sqrt(2.0)), method, v=0.0, y=0.3 - np.pi, dt=0.01, steps=100)
+        return float(abs(run.y[-1, 1] - pole.y[-1] - np.pi))
+
+    assert off("false_euler") < 1e-12
+    monkeypatch.setattr(equations, "OnOne", lambda limit, at, along: reference.OnOne(limit, at, None))
+    assert off("false_euler") > 1e-3
+
+
+# ---- refusals
+
+
+@sw.system
+def pair(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
+    return -k * y
+
+
+@pair.invariant
+def energy(v: Any, y: Any, *, k: Any) -> Any:
+    return 0.5 * v**2 + 0.5 * k * y**2
+
+
+@pair.friction
+def rubbing(t: Any, v: Any, y: Any, *, k: Any) -> Any:
+    return 0.1 * k
+
+
+def fresh(**options: Any) -> Any:
+    @sw.system
+    def bare(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
+        return -k * y
+
+    return bare.friction(**options) if options else bare.friction
+
+
+def rate() -> Any:
+    @sw.system(order=1)
+    def decay(t: Any, y: Any) -> Any:
+        return -y
+
+    return decay
+
+
+def declared(function: Callable[..., Any], v: Any = (0.0, 0.0), **options: Any) -> Callable[[], Any]:
+    def call() -> Any:
+        @sw.system(shape=np.shape(v))
+        def bare(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
+            return -k * y
+
+        bare.friction(**options)(function)
+        return sw.integrate(bare(), "rk4", v=v, y=v, dt=0.1, steps=1)
+
+    return call
+
+
+REFUSALS: dict[str, tuple[Callable[[], Any], type[StepwellError], str]] = {
+    "no velocities": (
+        lambda: rate().friction(lambda t, v, y: 1.0),
+        ArgumentError,
+        "decay: friction acts on velocities, and a system of first order has none",
+    ),
+    "twice": (lambda: pair.friction(rubbing), ArgumentError, "pair: expected one function for friction, and rubbing is declared"),
+    "no function": (lambda: fresh()(3), DTypeError, "bare: expected a function as friction, got int"),
+    "no state": (lambda: fresh()(lambda v, y: 1.0), ArgumentError, r"expected a function \(t, v, y, \*, …\), got \(v, y\)"),
+    "an unknown parameter": (
+        lambda: fresh()(lambda t, v, y, mu: 1.0),
+        ArgumentError,
+        "parameters of the system, got 'mu'. Known: k",
+    ),
+    "of what": (lambda: fresh(of="body"), ArgumentError, "of: there is no 'body'. Known: component, row"),
+    "both": (lambda: fresh(of="row", component=0), ArgumentError, "component: one number of v is no row"),
+    "no such number": (
+        declared(lambda t, v, y: 1.0, component=2),
+        TraceError,
+        r"component=2 is no number of a v of shape \(2,\)",
+    ),
+    "no rows": (declared(lambda t, v, y: 1.0, v=0.0, of="row"), TraceError, 'of="row" needs vectors along the last axis of v'),
+    "a wrong shape": (
+        declared(lambda t, v, y: np.ones(3)),
+        TraceError,
+        r"expected a deceleration of shape \(2,\), or one number, got shape \(3,\)",
+    ),
+    "three values": (declared(lambda t, v, y: (1.0, 2.0, 3.0), component=0), TraceError, "expected a deceleration, or a pair"),
+    "no value": (declared(lambda t, v, y: None), TraceError, r"expected a deceleration of shape \(2,\), got nothing"),
+    "adaptive steps": (
+        lambda: sw.integrate(pair(), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0]),
+        UnsupportedError,
+        "tolerance: .* has friction that sticks; what it does depends on the step",
+    ),
+    "a control": (
+        lambda: sw.integrate(pair(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=sw.Control("energy", 1.0)),
+        UnsupportedError,
+        "control: .* keeps an invariant of .*, from which friction takes energy for good; leave one out",
+    ),
+    "a projection": (
+        lambda: sw.integrate(pair(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=sw.Projection("energy")),
+        UnsupportedError,
+        "from which friction takes energy for good",
+    ),
+    "rates": (lambda: sw.jacobian(pair(), v=0.0, y=1.0), UnsupportedError, "rates: .* has friction that sticks"),
+    "the past": (
+        lambda: sw.integrate(pair(), "rk4", v=0.0, y=1.0, dt=-0.1, steps=1),
+        UnsupportedError,
+        "dt: a negative step needs a unique past",
+    ),
+    "an acceleration": (
+        lambda: sw.integrate(pair(), "leapfrog", v=0.0, y=1.0, dt=0.1, steps=1),
+        UnsupportedError,
+        "leapfrog needs forces that do not depend on the velocity, but .* has friction; use false_euler, or leave friction out",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_what_does_not_go_is_refused(name: str) -> None:
+    call, kind, text = REFUSALS[name]
+    with pytest.raises(kind, match=text):
+        call()
