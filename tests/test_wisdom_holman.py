@@ -240,3 +240,64 @@ def test_errors_are_those_of_rebound() -> None:
         run = sw.integrate(bodies, "wisdom_holman", v=start[0], y=start[1], dt=DT, steps=2000, every=7)
         ours = energy_error(bodies, *(sw.orbits.uncorrected(run, order=order) if order else (run.v, run.y)))
         assert low < ours / theirs < high
+
+
+# ---- close encounters
+
+
+def pair(a: Any, inclination: Any = 0.0, masses: Any = (1.0, 1e-3, 1e-3)) -> sw.orbits.Start:
+    """Two planets, the inner one at 5.2."""
+    second = {"a": a, "e": 0.1, "inclination": inclination, "node": 0.0, "argument_of_periapsis": 1.0, "mean_anomaly": 2.0}
+    first = {"a": 5.2, "e": 0.05, "inclination": 0.0, "node": 0.0, "argument_of_periapsis": 0.0, "mean_anomaly": 0.0}
+    return sw.orbits.system(masses, G=G, **{name: [first[name], second[name]] for name in first})
+
+
+def close(run: sw.Run, masses: Any) -> tuple[int, float]:
+    """The first saved state in which the planets are within three Hill radii, and their distance; by a formula of its own."""
+    apart = np.linalg.norm(run.y[:, 2] - run.y[:, 1], axis=1)
+    size = (np.linalg.norm(run.y[:, 1] - run.y[:, 0], axis=1) + np.linalg.norm(run.y[:, 2] - run.y[:, 0], axis=1)) / 2
+    radius = size * ((masses[1] + masses[2]) / (3.0 * masses[0])) ** (1 / 3)
+    k = int(np.argmax(apart < 3.0 * radius))
+    return (k, float(apart[k])) if apart[k] < 3.0 * radius[k] else (-1, math.inf)
+
+
+@pytest.mark.parametrize("masses", [(1.0, 1e-3, 1e-3), (1.0, 1e-3, 0.0)])
+def test_a_close_encounter_is_named(masses: Any) -> None:
+    """Also of a planet and a test particle, from a run that saves its end alone, and by ``run.encounters``."""
+    bodies, v, y = pair(5.6, masses=masses)
+    arguments: dict[str, Any] = {"v": v, "y": y, "dt": DT / 4.0, "steps": 1500}
+    with pytest.warns(sw.errors.AccuracyWarning, match="nearer than 3 Hill radii, and wisdom_holman does not follow") as heard:
+        run = sw.integrate(bodies, "wisdom_holman", **arguments)
+    (met,) = run.encounters
+    assert f"bodies 1 and 2 came to {met.distance:.3g} of each other in step {met.step} " in str(heard[0].message)
+    with pytest.warns(sw.errors.AccuracyWarning):
+        every = sw.integrate(bodies, "wisdom_holman", **arguments, every=1)
+    step, apart = close(every, masses)
+    assert step - 1 <= met.step <= step + 1  # between two states they may be nearer than in both
+    assert met.distance <= apart
+    assert met.bodies == (1, 2)
+
+
+@pytest.mark.filterwarnings("error")
+def test_planets_that_stay_apart_are_not_named() -> None:
+    """Orbits far apart; crossing distances on inclined orbits; massless bodies that pass each other."""
+    for bodies, v, y in (pair(9.0), pair(5.6, inclination=1.5), pair(5.6, masses=(1.0, 0.0, 0.0))):
+        run = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=DT / 4.0, steps=300, every=1)
+        near, _ = close(run, bodies.masses) if bodies.masses[1] else (-1, 0.0)
+        assert near == -1
+        assert run.encounters == ()
+
+
+def test_the_member_with_the_encounter_is_named() -> None:
+    apart, near = pair(9.0), pair(5.6)
+    v, y = (np.stack([one, other], axis=-1) for one, other in ((apart[1], near[1]), (apart[2], near[2])))
+    with pytest.warns(sw.errors.AccuracyWarning, match=r"bodies 1 and 2 of member 1 came to"):
+        run = sw.integrate(near[0], "wisdom_holman", v=v, y=y, dt=DT / 4.0, steps=1500)
+    (met,) = run.encounters
+    assert met.member == (1,)
+
+
+def test_leapfrog_says_nothing_of_hill_radii() -> None:
+    bodies, v, y = pair(5.6)
+    run = sw.integrate(bodies, "leapfrog", v=v, y=y, dt=DT / 4.0, steps=1500)
+    assert run.encounters == ()

@@ -265,6 +265,7 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: Shape
         start: its first state; None if that is not known.
         doubtful: a member whose energy is doubtful, or None.
     """
+    drifts = run.method.splits and bodies.force == "newton"
     suspects = [doubtful] if doubtful is not None else [] if start is None else _suspects(run, bodies, start)
     left = float(encounters.MAX_RERUN)
     for index in suspects:
@@ -275,6 +276,13 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: Shape
             continue  # it diverged, and that finding names the pair
         if (met := run.encounter(index, left)) is not None:
             i, j = met.bodies
+            if drifts:
+                text = (
+                    f"bodies {i} and {j}{of_member(index)} came to {met.distance:.3g} of each other in step {met.step} "
+                    f"(t = {time_of(run, met.step, index):g}), nearer than {encounters.HILL_RADII:g} Hill radii, and "
+                    f'{run.method.name} does not follow close encounters; use "dop853" with tolerance='
+                )
+                return text, _only(run, index)
             text = (
                 f"bodies {i} and {j}{of_member(index)} met within step {met.step} "
                 f"(t = {time_of(run, met.step, index):g}), {met.distance:.3g} apart, which steps of {run.dt:g} do not follow"
@@ -289,7 +297,7 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
 
     The two are taken to move alone from the start, from a saved state, or backward from the end.
     """
-    n, members, evaluations = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
+    n, evaluations = bodies.y_shape[0], run.method.evaluations * run.steps
     # Where time runs back, velocities are reversed.
     h, time, way = abs(run.dt), run.steps * abs(run.dt), 1.0 if run.dt > 0.0 else -1.0
     # As many states as are little work beside the run. From the last one time runs back.
@@ -297,6 +305,11 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
     looked = min(STATES, len(run.t) - 1, evaluations // EVALUATIONS)
     between = np.linspace(1, len(run.t) - 1, looked, endpoint=False, dtype=int).tolist() if len(run.t) > 2 else []
     states = [(way * v, y) for v, y in (start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1]))]
+    if run.method.splits and bodies.force == "newton":
+        if evaluations < FEW_EVALUATIONS or _numbers_of_pairs(run, bodies) > MOST_NUMBERS:
+            return []
+        near = [encounters.may_come_near(bodies, np.broadcast_to(v, y.shape), y) for v, y in states]
+        return [tuple(index) for index in np.argwhere(np.logical_or.reduce(near)).tolist()]
     if few:
         if evaluations < FEW_EVALUATIONS:
             return []
@@ -305,13 +318,18 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
             if any(encounters.may_meet(bodies, h, time, *(_lists(block, bodies.y_shape) for block in state)) for state in states)
             else []
         )
-    numbers = members * (n + 2 * bodies.pair_count)
+    numbers = _numbers_of_pairs(run, bodies)
     if evaluations < EVALUATIONS or evaluations * numbers < 2 * PAIRS or numbers > MOST_NUMBERS:
         return []
     may = np.zeros(run.status.shape, dtype=bool)
     for v, y in (states[0], states[-1]):
         may |= encounters.may_meet_each(bodies, h, time, np.broadcast_to(v, y.shape), y)
     return [tuple(index) for index in np.argwhere(may).tolist()]
+
+
+def _numbers_of_pairs(run: Run, bodies: NBody) -> int:
+    """How many numbers a search among all pairs of all members works on."""
+    return run.status.size * (bodies.y_shape[0] + 2 * bodies.pair_count)
 
 
 def _of_energy(method: str, ends: Ends) -> tuple[str, Any, Shape] | None:
@@ -392,7 +410,7 @@ def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
     evaluations = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
     if run.status.ndim == 0 and n <= FEW_BODIES:
         return _of_few(bodies, start, end) if evaluations >= FEW_EVALUATIONS else None
-    numbers = members * (n + 2 * bodies.pair_count)
+    numbers = _numbers_of_pairs(run, bodies)
     if evaluations < EVALUATIONS or evaluations * numbers < 2 * PAIRS or prod(end[1].shape) > MOST_NUMBERS or not members:
         return None
     start = np.broadcast_to(start[0], end[0].shape), start[1]  # one number may have been given for all

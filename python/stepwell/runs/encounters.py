@@ -23,6 +23,11 @@ from . import engine
 #: Encounters that turn a pair by less than this, in radians, do not count.
 WEAK = 0.01
 
+#: Planets nearer to each other than so many of their Hill radii move each other about as much as their orbits allow: a method
+#: that kicks them once a step off Kepler's orbits does not follow that, and Mercurius and TRACE change their method about there
+#: (Rein et al. 2019; Lu, Hernandez, Rein 2024).
+HILL_RADII = 3.0
+
 #: A warning names the bodies that collided or passed each other if repeating the member's run takes at most this many steps ×
 #: numbers, which is a moment. Otherwise ``Run.collisions`` and ``Run.encounters`` find them.
 MAX_RERUN = 10_000_000
@@ -105,6 +110,59 @@ def met_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], flo
     return step + 1, (int(first[pair]), int(second[pair])), float(math.sqrt(q2[step, pair]))
 
 
+def near_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], float] | None:
+    """The first step in which two bodies of one member, neither of which is the first, came within HILL_RADII of each other.
+
+    Args and result as of ``met_in``.
+    """
+    planets = [pair for pair in zip(*bodies.pairs(), strict=True) if 0 not in pair]
+    if not planets:
+        return None
+    first, second = np.array(planets).T
+    with np.errstate(all="ignore"):
+        d = y[:, second] - y[:, first]
+        before, moved = d[:-1], d[1:] - d[:-1]
+        share = np.clip(-(before * moved).sum(axis=-1) / (moved * moved).sum(axis=-1), 0.0, 1.0)
+        nearest = before + np.nan_to_num(share)[..., np.newaxis] * moved
+        distance = np.sqrt((nearest * nearest).sum(axis=-1))
+        place = np.sqrt(((y[1:, 1:] - y[1:, :1]) ** 2).sum(axis=-1))
+        size = 0.5 * (place[:, first - 1] + place[:, second - 1])
+        near = np.argwhere(distance < HILL_RADII * size * _hill(bodies.masses, first, second))
+    if not len(near):
+        return None
+    step, pair = near[0].tolist()
+    return step + 1, (int(first[pair]), int(second[pair])), float(distance[step, pair])
+
+
+def _hill(masses: Array, i: Any, j: Any) -> Any:
+    """The Hill radius of two bodies that move around the first one, by their distance from it."""
+    return np.cbrt((masses[i] + masses[j]) / (3.0 * masses[0]))
+
+
+def may_come_near(bodies: NBody, v: Array, y: Array) -> Any:
+    """Whether the orbits of two bodies around the first one reach places within HILL_RADII of each other.
+
+    Truths for every member; blocks have the shape (bodies, dim, *batch). Only the least and the largest distance from the first
+    body are compared, so orbits that are apart by their inclination or their resonance count, too.
+    """
+    planets = [pair for pair in zip(*bodies.pairs(), strict=True) if 0 not in pair]
+    batch = y.shape[2:]
+    if not planets:
+        return np.zeros(batch, dtype=bool)
+    i, j = np.array(planets).T
+    masses = np.broadcast_to(aligned(bodies.masses, 1, batch), (len(y), *batch))
+    with np.errstate(all="ignore"):
+        d, w = y - y[0], v - v[0]
+        attraction = bodies.G * (masses + masses[0])
+        r2, w2, along = ((a * b).sum(axis=1) for a, b in ((d, d), (w, w), (d, w)))
+        parameter = (r2 * w2 - along * along) / attraction  # p of the ellipse
+        e = np.sqrt(np.maximum(0.0, 1.0 + parameter * (w2 - 2.0 * attraction / np.sqrt(r2)) / attraction))
+        least, most = parameter / (1.0 + e), np.where(e < 1.0, parameter / (1.0 - e), np.inf)
+        inner, outer = np.minimum(most[i], most[j]), np.maximum(least[i], least[j])
+        hill = _hill(masses, i, j) * np.where(np.isfinite(inner), 0.5 * (inner + outer), outer)
+        return (outer - inner < HILL_RADII * hill).any(axis=0)
+
+
 def pieces(plan: engine.Plan, bodies: NBody, v: Array, y: Array, carried: bool, steps: int) -> Iterator[tuple[int, Array, Array]]:
     """All states of a run of one member, made again some at once: the number of earlier steps, velocities and coordinates."""
     length = max(16, NUMBERS_AT_ONCE // (y.size + 2 * bodies.pair_count * y.shape[1]))
@@ -123,14 +181,18 @@ def pieces(plan: engine.Plan, bodies: NBody, v: Array, y: Array, carried: bool, 
 def of_member(
     plan: engine.Plan, v: Array, y: Array, carried: bool, steps: int, index: tuple[int, ...], bound: float = math.inf
 ) -> Encounter | None:
-    """The first encounter of one member within ``steps``, searched for at most ``bound`` steps × numbers."""
+    """The first encounter of one member within ``steps``, searched for at most ``bound`` steps × numbers.
+
+    For a method that moves bodies along Kepler's orbits it is the first approach to HILL_RADII.
+    """
     assert isinstance(plan.system, NBody)
+    search = near_in if plan.method.splits and plan.system.force == "newton" else met_in
     bodies = plan.system.member(index, plan.batch)
     v, y = checks.member(v, index), checks.member(y, index)
     begin = y
     for done, _, states in pieces(plan, bodies, v, y, carried, steps):
         # Each step is searched with the one before it.
-        if (met := met_in(bodies, np.concatenate([begin[np.newaxis], states]), plan.dt)) is not None:
+        if (met := search(bodies, np.concatenate([begin[np.newaxis], states]), plan.dt)) is not None:
             step, pair, distance = met
             return Encounter(index, plan.first + done + step - 1, pair, distance)
         begin = states[-2]

@@ -286,8 +286,10 @@ class Run(ValueEquality):
 
         In such a step the line from one body to the other turns by more than a right angle, or they move past each other by more
         than twice the distance at which they begin or end. So it did not follow the motion, whatever the energy says.
-        Encounters that turn the bodies themselves by less than 0.01 rad are left out. They are found by repeating the run with
-        all of its states, which takes some times as long as it took before.
+        Encounters that turn the bodies themselves by less than 0.01 rad are left out. With ``wisdom_holman`` it is the first step
+        in which two bodies around the first one came within three of their Hill radii, where kicks do not follow them.
+
+        They are found by repeating the run with all of its states, which takes some times as long as it took before.
 
         Raises:
             UnsupportedError: if the system has no bodies, or the run has a tolerance, which chooses steps that follow encounters.
