@@ -17,6 +17,9 @@ from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
 from stepwell.runs.options import Options
 from stepwell.runs.request import Request
+from support.abroad import Journey, run
+from support.export import assert_same as assert_same_bits
+from support.export import languages
 from support.graphs import assert_one_graph
 from test_own_methods import adams_bashforth_2
 
@@ -72,6 +75,11 @@ def loop(period: int = 10, delay: int = 0, *, gain: Any = GAINS, system: Any = N
 def loop_of_two(period: int, delay: int) -> sw.System:
     """One whose controller sets two parameters and has a state of three numbers, for steps of 0.05."""
     return driven().surrounded(several(sets=("u", "w"), gain=GAINS, period=0.05 * period, delay=0.05 * delay))
+
+
+def linear_loop() -> Any:
+    plant = sw.LinearSystem([[-1.0, 0.5], [0.0, -2.0]], [[1.0], [1.0]], [[1.0, 0.0]], x=0.0, velocities=0)
+    return plant.surrounded(proportional(sets="x", period=0.1))
 
 
 def by_hand(period: int, delay: int, steps: int) -> Any:
@@ -379,13 +387,52 @@ def test_its_period_is_found_by_the_nearest_whole_number_of_steps() -> None:
     assert part.over_steps(-0.1).timing == Timing(3, 2, 1)
 
 
+def exported(language: str) -> list[Journey]:
+    """One whose results wait, two that set several parameters, with parameters that the code changes, a series, and float32."""
+    start = {"v": STATE["v"], "y": STATE["y"], "dt": 0.05, "member": 1, "steps": 23}
+    every = [
+        Journey(loop(10, 13), "rk4", np.zeros(3), np.zeros(3), dt=0.01, member=2, steps=41),
+        Journey(loop_of_two(4, 0), "rk4", **start),
+        Journey(loop_of_two(4, 7), "rodas4", **start),
+        Journey(loop_of_two(4, 4), "taylor", **start),
+        Journey(sw.Oscillator(2.0, x=0.0).surrounded(clock(sets="x", period=0.04)), "merson", 0.5, 1.0, dt=0.01, steps=23),
+        Journey(
+            loop(10, 13, gain=1.0),
+            "rk4",
+            0.0,
+            0.0,
+            dt=0.01,
+            steps=41,
+            changed={"controller_gain": 2.0},
+            twin=loop(10, 13, gain=2.0),
+        ),
+        Journey(loop(10, 13), "rk4", np.zeros(3), np.zeros(3), dt=0.01, member=2, steps=41, options={"dtype": "float32"}),
+    ]
+    if language != "javascript":
+        every.append(Journey(loop_of_two(4, 7), "rk4", **start, options={"fused": True}))
+    return every
+
+
+@languages
+def test_every_bit_of_an_exported_loop(language: str, tmp_path: Any) -> None:
+    every = exported(language)
+    assert_same_bits(every, run(language, every, tmp_path))
+
+
+def test_an_exported_controller_computes_at_samples_only() -> None:
+    text = sw.export(loop(10, 13, gain=1.0), "rk4", "python").source
+    before, within = text.partition("        if a1:\n")[::2]
+    assert "controller_gain * a2" not in before
+    assert "            a3 = memory_1 + (self.controller_gain * a2 - 1.5 * v)\n" in within
+
+
 WRONG: list[tuple[Any, type[StepwellError], str]] = [
     (lambda: sw.controller(3), DTypeError, "expected a Python function"),
     (lambda: sw.controller(limited), DTypeError, "limited is a controller already"),
     (lambda: sw.controller(lambda y, t: y), ArgumentError, r"expected a function \(t, v, y"),
     (lambda: sw.controller(lambda t, v, y, x: y), ArgumentError, "both with defaults"),
     (lambda: sw.controller(lambda t, v, y, *x: y), ArgumentError, "both with defaults"),
-    (lambda: sw.controller(lambda t, v, y, *, period=1.0: y), ArgumentError, "period is an argument of the call already"),
+    (lambda: sw.controller(lambda t, v, y, *, period=1.0: y), ArgumentError, "period has a meaning already"),
     (lambda: sw.controller(lambda t, v, y, x="a": y), DTypeError, "default of x"),
     (lambda: limited(period=0.1, speed=1.0), UnknownNameError, "there is no parameter 'speed'. Known: gain, total"),
     (lambda: limited(period=0.0), ArgumentError, "period: expected .* above zero"),
@@ -445,7 +492,22 @@ WRONG: list[tuple[Any, type[StepwellError], str]] = [
     (lambda: sw.analyse(loop(), "rk4", dt=0.01), UnsupportedError, "sampled controller"),
     (lambda: sw.jacobian(loop(), v=0.0, y=0.0), UnsupportedError, "sampled controller"),
     (lambda: sw.lyapunov(loop(), "rk4", v=0.0, y=0.0, dt=0.01, steps=10), UnsupportedError, "sampled controller"),
-    (lambda: sw.export(loop(), "rk4", "c"), UnsupportedError, "sampled controller"),
+    (lambda: sw.export(loop(), adams_bashforth_2, "c"), UnsupportedError, "goes on from more than v and y"),
+    (
+        lambda: sw.export(loop(), "rk4", "c", dt=0.3),
+        ArgumentError,
+        "period: expected a whole number of steps, got 0.1 with dt = 0.3",
+    ),
+    (lambda: sw.discretise(linear_loop(), 0.1), UnsupportedError, "sampled controller"),
+    (lambda: sw.sampled_loop(linear_loop(), 0.8, 0.1), UnsupportedError, "sampled controller"),
+    (lambda: sw.LinearSystem.of(linear_loop()), UnsupportedError, "sampled controller"),
+    (lambda: sw.frequency_response(linear_loop(), 1.0), UnsupportedError, "sampled controller"),
+    (lambda: sw.margins(linear_loop()), UnsupportedError, "sampled controller"),
+    (lambda: 2.0 * linear_loop(), UnsupportedError, "sampled controller"),
+    (lambda: linear_loop() * linear_loop(), UnsupportedError, "sampled controller"),
+    (lambda: linear_loop().with_inputs(None), UnsupportedError, "sampled controller"),
+    (lambda: sw.charts.bode(linear_loop(), ["rk4"], dt=0.1), UnsupportedError, "sampled controller"),
+    (lambda: sw.equilibria(loop(gain=1.0), near=(0.0, 0.0)), UnsupportedError, "sampled controller"),
     (lambda: sw.explain(loop(), "rk4"), UnsupportedError, "sampled controller"),
     (lambda: run_of(mass().surrounded(bad_count(period=0.1))), TraceError, "expected u of one number, got shape"),
     (lambda: run_of(mass().surrounded(bad_shape(period=0.1))), TraceError, "expected u of one number"),

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 OFF_STEPS = 1e-7
 #: The most steps of a period or a delay, and the most samples that results wait.
 MOST_STEPS, MOST_WAITING = 1 << 24, 1000
-#: The names of arguments of ``ControllerDefinition``, which no parameter can have.
-RESERVED = ("sets", "period", "delay")
+#: The names of arguments of ``ControllerDefinition`` and of its timing, which no parameter can have.
+RESERVED = ("sets", "period", "delay", "last", "later")
 #: The name of what a controller computes, for the core.
 CONTROLLER = "controller()"
 
@@ -181,7 +181,7 @@ def _arguments(function: FunctionType) -> tuple[bool, dict[str, Any], dict[str, 
         if each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD) or each.default is each.empty:
             raise ArgumentError(got)
         if each.name in RESERVED:
-            raise ArgumentError(f"{function.__name__}: {each.name} is an argument of the call already; take another name")
+            raise ArgumentError(f"{function.__name__}: {each.name} has a meaning already; take another name")
         numbers = checks.numbers(f"{function.__name__}: default of {each.name}", each.default)
         kind = parameters if each.kind is each.KEYWORD_ONLY else memory
         kind[each.name] = frozen(each.name, numbers) if numbers.ndim else each.default
@@ -295,13 +295,15 @@ class Controller(Part):
             )
 
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
-        """Its parameters."""
+        """Its parameters, and its timing once that is known."""
         own = self.definition.parameters
-        return {f"controller.{name}": aligned(self.values[name], self._own(name), batch) for name in own}
+        values = {f"controller.{name}": aligned(self.values[name], self._own(name), batch) for name in own}
+        return values if self.timing is None else values | self._in_steps()
 
     def own_axes(self, name: str) -> int:
         """The axes of its own of a parameter."""
-        return self._own(name.removeprefix("controller."))
+        name = name.removeprefix("controller.")
+        return 0 if name in RESERVED else self._own(name)
 
     def with_values(self, values: dict[str, Any]) -> Controller:
         """This controller with other numbers for some parameters."""
@@ -345,16 +347,17 @@ class Controller(Part):
             raise UnsupportedError(f"{self!r}: its period is a number of steps, and there is no step yet; give dt=")
         return self.timing
 
-    def loop(self, system: System, parameters: dict[str, Any], timing: dict[str, Any]) -> Loop:
+    def loop(self, system: System, parameters: dict[str, Any]) -> Loop:
         """The controller in the loop of the reference, with numbers or symbols for its parameters and its timing."""
         own = {name.removeprefix("controller."): value for name, value in parameters.items()}
+        last, later = (own.pop(name, None) for name in ("last", "later"))
 
         def control(t: Any, v: Any, y: Any, state: list[Any]) -> tuple[list[Any], list[Any]]:
             made = self._run(system, t, v, y, state, own)
             return made[:number], made[number:]
 
         number, known = self._counts(system)[0], self._timing()
-        last, later = (timing.get(f"controller.{each}") for each in ("last", "later"))
+        last, later = (each if each is None else np.asarray(each)[()] for each in (last, later))
         return Loop(control, number, known.waiting, last, later)
 
     def put(self, system: System, parameters: dict[str, Any], numbers: list[Any]) -> dict[str, Any]:
@@ -365,7 +368,7 @@ class Controller(Part):
             del rest[: prod(each.shape)]
         return parameters
 
-    def in_steps(self) -> dict[str, Array]:
+    def _in_steps(self) -> dict[str, Array]:
         """Its timing, as parameters."""
         steps, _, later = self._timing()
         return {"controller.last": np.asarray(steps - 1.0)} | ({"controller.later": np.asarray(float(later))} if later else {})
@@ -379,11 +382,10 @@ class Controller(Part):
                 f"{self.definition.name}: expected the same operations at every call, got others: a function of a step may not "
                 f"draw random numbers or count its calls"
             )
-        rows: list[tuple[str, Any]] = [(name, value.reshape(1, 1)) for name, value in self.in_steps().items()]
         sets = ",".join(each.row for each in self.targets(system))
         quantities = [(str(i), each) for i, each in enumerate(made[0])]
         more = [("controller.sets", sets), ("controller.waiting", timing.waiting)]
-        return [*rows, *more, (CONTROLLER, tape.equations([], [], quantities))]
+        return [*more, (CONTROLLER, tape.equations([], [], quantities))]
 
     def digest(self, system: System) -> str:
         """A hash of its operations, by which a saved run recognises it."""

@@ -118,8 +118,7 @@ class Tracer:
         """
         own, parts, controller = self._own(), self._parts(), self.system.controller
         of_part = next(parameters for part, parameters in parts if part is controller)
-        timing = {name: self._numbers(numbers, 0) for name, numbers in controller.in_steps().items()}
-        loop = controller.loop(self.system, of_part, {name: numbers[()] for name, numbers in timing.items()})
+        loop = controller.loop(self.system, of_part)
         out, remembered = loop.step(*state, memory) if state else (loop.held(memory), memory)
         return wrapped(self.system.reference(h, **controller.put(self.system, own, out)), h, parts), remembered
 

@@ -505,6 +505,9 @@ class Request(NamedTuple):
             system = system.stepped_by(method)
         stepped = system if options.dt is None else system.over_steps(method, t0, dt)
         plan = engine.Plan(stepped, method, batch, dt, t0, choice=choice, fused=fused, form=form, force=force, single=single)
+        if stepped.controller is not None:
+            goes_with_a_controller(stepped, method)
+            plan = plan._replace(memory=_memory(stepped, batch, None))
         first = np.arange(1.0, 1.0 + prod(system.y_shape)).reshape(system.y_shape)
         v = spread(np.zeros(system.v_shape), system.v_shape, batch) if v is None else v
         return cls(plan, system, v, spread(first, system.y_shape, batch) if y is None else y)

@@ -202,11 +202,17 @@ class System(Immutable, ValueEquality, ABC):
                 f"is another one at each sample. What is asked for is that of a map from one state to the next"
             )
 
+    def out_of_the_loop(self) -> Self:
+        """This system without its sampled controller."""
+        if self.controller is None:
+            return self
+        return changed(self, **self.operations(), around=tuple(part for part in self.around if part.kind != "controller"))
+
     def looped(self, h: float, batch: Shape, force: Array | None = None) -> tuple[Loop, Callable[[list[Array]], Any]]:
         """The controller in the loop of the reference, and a function from what it sets to what ``scaled`` returns."""
         parts = self.parts(batch, force)
         own = next(parameters for part, parameters in parts if part.kind == "controller")
-        loop = self.controller.loop(self, own, self.controller.in_steps())
+        loop = self.controller.loop(self, own)
 
         def scaled(numbers: list[Array]) -> Any:
             return wrapped(self.reference(h, **self.controller.put(self, self.own_parameters(batch), numbers)), h, parts)

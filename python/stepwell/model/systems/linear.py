@@ -132,6 +132,7 @@ class LinearSystem(System):
                    [ 1. ,  0. ]])
         """
         if isinstance(system, LinearSystem) and x is None and velocities is None:
+            system.not_in_a_loop("system")
             return system
         part = part_of("system", system, of_states=True)
         has = bool(part.inputs)
@@ -142,6 +143,7 @@ class LinearSystem(System):
 
     def with_inputs(self, x: Any) -> LinearSystem:
         """The system with other inputs x, as for ``LinearSystem``; None for none."""
+        self.not_in_a_loop("x")
         return LinearSystem(self.A, self.B, self.C, self.D, x=x, velocities=self.velocities)
 
     #: So that an array of NumPy times a system is a system with that gain, and not an array of systems.
@@ -317,6 +319,7 @@ def realised(system: LinearSystem, argument: str = "system", *, of_states: bool 
     """
     from .realisation import Realisation
 
+    system.not_in_a_loop(argument)
     n, C = len(system.A), system.C
     if system.B is None or (C is None and not of_states):
         missing = " and ".join(name for name, each in (("inputs (B)", system.B), ("outputs (C)", C)) if each is None)

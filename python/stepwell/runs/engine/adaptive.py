@@ -287,7 +287,7 @@ def evaluations(method: Method, system: System, *, order: int = 0, paced: bool =
     """
     if method.has_series:
         batch = system.batch if system.control is None else np.broadcast_shapes(system.batch, system.control.batch)
-        plan = Plan(system, method, batch, 1.0, order=order)
+        plan = Plan(system.out_of_the_loop(), method, batch, 1.0, order=order)
         return _core.series_evaluations(model(plan.of_core()), attempts=paced)
     return method.attempt_evaluations if paced else method.evaluations
 

@@ -98,7 +98,6 @@ def export(
     """
     method, system = find_method(method), a_system(system)
     one_state("export", method)
-    system.not_in_a_loop("export")
     kind = LANGUAGES[checks.known("language", language, tuple(LANGUAGES))]
     fused, single = checks.flag("fused", fused), checks.is_single(dtype)
     if fused and kind.fma is None:

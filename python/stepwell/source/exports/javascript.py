@@ -181,6 +181,8 @@ console.log(s.$shown[0]);"""
             lines.append(f"if ({of}.length !== {n}) throw new RangeError(`{of}: expected {numbers}, got ${{{of}.length}}`);")
         lines.append("const s = { step: 0 };")
         lines += ["s.tally = 0; // what the control has added up"] * bool(w.evaluations)
+        remembered = f"s.memory = {self.array_type}.from([{', '.join(w.memory)}]); // what the controller remembers"
+        lines += [remembered] * bool(w.memory)
         for name, of, n in w.blocks:
             array = f"new {self.array_type}({n})" if name == carried else f"{self.array_type}.from({of})"
             lines.append(f"s.{name} = {array};")

@@ -199,6 +199,7 @@ print(s.$shown[0])"""
         arguments = ", ".join(name for name, _, _ in w.blocks)
         lines = ["self.step = 0  # k; the time is t0 + k*dt", *(f"self.{name} = {name}" for name, _, _ in w.blocks)]
         lines += [f"self.tally = {self.literal(0.0)}  # what the control has added up"] * bool(w.evaluations)
+        lines += [f"self.memory = [{', '.join(w.memory)}]  # what the controller remembers"] * bool(w.memory)
         return [f"def __init__(self, {arguments}):", *indented(lines)]
 
     def _create(self, w: Written) -> list[str]:

@@ -152,6 +152,8 @@ fn main() {
         lines += ["}", "", "/// A state.", "#[allow(dead_code)]", "#[derive(Clone, Debug)]", f"pub struct {p}State {{"]
         lines += [f"    pub {name}: [{number}; {n}]," for name, _, n in w.blocks]
         lines += ["    /// What the control has added up.", f"    pub tally: {number},"] * bool(w.evaluations)
+        remembers = ["    /// What the controller remembers.", f"    pub memory: [{number}; {len(w.memory)}],"]
+        lines += remembers * bool(w.memory)
         return [*lines, "    /// k; the time is t0 + k*dt.", "    pub step: u64,", "}"]
 
     def _create(self, w: Written) -> list[str]:
@@ -165,7 +167,8 @@ fn main() {
     def _initial(self, w: Written) -> list[str]:
         carried = w.slot if "start" in w.functions else ""
         fields = [f"{name}: [0.0; {n}]" if name == carried else f"{name}: {of}" for name, of, n in w.blocks]
-        fields += ["tally: 0.0"] * bool(w.evaluations) + ["step: 0"]
+        fields += ["tally: 0.0"] * bool(w.evaluations)
+        fields += [f"memory: [{', '.join(w.memory)}]"] * bool(w.memory) + ["step: 0"]
         state = f"{camel(self.prefix)}State {{ {', '.join(fields)} }}"
         return [f"let mut s = {state};"] if carried else [state]
 

@@ -212,7 +212,7 @@ class Skeleton(Language, ABC):
         return self._with_head(w, "start", [*lines, *self._returned(w, "start")])
 
     def _step(self, w: Written) -> list[str]:
-        of = {name: f"{self.state}{name}" for name in (w.slot, "y", "tally")}
+        of = {name: f"{self.state}{name}" for name in (w.slot, "y", "tally", "memory")}
         return self._with_head(w, "step", [*self._body(w.functions["step"], of, of), f"{self.state}step += 1{self.end}"])
 
     def _finish(self, w: Written) -> list[str]:

@@ -148,6 +148,7 @@ class Traced:
         numbers: the name and the value of each parameter, in the tape's order.
         tables: the sampled inputs.
         force: the numbers of a force from outside; empty without one.
+        memory: what a sampled controller remembers at the start; empty without one.
         count: the number of arithmetic operations of a step, including those before the steps.
     """
 
@@ -181,6 +182,7 @@ class Traced:
         numbers = [float(kind(own(value))) for value in of_step.numbers]
         self.numbers = list(zip(names, numbers, strict=False))
         self.force = numbers[len(names) :]
+        self.memory = [] if plan.memory is None else [float(kind(own(row))) for row in plan.memory]
         samples: list[Held] = of_step.tables
         self.tables = [
             Table(name, [float(each) for each in own(table.values, 1)], float(table.interval), float(table.start))
@@ -204,6 +206,8 @@ class Traced:
         results = elements(f"{after}'", v_shape)
         if which == "step":
             results += elements("y'", plan.system.y_shape)
+            memory = (plan.memory_numbers,) if plan.system.controller is not None else (0,)
+            inputs, results = inputs + elements(MEMORY, memory), results + elements(f"{MEMORY}'", memory)
             if plan.system.control is not None:
                 inputs, results = [*inputs, TALLY], [*results, f"{TALLY}'"]
         return Part(tape, names, self.operations.add(operations, roots), inputs, results), tracer
@@ -217,6 +221,10 @@ def about(plan: engine.Plan) -> int:
 
 #: The sum that a control or a projection accumulates.
 TALLY = "tally"
+
+
+#: What a sampled controller remembers.
+MEMORY = "memory"
 
 
 def elements(name: str, shape: Shape) -> list[str]:

@@ -20,7 +20,7 @@ from .loops import Writer as LoopWriter
 from .names import Field, Names, fields
 from .program import FORCE, Assignment, Function, Loop, Place, Statement, Table, texts
 from .statements import Statements
-from .tapes import MAX_OPERATIONS, STATE, STEP, TALLY, Operations, Part, Traced, elements, too_long
+from .tapes import MAX_OPERATIONS, MEMORY, STATE, STEP, TALLY, Operations, Part, Traced, elements, too_long
 
 #: Names that are taken in a function: its arguments and the time.
 LOCALS = ("m", "s", "t", "self", "coordinates", "velocities", FORCE)
@@ -89,6 +89,11 @@ class Written:
             return
         self.hoisted, known = self._prepared(operations, hoisted)
         self.functions = {name: self._function(part, operations, hoisted, known) for name, part in traced.parts.items()}
+
+    @property
+    def memory(self) -> list[str]:
+        """What a sampled controller remembers at the start; empty without one."""
+        return [self.language.signed(x) for x in self.traced.memory]
 
     @property
     def carries(self) -> bool:
@@ -182,7 +187,7 @@ class Written:
             if name != "state":
                 return before(line)
             block = part.inputs[extra].partition("[")[0]
-            return f"@{block}", -1 if block == TALLY else extra if extra < self.n_v else extra - self.n_v
+            return f"@{block}", self._at(block, extra)
 
         inner = [line for line in operations.needed(hoisted, lambda line: False) if operations.all[line][1]]
         try:
@@ -204,6 +209,11 @@ class Written:
             raise too_long(self.traced.plan, str(self.traced.count), MAX_OPERATIONS) from None
         self.places = {name: places for places, name in loops.tables.items()}
         return functions
+
+    def _at(self, block: str, number: int) -> int:
+        """The place in a block of a number of the state; −1 of the sum of a control, which is one number."""
+        before = {TALLY: number + 1, MEMORY: self.n_v + self.n_y, "y": self.n_v}
+        return number - before.get(block, 0)
 
     def _loops(
         self,
@@ -228,7 +238,7 @@ class Written:
         to: list[LoopPlace] = []
         for i, name in enumerate(part.results):
             block = name.partition("'")[0]
-            to.append((f"#{block}", -1 if block == TALLY else i if i < self.n_v else i - self.n_v))
+            to.append((f"#{block}", self._at(block, i)))
         lines = [*body.loops, *loops.moved([body.places[i] for i in own], aside), *loops.moved(values, to)]
         needs_time = any(re.search(r"\bt\b", text) for text in texts(lines))
         return Function([], needs_time, [], list(lines), [], body.size + len(own))
@@ -242,8 +252,7 @@ class Written:
         def place(names: list[str], i: int) -> Place:
             """The place of a number of the state; the sum of a control comes last."""
             block = names[i].partition("[")[0].rstrip("'")
-            at = -1 if block == TALLY else i if i < self.n_v else i - self.n_v
-            return Place(block, at, language.names(names[i]))
+            return Place(block, self._at(block, i), language.names(names[i]))
 
         def state(i: int) -> Leaf:
             reads[i] = place(part.inputs, i)
