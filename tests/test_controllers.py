@@ -387,6 +387,45 @@ def test_its_period_is_found_by_the_nearest_whole_number_of_steps() -> None:
     assert part.over_steps(-0.1).timing == Timing(3, 2, 1)
 
 
+@pytest.mark.parametrize("samples", [0, 1, 3])
+@pytest.mark.parametrize("dt", [0.1, 0.2, 0.3])
+def test_near_a_state_it_is_the_loop_of_samples(dt: float, samples: int) -> None:
+    plant = sw.LinearSystem([[-0.4, 0.0], [1.0, 0.0]], [[4.0], [0.0]], [[0.0, 1.0]], x=0.0)
+    system = plant.surrounded(proportional(sets="x", period=dt, delay=samples * dt))
+    for steps in (1, 5):
+        near = sw.linearised_loop(system, "taylor", dt=dt / steps, y=np.zeros(2))
+        true = sw.sampled_loop(plant, 0.8, dt, samples=samples)
+        assert near.radius == pytest.approx(true.radius, rel=1e-11)
+        assert near.period == pytest.approx(dt)
+
+
+@pytest.mark.parametrize(("gain", "grows"), [(10.0, False), (14.0, False), (15.5, True), (20.0, True)])
+def test_a_loop_grows_where_its_radius_is_above_one(gain: float, grows: bool) -> None:
+    """From both sides, by a controller with a delay between samples and a state; at rest it does not saturate."""
+    system = mass().surrounded(limited(gain=gain, period=0.12, delay=0.06))
+    near = sw.linearised_loop(system, "rk4", dt=0.02, v=0.0, y=1.0)
+    run = sw.integrate(system, "rk4", v=0.0, y=1.0 + 1e-8, dt=0.02, steps=6 * 400, every=6)
+    size = np.abs(run.y - 1.0)
+    assert bool(near.radius > 1.0) is grows
+    assert bool(size[300:].max() > size[:100].max()) is grows
+
+
+def test_the_derivative_over_a_period_is_that_of_runs() -> None:
+    """By differences, of all that is remembered, for each member, for an explicit and an implicit method."""
+    for method in ("rk4", "rodas4"):
+        system, start = loop_of_two(4, 7), {"v": STATE["v"], "y": STATE["y"]}
+        near = sw.linearised_loop(system, method, dt=0.05, **start)
+        assert near.P.shape == (4 + 3 + 6 + 3, 4 + 3 + 6 + 3, 3)
+        for i, name in enumerate(("v", "v", "y", "y")):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = {key: block.copy() for key, block in start.items()}
+                moved[name][i % 2] += sign * 1e-5
+                run = sw.integrate(system, method, **moved, dt=0.05, steps=4)
+                ends.append(np.concatenate([run.v[-1], run.y[-1], run.carry[3:]]))
+            np.testing.assert_allclose(near.P[:, i], (ends[0] - ends[1]) / 2e-5, rtol=1e-7, atol=1e-9)
+
+
 def exported(language: str) -> list[Journey]:
     """One whose results wait, two that set several parameters, with parameters that the code changes, a series, and float32."""
     start = {"v": STATE["v"], "y": STATE["y"], "dt": 0.05, "member": 1, "steps": 23}
@@ -498,6 +537,10 @@ WRONG: list[tuple[Any, type[StepwellError], str]] = [
         ArgumentError,
         "period: expected a whole number of steps, got 0.1 with dt = 0.3",
     ),
+    (lambda: sw.linearised_loop(mass(), "rk4", dt=0.01, v=0.0, y=0.0), ArgumentError, "a sampled controller around it"),
+    (lambda: sw.linearised_loop(loop(), adams_bashforth_2, dt=0.01, v=0.0, y=0.0), UnsupportedError, "more than v and y"),
+    (lambda: sw.linearised_loop(loop(), "rk4", dt=0.03, v=0.0, y=0.0), ArgumentError, "period: expected a whole number"),
+    (lambda: sw.linearised_loop(loop(), "rk4", dt=1e-7, v=0.0, y=0.0), ArgumentError, "at most 100000 steps in a period"),
     (lambda: sw.discretise(linear_loop(), 0.1), UnsupportedError, "sampled controller"),
     (lambda: sw.sampled_loop(linear_loop(), 0.8, 0.1), UnsupportedError, "sampled controller"),
     (lambda: sw.LinearSystem.of(linear_loop()), UnsupportedError, "sampled controller"),

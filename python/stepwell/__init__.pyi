@@ -10,6 +10,7 @@ from .analysis.consistency import consistent_start as consistent_start
 from .analysis.discrete import DiscreteSystem as DiscreteSystem
 from .analysis.discrete import discretise as discretise
 from .analysis.discrete import frequency_response as frequency_response
+from .analysis.discrete import linearised_loop as linearised_loop
 from .analysis.discrete import margins as margins
 from .analysis.discrete import sampled_loop as sampled_loop
 from .analysis.discrete import sampling_limit as sampling_limit

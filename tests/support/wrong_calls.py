@@ -234,6 +234,12 @@ SAVED, SAVED_OWN = (Path(FILES.name) / f"{name}.npz" for name in ("run", "own"))
 A_RUN = sw.integrate(sw.Oscillator(np.ones(3)), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
 
 
+@sw.controller
+def held(t: Any, v: Any, y: Any, total: Any = 0.0, *, gain: Any = 1.0) -> Any:
+    """A controller that adds up what it sees."""
+    return gain * (1.0 - y) + total, total + y
+
+
 #: Every public function and class that users call, with arguments that are right and quick. Several entries of one name are
 #: several ways to call it, told apart by what follows a blank.
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
@@ -443,6 +449,18 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         sw.sampling_limit,
         {"plant": sw.TransferFunction(1.0, [1.0, 0.0]), "controller": 4.0, "delay": 0.0, "samples": 1, "how": "tustin"},
     ),
+    "linearised_loop": (
+        sw.linearised_loop,
+        {
+            "system": own.duffing().surrounded(held(sets="delta", period=0.2)),
+            "method": "rk4",
+            "dt": 0.1,
+            "v": 0.0,
+            "y": 1.0,
+            "t0": 0.0,
+        },
+    ),
+    "a controller": (held, {"sets": "delta", "period": 0.2, "delay": 0.1, "gain": 2.0, "total": 0.0}),
     "margins": (sw.margins, {"loop": sw.TransferFunction(9.0, [1.0, 3.0, 3.0, 1.0])}),
     "stability_limit at": (sw.stability_limit, {"system": sw.Pendulum(), "method": "rk4", "at": (0.0, 1.0), "t": 0.0}),
     "analyse v y": (sw.analyse, {"system": sw.Pendulum(), "method": "rk4", "dt": 0.1, "v": 0.0, "y": 1.0}),
