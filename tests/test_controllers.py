@@ -284,6 +284,32 @@ def test_its_parameters_live_in_a_world() -> None:
     np.testing.assert_array_equal(world.system.controller.values["gain"], 2.0 * GAINS)
 
 
+def test_what_the_controller_sets_cannot_be_set() -> None:
+    world = sw.World(loop(10, 13), "rk4", v=np.zeros(3), y=np.zeros(3), dt=0.01)
+    assert "u" not in list(world.parameters)
+    for call in (lambda: world.set(u=1.0), lambda: world.parameters["u"], lambda: world.reset([0], y=0.0, u=1.0)):
+        with pytest.raises(UnsupportedError, match="u: the sampled controller sets it"):
+            call()
+
+
+def test_friction_of_own_equations_sees_what_it_sets() -> None:
+    @sw.system
+    def sled(t: Any, v: Any, y: Any, *, u: Any = 0.0) -> Any:
+        return u - 0.1 * v
+
+    @sled.friction
+    def grip(t: Any, v: Any, y: Any, *, u: Any) -> Any:
+        return 0.1 + 0.2 * u * u
+
+    @sw.controller
+    def push(t: Any, v: Any, y: Any) -> Any:
+        return 1.0 - y
+
+    runs = [run_of(sled().surrounded(push(period=0.04)), 97, backend=backend) for backend in ("rust", "numpy")]
+    assert_same(*runs)
+    assert runs[0].y[-1] > 0.0
+
+
 def test_a_sweep_over_its_parameters_and_its_period() -> None:
     def make(gain: Any, period: Any) -> Any:
         return mass().surrounded(limited(gain=gain, period=period, delay=0.1))

@@ -75,6 +75,10 @@ def _is_set(value: Any) -> bool:
 
 def check_name(system: System, name: str) -> None:
     """Raise if a parameter cannot be set."""
+    if system.controller is not None and name in system.controller.sets:
+        raise UnsupportedError(
+            f"{name}: the sampled controller sets it, so a number for it would not be read; set the controller's"
+        )
     arguments, names = system.arguments(), known_names(system)
     if name in names:
         return
@@ -146,8 +150,8 @@ def direct(system: System, batch: Shape) -> dict[str, Direct]:
     all_of_them = system.all_parameters(batch)
     result = {}
     for name, (row, least) in (system.direct() | _of_control(system) | _of_controller(system)).items():
-        if row not in rows:
-            continue  # an input that changes with the time
+        if row not in rows or (system.controller is not None and name in system.controller.sets):
+            continue  # an input that changes with the time, or what a controller sets
         value = all_of_them.get(row)
         own = value.shape[: max(0, value.ndim - len(batch))] if isinstance(value, np.ndarray) else ()
         if prod(own) != len(rows[row]):
