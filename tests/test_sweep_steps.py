@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
-from stepwell.studies.sweeps import outcomes
+from stepwell.studies.sweeps import lengths, outcomes, task
+from support.cases import SYSTEMS, fits
 
 STEPS = [0.1, 0.05, 0.025]
 
@@ -90,3 +91,125 @@ def test_names_that_clash_are_refused_before_any_chunk(options: Any, message: st
     axes = options.pop("axes", {"omega": [1.0, 2.0]})
     with pytest.raises(ArgumentError, match=message):
         sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.1, steps=10, **options)
+
+
+@sw.system
+def driven(t: Any, v: Any, y: Any, *, omega: Any = 1.0, push: Any = 0.3) -> Any:
+    """Duffing's equation, driven, with a force that grows with the time."""
+    return push * np.cos(omega * t) + 1e-3 * t + y - y**3
+
+
+@pytest.fixture
+def pieces(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many members were in each piece of those that are stepped together."""
+    sizes: list[int] = []
+    make = lengths.Lengths.make
+
+    def counted(self: lengths.Lengths, **options: Any) -> sw.Run:
+        run = make(self, **options)
+        sizes.append(run.status.size)
+        return run
+
+    monkeypatch.setattr(lengths.Lengths, "make", counted)
+    return sizes
+
+
+OMEGA = np.linspace(0.5, 2.0, 21)
+EACH = 2.0 * np.pi / OMEGA / 40.0
+MAKERS = {
+    "own": (driven, 0.1, 0.5),
+    "drive": (lambda omega: sw.Oscillator(1.0, damping=0.1, form="physical", a=sw.Sinusoid(0.3, omega, 0.2)), 0.0, 0.5),
+    "free": (sw.Oscillator, 0.1, 1.0),
+    "bodies": (lambda omega: sw.NBody([1.0, 0.1, 0.0], force="newton", softening=0.3, G=omega), 0.1, [[0.0, 0], [1, 0], [0, 2]]),
+    "attitude": (lambda omega: sw.RigidBody([1.0, 2.0, 3.0], weight=omega, centre=[0.0, 0.1, 0.2]), 0.4, [1.0, 0.0, 0.0, 0.0]),
+}
+
+
+@pytest.mark.filterwarnings("ignore::stepwell.AccuracyWarning")
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
+@pytest.mark.parametrize("name", MAKERS)
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if not m.is_exact and m.name != "wisdom_holman"])
+def test_members_with_steps_of_their_own_are_stepped_together(name: str, method: str, pieces: list[int]) -> None:
+    """With the bits of runs one by one, whatever the chunks and pieces."""
+    make, v, y = MAKERS[name]
+    system = make(omega=1.0) if callable(make) else make
+    if not fits(system, sw.method(method)):
+        pytest.skip("the method does not step it")
+    axes = {"omega": ("run", OMEGA), "dt": ("run", EACH)}
+    ask: dict[str, Any] = {"v": v, "y": y, "steps": 30, "transient": 7, "t0": 0.7, "outcomes": ["last", "extremes"], "observe": 3}
+    whole = sw.sweep(make, axes, method, **ask)
+    assert set(pieces) == {21}
+    for chunk in (4, 21):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(task, "MAX_STEPS_OF_MEMBERS", 5 * chunk)
+            assert sw.sweep(make, axes, method, **ask, chunk=chunk).equals(whole)
+    for i in range(0, 21, 5):
+        run = sw.integrate(make(omega=OMEGA[i]), method, v=v, y=y, dt=EACH[i], steps=37, every=1, t0=0.7)
+        blocks = {"v": run.v, "y": run.y}
+        for block, states in blocks.items():
+            np.testing.assert_array_equal(whole[f"{block}_last"].values[i], states[-1])
+            seen = states[[*range(7, 37, 3), 37]]
+            np.testing.assert_array_equal(whole[f"{block}_max"].values[i], seen.max(axis=0) + 0.0)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("method", ["leapfrog", "standard_heun", "rodas4"])
+def test_every_system_in_steps_of_each_member(name: str, method: str) -> None:
+    """Those that are stepped together have the bits that each has alone."""
+    rng = np.random.default_rng(4)
+    system = SYSTEMS[name](rng, 3)
+    if not fits(system, sw.method(method)):
+        pytest.skip("the method does not step it")
+    state = [rng.uniform(0.1, 0.4, (*shape, 3)) for shape in (system.v_shape, system.y_shape)]
+    system = system.for_state_shapes(*state)
+    ask: dict[str, Any] = {"v": state[0], "y": state[1], "t0": 0.2}
+    if not lengths.together(system, sw.method(method), (sw.sweeps.Last(),), {"fused": False}):
+        pytest.skip("its members are computed one by one")
+    steps = np.array([0.01, 0.02, 0.013])
+    run = lengths.Lengths(system, sw.method(method), ask, steps, 20).make(20, 5)
+    for i, dt in enumerate(steps):
+        one = sw.integrate(system, method, **ask, dt=dt, steps=20, every=5)
+        np.testing.assert_array_equal(run.v[..., i], one.v[..., i])
+        np.testing.assert_array_equal(run.y[..., i], one.y[..., i])
+        np.testing.assert_array_equal(run.t[:, i], one.t)
+
+
+def test_the_same_step_given_for_each() -> None:
+    found = sw.sweep(sw.Oscillator(), {"dt": ("run", [0.1, 0.1, 0.1])}, "rk4", v=0.0, y=1.0, steps=10)
+    run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=10)
+    np.testing.assert_array_equal(found.y_last, np.full(3, run.y[-1]))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"outcomes": "mean"},
+        {"fused": True},
+        {"dtype": "float32"},
+        {"force": 0.1},
+        {"outcomes": sw.sweeps.Extremes("energy")},
+        {"outcomes": lambda run: {"end": run.y[-1]}},
+    ],
+)
+def test_what_needs_one_step_is_computed_one_by_one(options: dict[str, Any], pieces: list[int]) -> None:
+    axes = {"omega": ("run", OMEGA), "dt": ("run", EACH)}
+    sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, steps=10, **options)
+    assert not pieces
+
+
+def test_growth_and_divergence_of_members_with_steps_of_their_own() -> None:
+    """The member, the step and the limit that are named are those of the member."""
+    axes = {"omega": ("run", [1.0, 1.0, 1.0]), "dt": ("run", [0.1, 2.2, 0.2])}
+    with pytest.warns(sw.AccuracyWarning, match=r"at omega = 1, dt = 2.2: each step of 2.2 by .* its stability limit is 2"):
+        sw.sweep(sw.Oscillator, axes, "false_euler", v=0.0, y=1.0, steps=100)
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 3 members diverged, that at omega = 1, dt = 2.2, at step"):
+        found = sw.sweep(sw.Oscillator, axes, "false_euler", v=0.0, y=1.0, steps=3000)
+    with pytest.warns(sw.DivergenceWarning):
+        run = sw.integrate(sw.Oscillator(1.0), "false_euler", v=0.0, y=1.0, dt=2.2, steps=3000)
+    assert found.first_bad_step.values.tolist() == [-1, int(run.first_bad_step), -1]
+
+
+def test_times_that_do_not_move_on_are_refused() -> None:
+    axes = {"omega": ("run", [1.0, 1.0]), "dt": ("run", [1.0, 1e-20])}
+    with pytest.raises(ArgumentError, match="dt, t0: expected a time that moves on"):
+        sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, steps=10, t0=1.0)

@@ -86,14 +86,14 @@ class Growth(NamedTuple):
 
 
 def growth(
-    system: System, method: Method, dt: float, steps: int, t: Any, start: tuple[Array, Array], end: tuple[Array, Array]
+    system: System, method: Method, dt: Any, steps: int, t: Any, start: tuple[Array, Array], end: tuple[Array, Array]
 ) -> Growth | None:
     """The members that grew by their steps alone, or None.
 
     Args:
         system: the system that was stepped, with its control.
         method: the method.
-        dt: the step.
+        dt: the step, one for all members or one above zero for each.
         steps: the number of steps.
         t: the time at the start, one for all members or one for each.
         start: v and y at the start, spread over the batch.
@@ -126,9 +126,10 @@ def growth(
     if not by_steps.size:
         return None
     k = by_steps[0]
+    length = factors.step(suspects[k])
     why = (
-        f"each step of {dt:g} by {method.name} multiplies a disturbance of the start by {radius[k]:.4g}, and the motion itself "
-        f"does not grow; {factors.limit(suspects[k])}"
+        f"each step of {length:g} by {method.name} multiplies a disturbance of the start by {radius[k]:.4g}, and the motion "
+        f"itself does not grow; {factors.limit(suspects[k])}"
     )
     first = tuple(int(i) for i in np.unravel_index(suspects[k], many.shape))
     return Growth(suspects[by_steps], first, f"grew {_power_of_ten(float(grown[k]))}-fold in {steps} steps", why)
@@ -144,10 +145,11 @@ def _power_of_ten(logarithm: float) -> str:
 class _Factors:
     """The factors by which a step, and the motion itself, multiply disturbances of the start, for some members of a batch."""
 
-    def __init__(self, system: System, method: Method, dt: float, t: Any, start: tuple[Array, Array], batch: Shape) -> None:
+    def __init__(self, system: System, method: Method, dt: Any, t: Any, start: tuple[Array, Array], batch: Shape) -> None:
         from .stability.some_members import Batch
 
         self._system, self._method, self._dt = system.without_inputs() if system.linear else system, method, dt
+        self._each = None if np.ndim(dt) == 0 else np.broadcast_to(dt, batch).reshape(-1)
         v, y = (None, None) if system.linear else start
         self._batch = Batch(self._system, method, v, y, batch)
         self._t = np.broadcast_to(t, batch).reshape(-1) if np.ndim(t) else t
@@ -161,11 +163,17 @@ class _Factors:
         """For each member the spectral radius of a step, and the largest growth exponent of its rates over a step."""
         from .stability import eigen, maps
 
-        (own, t, v, y), dt = self._own(members), np.asarray(self._dt)
+        (own, t, v, y), dt = self._own(members), np.asarray(self._dt if self._each is None else self._each[members])
         rates = maps.rates(own, t, v, y)
         step = maps.transition(own, self._method, dt) if v is None or y is None else maps.jacobian(own, self._method, dt, t, v, y)
-        radius, rate = np.abs(eigen.eigenvalues(step)).max(axis=0), (self._dt * eigen.eigenvalues(rates).real).max(axis=0)
+        exponents = eigen.eigenvalues(rates).real
+        radius = np.abs(eigen.eigenvalues(step)).max(axis=0)
+        rate = (dt * exponents).max(axis=0) if self._each is None else dt * exponents.max(axis=0)
         return np.broadcast_to(radius, members.shape), np.broadcast_to(rate, members.shape)
+
+    def step(self, member: int) -> float:
+        """The step of a member."""
+        return float(self._dt if self._each is None else self._each[member])
 
     def limit(self, member: int) -> str:
         """What to do about a member, with its stability limit where that is quickly computed."""
@@ -173,7 +181,8 @@ class _Factors:
 
         if sum(maps.size(self._system)) > SMALL_SYSTEM:
             return "use a shorter step; stability_limit says how short"
-        if self._dt < 0.0 or self._method.is_implicit:  # whose growth is not that of a linear system
+        dt = self.step(member)
+        if dt < 0.0 or self._method.is_implicit:  # whose growth is not that of a linear system
             return "use a shorter step"
         own, t, v, y = self._own(np.array([member]))
         if v is None and not self._system.batch:
@@ -182,7 +191,7 @@ class _Factors:
             limit = _limit(own, self._method, v, y, t)
         if limit == 0.0:
             return f"{self._method.name} is stable with no step here, use another method"
-        return f"its stability limit is {limit:.6g}" if limit < self._dt else "use a shorter step"
+        return f"its stability limit is {limit:.6g}" if limit < dt else "use a shorter step"
 
 
 def _limit(system: System, method: Method, v: Array | None, y: Array | None, t: Any) -> float:

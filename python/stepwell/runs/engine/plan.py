@@ -20,6 +20,8 @@ from ...reference.acceptance import Acceptance
 
 #: Under this name the core takes the times of step 0 of members that have their own.
 BEGINS = "time.begins"
+#: And under this one the steps of members that have their own.
+LENGTH = "time.step"
 
 
 class Watched(NamedTuple):
@@ -35,7 +37,8 @@ class Plan(NamedTuple):
     ``t0`` is the time of step 0, or that of each member, shape (*batch), which the core takes as a parameter: see ``of_core``.
     ``single`` is whether steps are computed in float32. With adaptive steps ``order`` is that of a series, ``acceptance`` what a
     step must satisfy, and ``backward`` whether the time of the system is the negated time of the run. ``memory`` is what a
-    sampled controller remembers at the start, rows of one number for each member.
+    sampled controller remembers at the start, rows of one number for each member. ``lengths`` are the steps of members
+    that have their own, shape (*batch), or None; ``dt`` is then 1: the clock of the core counts steps.
     """
 
     system: System
@@ -60,6 +63,7 @@ class Plan(NamedTuple):
     acceptance: Acceptance = Acceptance()  # it is immutable
     backward: bool = False
     memory: Array | None = None
+    lengths: Array | None = None
 
     def t0_of(self, members: Any) -> Any:
         """The time of step 0 of these members of one batch axis, or of all."""
@@ -67,7 +71,8 @@ class Plan(NamedTuple):
 
     def of_core(self) -> Plan:
         """The plan with one clock for all members, at 0 if each has a time of its own."""
-        return self._replace(t0=0.0) if isinstance(self.t0, np.ndarray) else self
+        own = isinstance(self.t0, np.ndarray) or self.lengths is not None
+        return self._replace(t0=0.0) if own else self
 
     @property
     def dtype(self) -> type[Any]:
@@ -191,8 +196,11 @@ def model(plan: Plan) -> _core.ModelSpec:
     """The model of a plan, as the core takes it."""
     series = plan.method.has_derivatives
     parameters = plan.system.parameters(plan.batch, series=series, single=plan.single)
-    if isinstance(plan.t0, np.ndarray) and plan.system.has_time and not plan.single:
-        parameters.append((BEGINS, rows(plan.t0, plan.batch, 0)))
+    own = isinstance(plan.t0, np.ndarray) or plan.lengths is not None
+    if own and plan.system.has_time and not plan.single:
+        parameters.append((BEGINS, rows(np.asarray(plan.t0, np.float64), plan.batch, 0)))
+    if plan.lengths is not None:
+        parameters.append((LENGTH, rows(plan.lengths, plan.batch, 0)))
     if plan.force is not None:
         parameters.append((FORCE, rows(np.asarray(plan.force, np.float64), plan.batch, len(plan.system.v_shape))))
     if plan.system.controller is not None:

@@ -62,7 +62,7 @@ class Grid:
     """All members of a sweep: the product of its dimensions.
 
     Members are numbered with the last dimension fastest. Dimensions of ``dt`` come first, so that members with the same step
-    follow each other, since a run has one step.
+    follow each other, since most runs have one step.
 
     Attributes:
         axes: the arguments that vary.
@@ -91,14 +91,14 @@ class Grid:
         """How many."""
         return prod(self.shape)
 
-    def chunk_shape(self, most: int) -> Shape:
+    def chunk_shape(self, most: int, *, mixed: bool = False) -> Shape:
         """The shape of chunks of at most ``most`` members (and at least one), of about equal size.
 
-        A chunk is whole along the last dimensions, so that its members follow each other, and one wide along the first, so that
-        it has one ``dt``.
+        A chunk is whole along the last dimensions, so that its members follow each other, and unless it may be ``mixed``, one
+        wide along the first, so that it has one ``dt``.
         """
         shape, room = [1] * len(self.shape), max(1, most)
-        for i in range(len(self.shape) - 1, self.of_dt - 1, -1):
+        for i in range(len(self.shape) - 1, -1 if mixed else self.of_dt - 1, -1):
             size = self.shape[i]
             parts = -(-size // min(size, room))
             shape[i] = -(-size // parts)
@@ -118,7 +118,7 @@ class Grid:
             first += chunk.members
 
     def values(self, chunk: Chunk) -> dict[str, Any]:
-        """The arguments of the members of a chunk, shape (*own axes, members); ``dt`` is one number."""
+        """The arguments of the members of a chunk, shape (*own axes, members); ``dt`` is one number if it is that of all."""
         arguments: dict[str, Any] = {}
         for axis in self.axes:
             own = axis.values.shape[: axis.own]
@@ -129,7 +129,9 @@ class Grid:
             values = values[slices]
             widths = [chunk.shape[i] if i in there else 1 for i in range(len(self.dims))]
             values = np.broadcast_to(values.reshape(*own, *widths), (*own, *chunk.shape)).reshape(*own, chunk.members)
-            arguments[axis.argument] = float(values[0]) if axis.argument == "dt" else np.ascontiguousarray(values)
+            alone = chunk.members == 1 or len(self.axes) > 1  # else dt says how many members there are
+            one = axis.argument == "dt" and alone and bool((values == values[0]).all())
+            arguments[axis.argument] = float(values[0]) if one else np.ascontiguousarray(values)
         return arguments
 
     def place(self, member: int) -> str:

@@ -21,7 +21,7 @@ from ...model.methods import method as find_method
 from ...model.systems import System
 from ...runs import float32
 from ...runs.findings import is_heard, warn_of
-from . import adaptive, happenings
+from . import adaptive, happenings, lengths
 from .adaptive import Evaluations
 from .axes import OF_THE_RUN, Chunk, Grid
 from .axes import grid as a_grid
@@ -218,7 +218,8 @@ def sweep(
     )
     first, bits, names = _probe(task, grid)
     workers = Engine(engine, threads)
-    shape = grid.chunk_shape(_members(task, first, grid, workers.workers, chunk))
+    mixed = times is None and lengths.together(first, method, kept_of_each, arguments)
+    shape = grid.chunk_shape(_members(task, first, grid, workers.workers, chunk), mixed=mixed)
     layout = layout_of(task, grid, first, bits, named)
     if taken := sorted(names & {*layout.coords, *grid.dims}):
         raise ArgumentError(

@@ -30,6 +30,7 @@ from ...runs.result import Run
 from .adaptive import NUMBERS_OF_A_CONTROLLER, Pieces, lost, numbers_of_waypoints
 from .axes import OF_THE_RUN
 from .exponents import Exponents
+from .lengths import Lengths
 from .observed import Piece
 from .outcomes import Function, History, Outcome, ReducedOutcome, Results, Variable, together
 
@@ -39,6 +40,10 @@ MAX_STEPS_OF_MEMBERS = 50_000_000
 COPIES_OF_A_STATE = 4
 #: How many times the numbers of a member are in memory besides: at the start, in the carry, at the end.
 COPIES_OF_A_MEMBER = 12
+
+
+#: Makes a piece of a run: by its number of steps, the interval of the states that it saves, and the arguments of ``integrate``.
+Make = Callable[..., Run]
 
 
 class Stopped(Exception):  # noqa: N818 (not an error)
@@ -160,10 +165,10 @@ def prepared(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]
     system = task.system if isinstance(task.system, System) else task.system(**parameters)
     system = a_system(system).for_state_shapes(options.get("v"), options["y"])
     if set(values) == {"dt"}:
-        # Without another argument that has an axis of members, v gets one; a chunk has one dt.
+        # Without another argument that has an axis of members, y gets one.
         block = checks.block("y", options["y"], system.y_shape, system.axes)
         if block.shape == system.y_shape:
-            options["y"] = block[..., np.newaxis]
+            options["y"] = np.repeat(block[..., np.newaxis], np.size(options["dt"]), axis=-1)
     return system, options
 
 
@@ -172,7 +177,10 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
     with _listening(stopped), np.errstate(all="ignore"):  # the status tells which members diverged
         system, options = prepared(task, values)
         start = options
-        for each in _pieces(task, system, options, members, task.transient, None, stopped):
+        make: Make = partial(quietly, system, task.method)
+        if isinstance(dt := options.get("dt"), np.ndarray):
+            make = Lengths(system, task.method, options, dt, task.transient + task.steps).make
+        for each in _pieces(task, system, make, options, members, task.transient, None, stopped):
             start = _going_on(options, each)
         parts: list[Results] = []
         functions, pieces = task.kinds(Function), Pieces(system, task.method, looks=task.looks)
@@ -183,7 +191,7 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
             parts += [each.of_run(last) for each in functions]
         if task.reductions or not functions:
             pieces = Pieces(system, task.method, looks=task.looks)
-            last, reduced = _reduced(task, pieces, start, members, stopped)
+            last, reduced = _reduced(task, pieces, make, start, members, stopped)
             parts += reduced
         for each in task.kinds(Exponents):
             look = partial(_stop, stopped)
@@ -209,7 +217,7 @@ def _growth_of(task: Task, options: dict[str, Any], last: Run) -> Growth | None:
 
 
 def _reduced(
-    task: Task, pieces: Pieces, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
+    task: Task, pieces: Pieces, make: Make, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
 ) -> tuple[Run, list[Results]]:
     """The last piece of the run, and the results of the reductions."""
     between, reductions = task.between, [(each, each.begin()) for each in task.reductions]
@@ -220,9 +228,9 @@ def _reduced(
                 reduction.see(Piece(last, 0))
         assert last is not None
         return last, [reduction.results() for _, reduction in reductions]
-    for each in _pieces(task, pieces.system, start, members, task.steps, between, stopped):
+    for each in _pieces(task, pieces.system, make, start, members, task.steps, between, stopped):
         since = 0 if at == 0 else 1
-        steps = at + (each.t.size - 1 if between else 0)  # number of the last saved state
+        steps = at + (len(each.t) - 1 if between else 0)  # number of the last saved state
         for outcome, reduction in reductions:
             reduction.see(_thinned(task, outcome, each, at, since))
         at, last = steps + (0 if between else 1), each
@@ -246,6 +254,7 @@ def _thinned(task: Task, outcome: Outcome, piece: Run, first: int, since: int) -
 def _pieces(
     task: Task,
     system: System,
+    make: Make,
     start: dict[str, Any],
     members: int,
     steps: int,
@@ -261,7 +270,7 @@ def _pieces(
     done, going_on = 0, start
     while done < steps:
         _stop(stopped)
-        piece = quietly(system, task.method, steps=min(length, steps - done), every=between, **going_on)
+        piece = make(steps=min(length, steps - done), every=between, **going_on)
         _as_many(piece, members)
         done += piece.steps
         if done < steps:

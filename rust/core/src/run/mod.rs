@@ -32,8 +32,9 @@ use crate::{
     },
     stage::{Clock, Machine},
     step::{
-        BEGINS, MAX_TAPE_OPERATIONS,
+        MAX_TAPE_OPERATIONS,
         key::{StepKind, TapeKey},
+        own_times,
         tapes::{Traceable, Traced},
     },
     tape::real::Precision,
@@ -70,7 +71,7 @@ impl Model<'_> {
         let single = members == 1;
         // Operations are fused on the tape of the whole step, friction needs the state at its start, and only there have members
         // times of their own. Not everything around a system is known over rows.
-        let own_times = self.key.signature.count(BEGINS) > 0;
+        let own_times = own_times(&self.key.signature);
         let is_single = self.key.precision == Precision::Single;
         let is_given = matches!(self.key.how, StepKind::Step(_));
         let as_one = is_single || own_times || self.key.fused || traced.series || is_given;

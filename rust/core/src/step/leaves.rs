@@ -18,9 +18,23 @@ pub(crate) fn parameters(signature: &Signature, h: Symbol) -> Parameters<'_, Sym
 /// The parameter that is each member's own time of step 0, where they have some: the clock's is then 0.
 pub(crate) const BEGINS: &str = "time.begins";
 
+/// The parameter that is each member's own step, where they have some: the clock then counts steps.
+pub(crate) const LENGTH: &str = "time.step";
+
+/// Whether members have times of their own.
+pub(crate) fn own_times(signature: &Signature) -> bool {
+    signature.count(BEGINS) > 0 || signature.count(LENGTH) > 0
+}
+
+/// The step.
+pub(crate) fn length(signature: &Signature) -> Symbol {
+    Symbol::new(signature.place(LENGTH).map_or(Op::Step, |row| Op::Param(row as u32)))
+}
+
 /// The time of a step.
 pub(crate) fn time(signature: &Signature) -> Symbol {
     let clock = Symbol::new(Op::Time);
+    let clock = if signature.count(LENGTH) > 0 { clock * length(signature) } else { clock };
     match signature.place(BEGINS) {
         Some(row) => Symbol::new(Op::Param(row as u32)) + clock,
         None => clock,

@@ -16,4 +16,4 @@ pub mod trace;
 mod watch;
 
 pub(crate) use self::leaves::{block, ids, parameters};
-pub(crate) use self::{leaves::BEGINS, properties::MAX_TAPE_OPERATIONS};
+pub(crate) use self::{leaves::own_times, properties::MAX_TAPE_OPERATIONS};

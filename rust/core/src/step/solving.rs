@@ -4,7 +4,7 @@
 use super::{
     attempts::AttemptsOf,
     key::StepKind,
-    leaves::{block, ids, parameters, time},
+    leaves::{block, ids, length, parameters, time},
 };
 use crate::{
     error::Error,
@@ -27,7 +27,7 @@ use crate::{
 
 /// Operations of a step's equations, and of solving them.
 pub(super) fn operations(signature: &Signature, program: &Program, shape: Shape) -> Result<(usize, usize), Error> {
-    let (kind, h) = (kind(signature)?, Symbol::new(Op::Step));
+    let (kind, h) = (kind(signature)?, length(signature));
     let of_step = || window::of_step(time(signature), h, false);
     let rates = || {
         let p = parameters(signature, h);

@@ -6,7 +6,7 @@ use super::{
     attempts::TriedRows,
     cache::Cache,
     key::{StepKind, TapeKey},
-    leaves::BEGINS,
+    leaves::own_times,
     properties::{
         MAX_IMPLICIT_OPERATIONS, MAX_IMPLICIT_TAPE_OPERATIONS, MAX_LONG_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, MAX_UNKNOWNS,
         Operations, has_derivatives, has_series, has_splitting, operations, recorded, shape,
@@ -88,7 +88,7 @@ impl TapeKey {
             let shape = shape(&self.signature, &self.how)?;
             let Operations { rates, step, equations } = operations(&self.signature, &self.how, shape)?;
             let operations = (rates, step);
-            let own_times = self.signature.count(BEGINS) > 0;
+            let own_times = own_times(&self.signature);
             let mut series = has_series(&self.how)?;
             let has_mass = self.signature.equations.as_ref().is_some_and(|equations| equations.mass.is_some());
             if !series && has_derivatives(&self.how)? {

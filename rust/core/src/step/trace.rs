@@ -3,7 +3,7 @@
 use super::{
     attempts::{AttemptsOf, TriedRows},
     key::StepKind,
-    leaves::{block, ids, parameters, time},
+    leaves::{block, ids, length, parameters, time},
     pace::Pace,
     properties::{recorded, shape},
     watch,
@@ -54,7 +54,7 @@ pub(crate) fn trace_step(tape: Tape, signature: &Signature, how: &StepKind) -> R
         }
         StepKind::Step(step) => {
             let (tape, next) = record(tape, || {
-                let p = parameters(signature, Symbol::new(Op::Step));
+                let p = parameters(signature, length(signature));
                 let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
                 ids([&next_state(step, &p, time(signature), &v, &y)])
             });
@@ -62,7 +62,7 @@ pub(crate) fn trace_step(tape: Tape, signature: &Signature, how: &StepKind) -> R
         }
         StepKind::Method { name, choice } => {
             let (kind, method) = (kind(signature)?, method(name)?);
-            let seen = || window::of_step(time(signature), Symbol::new(Op::Step), method.carries);
+            let seen = || window::of_step(time(signature), length(signature), method.carries);
             let (tape, next) = record(tape, || window::over(signature, seen, || step(kind, signature, shape, &method, *choice)));
             Ok(Steps { tape, next, shape, terms: Vec::new() })
         }
@@ -91,7 +91,7 @@ fn series_order(program: &Program, asked: u32) -> Option<u32> {
 }
 
 fn step(kind: &Kind, signature: &Signature, shape: Shape, method: &Method, choice: usize) -> Vec<Id> {
-    let (h, t) = (Symbol::new(Op::Step), time(signature));
+    let (h, t) = (length(signature), time(signature));
     let (v0, y0) = (block(0, shape.v), block(shape.v, shape.y));
     let mut p = parameters(signature, h);
     let before = kept(method, shape);
@@ -177,7 +177,7 @@ pub(super) fn trace_by_terms(
 
 /// s ← P·s + Σ Q·u; the sums run over s, then over the nodes and their inputs.
 fn matrix(signature: &Signature, shape: Shape, nodes: &[u64], fused: bool) -> Vec<Id> {
-    let (h, t) = (Symbol::new(Op::Step), time(signature));
+    let (h, t) = (length(signature), time(signature));
     let p = parameters(signature, h);
     let n = shape.v + shape.y;
     let mut columns: Vec<Symbol> = block(0, n).iter().copied().collect();
@@ -220,7 +220,7 @@ pub(super) fn trace_slot(
     let kind = kind(signature)?;
     let shape = (kind.shape)(signature)?;
     Ok(record(tape, || {
-        let (h, t) = (Symbol::new(Op::Step), time(signature));
+        let (h, t) = (length(signature), time(signature));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let mut p = parameters(signature, h);
         let memory = memory(signature, method, shape);
@@ -240,7 +240,7 @@ pub(crate) fn trace_record(tape: Tape, signature: &Signature, names: &[String]) 
     recorded(signature, names)?;
     Ok(record(tape, || {
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-        let s = (kind.make)(&parameters(signature, Symbol::new(Op::Step)));
+        let s = (kind.make)(&parameters(signature, length(signature)));
         let mut next = ids([&v, &y]);
         for name in names {
             next.extend(s.record(name, &v, &y).into_iter().flatten().map(|symbol| symbol.0));
