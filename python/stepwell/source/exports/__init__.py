@@ -1,7 +1,8 @@
 """A step as source code of another language, for games and other programs.
 
-``tapes`` traces a step and splits it. ``names`` makes names that every language accepts. ``written`` writes the step in a
-``language``, each of which has a file. ``result`` is the exported text.
+``tapes`` traces a step and splits it. ``names`` makes names that every language accepts. ``lanes`` finds what is alike in a long
+step, such as its springs, and ``lane_writer`` writes loops of it. ``written`` writes the step in a ``language``, each of which
+has a file. ``result`` is the exported text.
 """
 
 from __future__ import annotations

@@ -129,6 +129,7 @@ class C(Skeleton):
     types: ClassVar[dict[str, str]] = TYPES
     helpers: ClassVar[dict[str, str]] = HELPERS | {"sample": SAMPLE}
     declaration, variable = "const $type $name = $text;", ("$type $name = $text;", "$type $name;")
+    loop_of_lines = ("for (int i = 0; i < $count; i++) {", "}")
     loop, work_array = "for (int i = 0; i < $count; i++) $line", "$number w[$size];"
     table, table_end, array = "static const $of $name[$count] = {", "};", "const $number $name[$count] = {"
     force = f", const $number {FORCE}[$n]"

@@ -96,7 +96,8 @@ class JavaScript(Skeleton):
         "sample": SAMPLE,
     }
     declaration, variable = "const $name = $text;", ("let $name = $text;", "let $name;")
-    loop, work_array = "for (let i = 0; i < $count; i++) $line", "const w = new Float64Array($size);"
+    loop_of_lines = ("for (let i = 0; i < $count; i++) {", "}")
+    loop, work_array = "for (let i = 0; i < $count; i++) $line", ""
     table = array = "const $name = ["
     heads: ClassVar[dict[str, str]] = {
         "function": "function $name(x)",
@@ -126,7 +127,6 @@ console.log(s.$shown[0]);"""
         "bits_literal": "{}",
         "time": "fround(this.t0 + s.step * this.dt)",
         "rounding": "fround($text)",
-        "work_array": "const w = new Float32Array($size);",
         "velocities": "const velocities = new Float32Array($n);",
         "helpers": {
             "fround": FROUND,
@@ -159,7 +159,10 @@ console.log(s.$shown[0]);"""
         """The whole text; ``head`` is the comment at its head."""
         inside = "\n\n".join("\n".join(indented(each, "  ")) for each in self._functions(w))
         whole = f"export class {camel(self.prefix)} {{\n{inside}\n}}"
-        return "\n".join(head) + "\n\n" + "\n\n".join([*self._helpers(whole), *self._tables(w), whole]) + "\n"
+        work = max(each.work or 0 for each in w.functions.values())
+        waiting = [f"// Where values of loops wait for other loops.\nconst w = new {self.array_type}({work});"] * bool(work)
+        parts = [*self._helpers(whole), *self._tables(w), *waiting, whole]
+        return "\n".join(head) + "\n\n" + "\n\n".join(parts) + "\n"
 
     def _create(self, w: Written) -> list[str]:
         lines = self._set(w, "this.$name = ", ";", remarks=True)

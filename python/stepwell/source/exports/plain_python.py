@@ -116,6 +116,7 @@ class Python(Skeleton):
     }
     declaration, variable = "$name = $text", ("$name = $text", "")
     branch = ("if $condition:", "else:", "")
+    loop_of_lines = ("for i in range($count):", "")
     loop, work_array = "for i in range($count): $line", "w = [$zero] * $size"
     table, table_end, array = "$name = [", "]", "$name = ["
     doc = "#"

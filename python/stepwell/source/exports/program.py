@@ -49,7 +49,14 @@ class Loop(NamedTuple):
     text: str
 
 
-Statement = Assignment | Conditional | Loop
+class Lanes(NamedTuple):
+    """Statements that are repeated ``times``; they read and write elements i of arrays, which are written as in a ``Loop``."""
+
+    times: int
+    lines: list[Statement]
+
+
+Statement = Assignment | Conditional | Loop | Lanes
 
 
 class Place(NamedTuple):
@@ -69,7 +76,7 @@ class Function(NamedTuple):
         of_time: the values that depend on the time alone.
         lines: the values that depend on the state.
         writes: the numbers that it writes.
-        work: the length of the array in which loops compute; 0 without loops.
+        work: the length of the array in which values of loops wait for other loops; None without loops.
     """
 
     reads: list[Place]
@@ -77,7 +84,7 @@ class Function(NamedTuple):
     of_time: list[Assignment]
     lines: list[Statement]
     writes: list[Place]
-    work: int = 0
+    work: int | None = None
 
 
 class Table(NamedTuple):
@@ -102,6 +109,8 @@ def texts(statements: Iterable[Statement]) -> list[str]:
             formulas += [each.condition, *texts(each.then), *texts(each.other)]
         elif isinstance(each, Loop):
             formulas += [each.target, each.text]
+        elif isinstance(each, Lanes):
+            formulas += texts(each.lines)
         else:
             formulas.append(each.text)
     return formulas

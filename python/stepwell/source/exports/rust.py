@@ -71,6 +71,7 @@ class Rust(Skeleton):
     helpers: ClassVar[dict[str, str]] = HELPERS | {"sample": SAMPLE}
     declaration, variable = "let $name = $text;", ("let mut $name = $text;", "let $name;")
     branch = ("if $condition {", "} else {", "}")
+    loop_of_lines = ("for i in 0..$count {", "}")
     loop, work_array = "for i in 0..$count { $line }", "let mut w = [0.0; $size];"
     table, array = "static $name: [$of; $count] = [", "let $name = ["
     force, passed_force = f", {FORCE}: &[$number; $n]", f", &{FORCE}"

@@ -20,7 +20,7 @@ from .functions import FUNCTIONS, operations_of
 from .language import Language
 from .lines import indented, listed, printable
 from .names import Field, Names, camel
-from .program import FORCE, Assignment, Conditional, Function, Loop, Statement
+from .program import FORCE, Assignment, Conditional, Function, Lanes, Loop, Statement
 from .written import Written
 
 #: The comments of the functions of a file.
@@ -54,7 +54,8 @@ class Skeleton(Language, ABC):
         variable: the declaration of a variable that a branch sets: with a first value, and without.
         branch: the lines around both sides of a branch; the last is omitted if empty.
         loop: a line for each i from 0 on.
-        work_array: the array in which loops compute.
+        loop_of_lines: the lines around several lines for each i; the last is omitted if empty.
+        work_array: the array in which values of loops wait for other loops; empty where it is made once.
         table: the first line of a table of numbers.
         table_end: its last line.
         array: the first line of an array in the example.
@@ -85,6 +86,7 @@ class Skeleton(Language, ABC):
     variable: ClassVar[tuple[str, str]]
     branch: ClassVar[tuple[str, str, str]] = ("if ($condition) {", "} else {", "}")
     loop: ClassVar[str]
+    loop_of_lines: ClassVar[tuple[str, str]]
     work_array: ClassVar[str]
     table: ClassVar[str]
     table_end: ClassVar[str] = "];"
@@ -321,7 +323,7 @@ class Skeleton(Language, ABC):
             ("What depends on the state.", f.lines),
         ]
         out = self._statement(Assignment("t", "number", self.time)) if f.needs_time else []
-        if f.work:
+        if f.work and self.work_array:
             words = {"size": f.work, "number": self.types.get("number", ""), "zero": self.literal(0.0)}
             out.append(filled(self.work_array, words))
         for title, statements in groups:
@@ -333,8 +335,8 @@ class Skeleton(Language, ABC):
                     evaluation = each.evaluation
                     out += ["", f"{self.comment} Evaluation {evaluation} of the rates."]
                 out += [self._placed(line, read, write) for line in self._statement(each)]
-        if f.work:
-            return out
+        if f.work is not None:
+            return out if not out or out[0] else out[1:]
         out += ["", f"{self.comment} {after}"]
         out += [f"{place(p.block, p.at, write)} = {p.name}{self.end}" for p in f.writes]
         return out if out[0] else out[1:]
@@ -353,6 +355,10 @@ class Skeleton(Language, ABC):
         if isinstance(each, Loop):
             line = f"{each.target} = {each.text}{self.end}"
             return [line if each.times == 1 else filled(self.loop, {"count": each.times, "line": line})]
+        if isinstance(each, Lanes):
+            inside = [line for inner in each.lines for line in self._statement(inner)]
+            begin, end = self.loop_of_lines
+            return [filled(begin, {"count": each.times}), *indented(inside, self.step_in), *[end] * bool(end)]
         if isinstance(each, Conditional):
             then, other = ([line for inner in side for line in self._statement(inner)] for side in (each.then, each.other))
             if then:

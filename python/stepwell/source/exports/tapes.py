@@ -20,11 +20,14 @@ from ..explanation.listing import Body
 from ..explanation.naming import Named, increments_last, indexed, parameters
 from .functions import named
 
+#: Steps of more operations are loops over lanes, where these are alike: short to read, and quick to compile.
+MAX_SHORT = 2_000
+
 #: The most operations that are written out one by one; a longer text is too long for compilers and for people.
 MAX_OPERATIONS = 20_000
 
 #: The most operations that are written as loops: a few arrays of some megabytes.
-MAX_IN_LOOPS = 400_000
+MAX_IN_LOOPS = 3_000_000
 
 #: How often a value changes: never, once a run, once a step with the time, with the state.
 NEVER, RUN, STEP, STATE = range(4)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections import Counter, defaultdict
+from collections.abc import Callable, Hashable
 from functools import cached_property, partial
 from math import prod
 
@@ -13,6 +14,8 @@ from ...runs.engine import pushes
 from ..explanation.formula import Formula
 from ..explanation.listing import Leaf, Line, Writer
 from .branches import Branched
+from .lane_writer import LaneWriter
+from .lanes import SHARED, Lanes
 from .language import Language
 from .loops import MADE, WORK, NoLoopError
 from .loops import Place as LoopPlace
@@ -20,10 +23,13 @@ from .loops import Writer as LoopWriter
 from .names import Field, Names, fields
 from .program import FORCE, Assignment, Function, Loop, Place, Statement, Table, texts
 from .statements import Statements
-from .tapes import MAX_OPERATIONS, MEMORY, STATE, STEP, TALLY, Operations, Part, Traced, elements, too_long
+from .tapes import MAX_OPERATIONS, MAX_SHORT, MEMORY, STATE, STEP, TALLY, Operations, Part, Traced, elements, too_long
 
 #: Names that are taken in a function: its arguments and the time.
 LOCALS = ("m", "s", "t", "self", "coordinates", "velocities", FORCE)
+
+#: Loops have at least this many operations for each line of text: fewer are as well written out.
+LANES = 4
 
 #: Names that fields cannot have, since other members of the object have them.
 MEMBERS = ("defaults", "finish", "new", "prepare", "start", "step", "work", "constructor", "prototype")
@@ -82,11 +88,17 @@ class Written:
         self.loops: list[Loop] = []
         self.array, self.hoisted_size = language.fields(MADE, "made by loops"), 0
         self.places: dict[str, tuple[int, ...]] = {}
-        if traced.count > MAX_OPERATIONS:
-            self.parameters = [each._replace(shape=each.shape and (prod(each.shape),)) for each in self.parameters]
-            self.hoisted: list[Assignment] = []
-            self.functions = self._looped(operations, hoisted)
-            return
+        self.hoisted: list[Assignment] = []
+        if traced.count > MAX_SHORT:
+            try:
+                self.functions = self._looped(operations, hoisted)
+            except NoLoopError:
+                if traced.count > MAX_OPERATIONS:
+                    raise too_long(plan, str(traced.count), MAX_OPERATIONS) from None
+                self.loops, self.hoisted_size, self.places = [], 0, {}
+            else:
+                self.parameters = [each._replace(shape=each.shape and (prod(each.shape),)) for each in self.parameters]
+                return
         self.hoisted, known = self._prepared(operations, hoisted)
         self.functions = {name: self._function(part, operations, hoisted, known) for name, part in traced.parts.items()}
 
@@ -190,23 +202,20 @@ class Written:
             return f"@{block}", self._at(block, extra)
 
         inner = [line for line in operations.needed(hoisted, lambda line: False) if operations.all[line][1]]
-        try:
-            first = loops.looped(inner, hoisted, before, keep=True)
-            hoisted_places |= dict(zip(hoisted, [(f"{language.me}{self.array}", at) for _, at in first.places], strict=True))
-            self.loops = [
-                each._replace(
-                    target=language.me + each.target.replace(MADE, self.array, 1),
-                    text=re.sub(rf"\b{MADE}\[", f"{language.me}{self.array}[", each.text),
-                )
-                for each in first.loops
-            ]
-            self.hoisted_size = first.size
-            functions = {
-                name: self._loops(part, operations, loops, hoisted_places, partial(source, part))
-                for name, part in self.traced.parts.items()
-            }
-        except NoLoopError:
-            raise too_long(self.traced.plan, str(self.traced.count), MAX_OPERATIONS) from None
+        first = loops.looped(inner, hoisted, before, keep=True)
+        hoisted_places |= dict(zip(hoisted, [(f"{language.me}{self.array}", at) for _, at in first.places], strict=True))
+        self.loops = [
+            each._replace(
+                target=language.me + each.target.replace(MADE, self.array, 1),
+                text=re.sub(rf"\b{MADE}\[", f"{language.me}{self.array}[", each.text),
+            )
+            for each in first.loops
+        ]
+        self.hoisted_size = first.size
+        functions = {
+            name: self._loops(name, part, operations, loops, hoisted_places, partial(source, part))
+            for name, part in self.traced.parts.items()
+        }
         self.places = {name: places for places, name in loops.tables.items()}
         return functions
 
@@ -217,6 +226,7 @@ class Written:
 
     def _loops(
         self,
+        name: str,
         part: Part,
         operations: Operations,
         loops: LoopWriter,
@@ -228,7 +238,12 @@ class Written:
             for line in operations.needed(part.roots, hoisted_places.__contains__)
             if operations.all[line][1] and line not in hoisted_places
         ]
-        body = loops.looped(needed, part.roots, source, keep=False)
+        try:
+            return self._lanes(name, part, operations, loops, needed, source)
+        except NoLoopError:  # lanes are not alike
+            if self.traced.count <= MAX_OPERATIONS:
+                raise
+            body = loops.looped(needed, part.roots, source, keep=False)
         # Results that are no computed values, such as a number of the state, are read before anything is written.
         own = [i for i, (array, _) in enumerate(body.places) if array != WORK]
         aside = [(WORK, body.size + k) for k in range(len(own))]
@@ -242,6 +257,50 @@ class Written:
         lines = [*body.loops, *loops.moved([body.places[i] for i in own], aside), *loops.moved(values, to)]
         needs_time = any(re.search(r"\bt\b", text) for text in texts(lines))
         return Function([], needs_time, [], list(lines), [], body.size + len(own))
+
+    def _lanes(
+        self,
+        name: str,
+        part: Part,
+        operations: Operations,
+        loops: LoopWriter,
+        needed: list[int],
+        source: Callable[[int], LoopPlace],
+    ) -> Function:
+        """A function as loops over lanes."""
+        language = self.language
+        reads = Counter(each for line in needed for each in set(operations.all[line][1]))
+        axes = prod(self.traced.plan.system.v_shape[1:]) or 1
+
+        def label(line: int) -> tuple[Hashable, Hashable]:
+            if operations.all[line][0] == "constant":
+                return operations.all[line], operations.all[line]
+            array, at = source(line)
+            if array.startswith("@"):
+                return (array, at % axes), array
+            return (array, at if reads[line] > SHARED else None), array
+
+        lanes = Lanes(operations, needed, source, label)
+        to: dict[int, list[LoopPlace]] = defaultdict(list)  # where results are written, by their line
+        aside: list[tuple[LoopPlace, LoopPlace]] = []
+        for i, (line, result) in enumerate(zip(part.roots, part.results, strict=True)):
+            block = result.partition("'")[0]
+            place = f"#{block}", self._at(block, i)
+            if line in lanes.of:
+                to[line].append(place)
+            elif (source(line)[0][1:], source(line)[1]) != (block, place[1]) or name != "step":
+                aside.append((source(line), place))
+        language.names = Names((*LOCALS, "i", WORK))
+        written = LaneWriter(operations, loops, lanes, source, to, {place for place, _ in aside})
+        lines = written.lines
+        # Results that are no computed values, such as a number of the state, are read before anything is written.
+        own = [(WORK, written.size + k) for k in range(len(aside))]
+        before, after = loops.moved([each for each, _ in aside], own), loops.moved(own, [each for _, each in aside])
+        every = [*before, *lines, *after]
+        if len(texts(every)) * LANES > len(needed):
+            raise NoLoopError
+        needs_time = any(re.search(r"\bt\b", text) for text in texts(every))
+        return Function([], needs_time, [], every, [], written.size + len(own))
 
     def _function(self, part: Part, operations: Operations, hoisted: list[int], known: list[Leaf]) -> Function:
         language, tape = self.language, part.tape

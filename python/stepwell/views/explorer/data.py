@@ -180,7 +180,8 @@ def parameters_of(source: str) -> dict[str, Any]:
     """The parameters of an exported step, with their values in its text."""
     begin = source.index("  constructor(")
     text = source[begin : source.index("    for (const name of", begin)]
-    return {name: json.loads(re.sub(r",\s*\]", "]", value)) for name, value in PARAMETER.findall(text)}
+    numbers = [(name, value) for name, value in PARAMETER.findall(text) if not value.startswith("new ")]
+    return {name: json.loads(re.sub(r",\s*\]", "]", value)) for name, value in numbers}
 
 
 def packed(sources: list[str]) -> str:
