@@ -14,6 +14,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, StepwellError, UnsupportedError
+from support.abroad import Journey, run
+from support.export import assert_same as assert_same_bits
+from support.export import languages
 
 RNG = np.random.default_rng(20)
 
@@ -380,12 +383,45 @@ def test_charts_and_sweeps_take_them(tmp_path: Any) -> None:
     assert np.array_equal(swept["y_last"].to_numpy().ravel(), run.y[-1])
 
 
+def exported(language: str) -> list[Journey]:
+    """On numbers, in a batch, in float32, under a control, beside a floor, in loops, with a sampled controller."""
+    ball = sw.Particles(gravity=9.81, floor=sw.Floor(restitution=0.5))
+    pairs = [(i, i + 1) for i in range(119)] + [(i, i + 2) for i in range(118)]
+    rope = sw.Springs(pairs, masses=0.1, stiffness=20.0, rest=0.1, gravity=9.81, fixed=[0], dim=2)
+    places = np.stack([0.1 * np.arange(120), np.zeros(120)], axis=1)
+
+    @sw.controller
+    def braked(t: Any, v: Any, y: Any, total: Any = 0.0) -> Any:
+        return -y - v, total + y
+
+    loop = sw.Oscillator(2.0, x=0.0).surrounded(braked(sets="x", period=0.2))
+    kept = {"control": sw.EnergyControl(0.5)}
+    every = [
+        Journey(duffing(beta=np.array([0.5, 2.0])), method, np.zeros(2), np.ones(2), member=1)
+        for method in (midpoint, heun_euler, adams_bashforth_2, adams_bashforth_3)
+    ]
+    every += [
+        Journey(decay(), adams_bashforth_3, np.zeros(0), 1.0),
+        Journey(sw.Oscillator(2.0), adams_bashforth_3, 0.5, 1.0, options={"dtype": "float32"}),
+        Journey(sw.NBody(np.ones(2), softening=0.1), adams_bashforth_2, np.eye(2), 2.0 * np.eye(2), options=kept),
+        Journey(ball, adams_bashforth_2, np.array([[0.5, 0.0]]), np.array([[0.0, 0.3]]), steps=60, dt=0.02),
+        Journey(rope, adams_bashforth_2, np.zeros((120, 2)), places, steps=20, dt=0.01),
+        Journey(loop, adams_bashforth_3, 0.5, 1.0),
+    ]
+    return every
+
+
+@languages
+def test_every_bit_of_exported_steps(language: str, tmp_path: Any) -> None:
+    every = exported(language)
+    assert_same_bits(every, run(language, every, tmp_path))
+
+
 @pytest.mark.parametrize(
     "what",
     [
         lambda m: sw.analyse(sw.Oscillator(), m, dt=0.1),
         lambda m: sw.stability_limit(sw.Oscillator(), m),
-        lambda m: sw.export(sw.Oscillator(), m, "c"),
         lambda m: sw.lyapunov(sw.Pendulum(), m, v=0.0, y=1.0, dt=0.1, steps=100),
         lambda m: sw.integrate(sw.Oscillator(), m, v=0.0, y=1.0, dt=0.1, steps=3, form="matrix"),
         lambda m: sw.explain(sw.Oscillator(), m, form="matrix"),

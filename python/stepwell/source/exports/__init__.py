@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from ...base import checks
 from ...base.arrays import Shape
 from ...errors import ArgumentError, ShapeError, UnsupportedError
-from ...model.compatibility import one_state
 from ...model.controls import AnyControl
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
@@ -98,7 +97,6 @@ def export(
         'step.c'
     """
     method, system = find_method(method), a_system(system)
-    one_state("export", method)
     kind = LANGUAGES[checks.known("language", language, tuple(LANGUAGES))]
     fused, single = checks.flag("fused", fused), checks.is_single(dtype)
     if fused and kind.fma is None:

@@ -212,7 +212,7 @@ int main(void) {
         lines += [f"}} {p};", "", "// A state.", "typedef struct {"]
         lines += [f"    {number} {name}[{n}];" for name, _, n in w.blocks]
         lines += [f"    {number} tally; // what the control has added up"] * bool(w.evaluations)
-        lines += [f"    {number} memory[{len(w.memory)}]; // what the controller remembers"] * bool(w.memory)
+        lines += [f"    {number} memory[{len(w.memory)}]; // {w.of_memory}"] * bool(w.memory)
         return [*lines, "    int64_t step; // k; the time is t0 + k*dt", f"}} {p}_state;"]
 
     def _create(self, w: Written) -> list[str]:
@@ -231,7 +231,7 @@ int main(void) {
         return self._function(about, head, inside)
 
     def _initial(self, w: Written) -> list[str]:
-        carried = w.slot if "start" in w.functions else ""
+        carried = w.slot if w.carries else ""
         blocks = [(name, of) for name, of, _ in w.blocks if name != carried]
         lines = ["s->step = 0;"] + [f"s->tally = {self.literal(0.0)};"] * bool(w.evaluations)
         begun = listed(f"static const {self.types['number']} memory[{len(w.memory)}] = {{", w.memory, "};") if w.memory else []

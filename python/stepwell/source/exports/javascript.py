@@ -177,14 +177,14 @@ console.log(s.$shown[0]);"""
         return ["constructor(given = {}) {", *indented(lines, "  "), "}"]
 
     def _initial(self, w: Written) -> list[str]:
-        carried = w.slot if "start" in w.functions else ""
+        carried = w.slot if w.carries else ""
         lines = []
         for of, n in w.arguments:
             numbers = f"{n} number{'s' * (n > 1)}"
             lines.append(f"if ({of}.length !== {n}) throw new RangeError(`{of}: expected {numbers}, got ${{{of}.length}}`);")
         lines.append("const s = { step: 0 };")
         lines += ["s.tally = 0; // what the control has added up"] * bool(w.evaluations)
-        remembered = f"s.memory = {self.array_type}.from([{', '.join(w.memory)}]); // what the controller remembers"
+        remembered = f"s.memory = {self.array_type}.from([{', '.join(w.memory)}]); // {w.of_memory}"
         lines += [remembered] * bool(w.memory)
         for name, of, n in w.blocks:
             array = f"new {self.array_type}({n})" if name == carried else f"{self.array_type}.from({of})"

@@ -200,7 +200,7 @@ print(s.$shown[0])"""
         arguments = ", ".join(name for name, _, _ in w.blocks)
         lines = ["self.step = 0  # k; the time is t0 + k*dt", *(f"self.{name} = {name}" for name, _, _ in w.blocks)]
         lines += [f"self.tally = {self.literal(0.0)}  # what the control has added up"] * bool(w.evaluations)
-        lines += [f"self.memory = [{', '.join(w.memory)}]  # what the controller remembers"] * bool(w.memory)
+        lines += [f"self.memory = [{', '.join(w.memory)}]  # {w.of_memory}"] * bool(w.memory)
         return [f"def __init__(self, {arguments}):", *indented(lines)]
 
     def _create(self, w: Written) -> list[str]:
@@ -216,7 +216,7 @@ print(s.$shown[0])"""
         return ["def __init__(self, **given):", *indented(lines)]
 
     def _initial(self, w: Written) -> list[str]:
-        carried, number = w.slot if "start" in w.functions else "", "float32" if self.single else "float"
+        carried, number = w.slot if w.carries else "", "float32" if self.single else "float"
         lines = []
         for of, n in w.arguments:
             numbers = f"{n} number{'s' * (n > 1)}"

@@ -153,7 +153,7 @@ fn main() {
         lines += ["}", "", "/// A state.", "#[allow(dead_code)]", "#[derive(Clone, Debug)]", f"pub struct {p}State {{"]
         lines += [f"    pub {name}: [{number}; {n}]," for name, _, n in w.blocks]
         lines += ["    /// What the control has added up.", f"    pub tally: {number},"] * bool(w.evaluations)
-        remembers = ["    /// What the controller remembers.", f"    pub memory: [{number}; {len(w.memory)}],"]
+        remembers = [f"    /// {w.of_memory.capitalize()}.", f"    pub memory: [{number}; {len(w.memory)}],"]
         lines += remembers * bool(w.memory)
         return [*lines, "    /// k; the time is t0 + k*dt.", "    pub step: u64,", "}"]
 
@@ -166,12 +166,12 @@ fn main() {
         return self._function("With the parameters with which it was exported.", "pub fn new() -> Self", inside)
 
     def _initial(self, w: Written) -> list[str]:
-        carried = w.slot if "start" in w.functions else ""
+        carried = w.slot if w.carries else ""
         fields = [f"{name}: [0.0; {n}]" if name == carried else f"{name}: {of}" for name, of, n in w.blocks]
         fields += ["tally: 0.0"] * bool(w.evaluations)
         fields += [f"memory: [{', '.join(w.memory)}]"] * bool(w.memory) + ["step: 0"]
         state = f"{camel(self.prefix)}State {{ {', '.join(fields)} }}"
-        return [f"let mut s = {state};"] if carried else [state]
+        return [f"let mut s = {state};"] if "start" in w.functions else [state]
 
     def _returned(self, w: Written, name: str) -> list[str]:
         # Without a carry the state itself is the last expression.

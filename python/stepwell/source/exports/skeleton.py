@@ -206,11 +206,10 @@ class Skeleton(Language, ABC):
     def _start(self, w: Written) -> list[str]:
         lines = self._initial(w)
         if (start := w.functions.get("start")) is not None:
-            to = {w.slot: f"{self.state}{w.slot}"}
-            lines += [
-                *self.carried,
-                *self._body(start, {"v": "velocities", "y": "coordinates"}, to, "The carry, in place of v."),
-            ]
+            to = {name: f"{self.state}{name}" for name in (w.slot, "memory")}
+            of = {"v": "velocities", "y": "coordinates", "memory": f"{self.state}memory"}
+            about = "The carry, in place of v." if w.carries else "What the method keeps."
+            lines += [*self.carried, *self._body(start, of, to, about)]
         return self._with_head(w, "start", [*lines, *self._returned(w, "start")])
 
     def _step(self, w: Written) -> list[str]:

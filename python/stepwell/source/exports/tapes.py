@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from math import prod
 from typing import Any, NamedTuple
@@ -147,11 +148,12 @@ class Traced:
 
     Attributes:
         operations: the operations of all its functions.
-        parts: its functions, by name: "step", and "start" and "finish" for a method that carries something other than v.
+        parts: its functions, by name: "step"; "start" for a method that carries something other than v or keeps blocks between
+            steps, and "finish" for one that carries.
         numbers: the name and the value of each parameter, in the tape's order.
         tables: the sampled inputs.
         force: the numbers of a force from outside; empty without one.
-        memory: what a sampled controller remembers at the start; empty without one.
+        memory: room for what the method keeps between steps, and what a sampled controller remembers at the start.
         count: the number of arithmetic operations of a step, including those before the steps.
     """
 
@@ -166,7 +168,8 @@ class Traced:
         self.operations = Operations()
         self.operations.first_of_force = None if plan.force is None else len(names)
         self.parts: dict[str, Part] = {}
-        for which in ("step", "start", "finish") if plan.method.carry else ("step",):
+        self.kept = plan.method.kept_numbers(prod(plan.system.v_shape), prod(plan.system.y_shape))
+        for which in ("step", "start", "finish") if plan.method.carry else ("step", "start")[: 1 + bool(self.kept)]:
             self.parts[which], tracer = self._part(which)
             if which == "step":
                 of_step = tracer
@@ -185,7 +188,8 @@ class Traced:
         numbers = [float(kind(own(value))) for value in of_step.numbers]
         self.numbers = list(zip(names, numbers, strict=False))
         self.force = numbers[len(names) :]
-        self.memory = [] if plan.memory is None else [float(kind(own(row))) for row in plan.memory]
+        remembered = [] if plan.memory is None else [float(kind(own(row))) for row in plan.memory]
+        self.memory = self.kept * [0.0] + remembered
         samples: list[Held] = of_step.tables
         self.tables = [
             Table(name, [float(each) for each in own(table.values, 1)], float(table.interval), float(table.start))
@@ -195,22 +199,26 @@ class Traced:
     def _part(self, which: str) -> tuple[Part, Named]:
         plan, tape = self.plan, _core.Tape(single=self.plan.single)
         tracer = Named(plan.system, tape, plan.force)
-        method, v_shape = plan.method, plan.system.v_shape
-        symbols = (
-            tracer.step(method, plan.choice) if which == "step" else tracer.slot(method, which, plan.choice)[: prod(v_shape)]
-        )
+        method, v_shape, y_shape = plan.method, plan.system.v_shape, plan.system.y_shape
+        if which == "step":
+            symbols = tracer.step(method, plan.choice)
+        else:
+            state = prod(v_shape) + prod(y_shape)
+            made = slice(state, state + self.kept) if self.kept else slice(prod(v_shape))
+            symbols = tracer.slot(method, which, plan.choice)[made]
         operations, roots = _fused(tape, symbols) if plan.fused else tape.operations(symbols)
         names = tracer.names
         if plan.fused:
             tape, names, _ = increments_last(tracer, symbols, plan.single)
         slot = method.carry or "v"
         before, after = {"step": (slot, slot), "start": ("v", slot), "finish": (slot, "v")}[which]
-        inputs = elements(before, v_shape) + elements("y", plan.system.y_shape)
-        results = elements(f"{after}'", v_shape)
+        inputs = elements(before, v_shape) + elements("y", y_shape)
+        results = elements(f"{after}'", v_shape) if which == "step" or method.carry else elements(f"{MEMORY}'", (self.kept,))
+        memory = (self.kept + (plan.memory_numbers if plan.system.controller is not None else 0),)
+        if which == "step" or not method.carry:
+            inputs += elements(MEMORY, memory)
         if which == "step":
-            results += elements("y'", plan.system.y_shape)
-            memory = (plan.memory_numbers,) if plan.system.controller is not None else (0,)
-            inputs, results = inputs + elements(MEMORY, memory), results + elements(f"{MEMORY}'", memory)
+            results += elements("y'", y_shape) + elements(f"{MEMORY}'", memory)
             if plan.system.control is not None:
                 inputs, results = [*inputs, TALLY], [*results, f"{TALLY}'"]
         return Part(tape, names, self.operations.add(operations, roots), inputs, results), tracer
@@ -226,8 +234,19 @@ def about(plan: engine.Plan) -> int:
 TALLY = "tally"
 
 
-#: What a sampled controller remembers.
+#: What a method keeps between steps, and what a sampled controller remembers.
 MEMORY = "memory"
+
+
+def placed(names: Sequence[str]) -> list[tuple[str, int]]:
+    """For each of these numbers its block and its place there; −1 of the sum of a control, which is one number."""
+    counts: Counter[str] = Counter()
+    places = []
+    for name in names:
+        block = name.partition("[")[0].rstrip("'")
+        places.append((block, -1 if block == TALLY else counts[block]))
+        counts[block] += 1
+    return places
 
 
 def elements(name: str, shape: Shape) -> list[str]:

@@ -23,7 +23,7 @@ from .loops import Writer as LoopWriter
 from .names import Field, Names, fields
 from .program import FORCE, Assignment, Function, Loop, Place, Statement, Table, texts
 from .statements import Statements
-from .tapes import MAX_OPERATIONS, MAX_SHORT, MEMORY, STATE, STEP, TALLY, Operations, Part, Traced, elements, too_long
+from .tapes import MAX_OPERATIONS, MAX_SHORT, STATE, STEP, Operations, Part, Traced, elements, placed, too_long
 
 #: Names that are taken in a function: its arguments and the time.
 LOCALS = ("m", "s", "t", "self", "coordinates", "velocities", FORCE)
@@ -41,7 +41,7 @@ class Written:
     Attributes:
         parameters: the fields that users may change, dt and t0 first.
         hoisted: values computed from them before the steps.
-        functions: "step", and "start" and "finish" for a method that carries something other than v.
+        functions: "step"; "start" for a method that carries something other than v or keeps blocks, "finish" for the former.
         tables: the sampled inputs.
         slot: the name of the first block of a state.
         n_v: the length of the first block.
@@ -104,8 +104,14 @@ class Written:
 
     @property
     def memory(self) -> list[str]:
-        """What a sampled controller remembers at the start; empty without one."""
+        """Room for what the method keeps, and what a sampled controller remembers at the start; empty without both."""
         return [self.language.signed(x) for x in self.traced.memory]
+
+    @property
+    def of_memory(self) -> str:
+        """What the memory holds, for a comment."""
+        controller = "what the controller remembers" if len(self.traced.memory) > self.traced.kept else ""
+        return ", and ".join(each for each in ("what the method keeps" if self.traced.kept else "", controller) if each)
 
     @property
     def carries(self) -> bool:
@@ -186,7 +192,7 @@ class Written:
             at = int(np.ravel_multi_index(place, self._shapes[field])) if shapes[field] else -1
             return f"{language.me}{field}", at
 
-        def source(part: Part, line: int) -> LoopPlace:
+        def source(places: list[tuple[str, int]], line: int) -> LoopPlace:
             name, _, extra = operations.all[line]
             if line in hoisted_places:
                 return hoisted_places[line]
@@ -198,8 +204,8 @@ class Written:
                 return f"@{FORCE}", extra - len(self.traced.numbers)
             if name != "state":
                 return before(line)
-            block = part.inputs[extra].partition("[")[0]
-            return f"@{block}", self._at(block, extra)
+            block, at = places[extra]
+            return f"@{block}", at
 
         inner = [line for line in operations.needed(hoisted, lambda line: False) if operations.all[line][1]]
         first = loops.looped(inner, hoisted, before, keep=True)
@@ -213,16 +219,11 @@ class Written:
         ]
         self.hoisted_size = first.size
         functions = {
-            name: self._loops(name, part, operations, loops, hoisted_places, partial(source, part))
+            name: self._loops(name, part, operations, loops, hoisted_places, partial(source, placed(part.inputs)))
             for name, part in self.traced.parts.items()
         }
         self.places = {name: places for places, name in loops.tables.items()}
         return functions
-
-    def _at(self, block: str, number: int) -> int:
-        """The place in a block of a number of the state; −1 of the sum of a control, which is one number."""
-        before = {TALLY: number + 1, MEMORY: self.n_v + self.n_y, "y": self.n_v}
-        return number - before.get(block, 0)
 
     def _loops(
         self,
@@ -250,10 +251,7 @@ class Written:
         values = list(body.places)
         for i, place in zip(own, aside, strict=True):
             values[i] = place
-        to: list[LoopPlace] = []
-        for i, name in enumerate(part.results):
-            block = name.partition("'")[0]
-            to.append((f"#{block}", self._at(block, i)))
+        to = [(f"#{block}", at) for block, at in placed(part.results)]
         lines = [*body.loops, *loops.moved([body.places[i] for i in own], aside), *loops.moved(values, to)]
         needs_time = any(re.search(r"\bt\b", text) for text in texts(lines))
         return Function([], needs_time, [], list(lines), [], body.size + len(own))
@@ -283,12 +281,11 @@ class Written:
         lanes = Lanes(operations, needed, source, label)
         to: dict[int, list[LoopPlace]] = defaultdict(list)  # where results are written, by their line
         aside: list[tuple[LoopPlace, LoopPlace]] = []
-        for i, (line, result) in enumerate(zip(part.roots, part.results, strict=True)):
-            block = result.partition("'")[0]
-            place = f"#{block}", self._at(block, i)
+        for line, (block, at) in zip(part.roots, placed(part.results), strict=True):
+            place = f"#{block}", at
             if line in lanes.of:
                 to[line].append(place)
-            elif (source(line)[0][1:], source(line)[1]) != (block, place[1]) or name != "step":
+            elif (source(line)[0][1:], source(line)[1]) != (block, at) or name != "step":
                 aside.append((source(line), place))
         language.names = Names((*LOCALS, "i", WORK))
         written = LaneWriter(operations, loops, lanes, source, to, {place for place, _ in aside})
@@ -308,13 +305,13 @@ class Written:
         reads: dict[int, Place] = {}
         leaf_names: set[str] = set()
 
-        def place(names: list[str], i: int) -> Place:
-            """The place of a number of the state; the sum of a control comes last."""
-            block = names[i].partition("[")[0].rstrip("'")
-            return Place(block, self._at(block, i), language.names(names[i]))
+        def places(names: list[str]) -> list[Place]:
+            return [Place(block, at, language.names(name)) for (block, at), name in zip(placed(names), names, strict=True)]
+
+        inputs = places(part.inputs)
 
         def state(i: int) -> Leaf:
-            reads[i] = place(part.inputs, i)
+            reads[i] = inputs[i]
             return Leaf(Formula(reads[i].name), tape.state(i), 4)
 
         entries: list[Leaf] = []
@@ -357,7 +354,7 @@ class Written:
             lines = [self._assignment(line) for line in after.lines]
         else:
             lines = Statements(branched, writer, leaf, leaves, part.roots, part.results).lines
-        writes = [place(part.results, i) for i in range(len(part.results))]
+        writes = places(part.results)
         return Function(
             [reads[i] for i in sorted(reads)],
             "time" in leaf_names,
