@@ -97,8 +97,8 @@ def test_every_bit_of_other_pairs(language: str, tmp_path: Path) -> None:
 
 @languages
 def test_every_bit_of_fused_steps(language: str, tmp_path: Path) -> None:
-    if language == "javascript":
-        with pytest.raises(sw.errors.UnsupportedError, match="fused: JavaScript has no fused multiply-add"):
+    if language in ("csharp", "javascript"):
+        with pytest.raises(sw.errors.UnsupportedError, match=r"fused: (C#|JavaScript) has no fused multiply-add"):
             sw.export(sw.Oscillator(), "rk4", language, fused=True)
         return
     names = ["damped", "sinusoids x and a, damped", "sampled x and a, physical", "pendulum, damped", "Arenstorf's moon"]
@@ -201,7 +201,7 @@ def random_rates(seed: int) -> Any:
 
 
 #: How many random rates are exported; compilers take longest.
-CHOICES = {"c": 8, "javascript": 12, "python": 24, "rust": 8}
+CHOICES = {"c": 8, "csharp": 8, "javascript": 12, "python": 24, "rust": 8}
 
 
 @languages
@@ -461,8 +461,14 @@ def test_each_operation_counts(tmp_path: Path) -> None:
 def test_a_wrong_operation_is_noticed_in_every_language(language: str, tmp_path: Path) -> None:
     each = Journey(sw.Pendulum(1.3), "merson", 4.0, 5.5, steps=90)
     source = each.export(language, "step_0").source
-    begin = {"c": "double step_0_sine(", "javascript": "function sine(", "python": "def sine(", "rust": "fn sine("}[language]
-    changed = mutants(source, begin, "The state after the step")[:: 20 if language in ("c", "rust") else 7]
+    begin = {
+        "c": "double step_0_sine(",
+        "csharp": "double _sine(",
+        "javascript": "function sine(",
+        "python": "def sine(",
+        "rust": "fn sine(",
+    }[language]
+    changed = mutants(source, begin, "The state after the step")[:: 20 if language in ("c", "csharp", "rust") else 7]
     assert len(changed) > 3
     for mutant in changed:
         (numbers,) = run(language, [each], tmp_path, [mutant])

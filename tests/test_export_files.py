@@ -359,7 +359,7 @@ def test_it_can_be_kept(tmp_path: Path) -> None:
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "howto" / "export.md"
 
 
-@pytest.mark.parametrize("fence", [pytest.param(each, id=each) for each in ("c", "javascript", "rust")])
+@pytest.mark.parametrize("fence", [pytest.param(each, id=each) for each in ("c", "csharp", "javascript", "rust")])
 def test_the_programs_of_the_page_run(fence: str, tmp_path: Path) -> None:
     """All print the number that the page prints in Python."""
     if missing(fence):
@@ -367,14 +367,17 @@ def test_the_programs_of_the_page_run(fence: str, tmp_path: Path) -> None:
     text = PAGE.read_text(encoding="utf-8")
     (code,) = re.findall(rf"^```{fence}\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     (wanted,) = re.findall(r"print\(s\.y\[0\], .*\)  # → (\S+) True", text)
-    ending = {"c": "c", "javascript": "mjs", "rust": "rs"}[fence]
+    ending = {"c": "c", "csharp": "cs", "javascript": "mjs", "rust": "rs"}[fence]
     sw.export(sw.Pendulum(omega=2.0), "leapfrog", fence, dt=1 / 60, name="swing").save(tmp_path / f"swing.{ending}")
     (tmp_path / f"game.{ending}").write_text(code, encoding="utf-8")
     if fence == "c":
         executed(["cc", *C_FLAGS, "game.c", "-lm", "-o", "game"], tmp_path)
     elif fence == "rust":
         executed(["rustc", *RUST_FLAGS, "game.rs", "-o", "game"], tmp_path)
-    command = ["node", "game.mjs"] if fence == "javascript" else [tmp_path / "game"]
+    elif fence == "csharp":
+        executed(["mcs", "game.cs", "swing.cs"], tmp_path)
+    commands: dict[str, list[Any]] = {"csharp": ["mono", "game.exe"], "javascript": ["node", "game.mjs"]}
+    command = commands.get(fence, [tmp_path / "game"])
     assert float(executed(command, tmp_path)) == float(wanted)
 
 

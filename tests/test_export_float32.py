@@ -57,8 +57,8 @@ def test_what_a_file_says() -> None:
 
 
 def test_what_does_not_go_is_refused() -> None:
-    for language in ("javascript", "python"):
-        with pytest.raises(UnsupportedError, match=r"fused: (JavaScript|Python) has no fused multiply-add"):
+    for language in ("csharp", "javascript", "python"):
+        with pytest.raises(UnsupportedError, match=r"fused: (C#|JavaScript|Python) has no fused multiply-add"):
             sw.export(sw.Oscillator(), "rk4", language, fused=True, dtype="float32")  # type: ignore[arg-type]
     sampled = sw.Oscillator(a=sw.Sampled([1.0, 2.0], 1.0))
     for system, method, options, error, message in (

@@ -109,7 +109,9 @@ def test_every_bit_of_loops_over_lanes(language: str, tmp_path: Path, monkeypatc
     monkeypatch.setattr(written, "MAX_SHORT", 100)
     every = journeys()
     sources = [each.export(language, f"step_{i}") for i, each in enumerate(every)]
-    begin = {"c": "for (int i", "javascript": "for (let i", "rust": "for i in", "python": "for i in"}[language]
+    begin = {"c": "for (int i", "csharp": "for (int i", "javascript": "for (let i", "rust": "for i in", "python": "for i in"}[
+        language
+    ]
     assert all(begin in each.source for each in sources)
     assert_same(every, run(language, every, tmp_path, [each.source for each in sources]))
 

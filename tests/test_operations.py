@@ -12,6 +12,7 @@ from stepwell.reference.tape.evaluate import Evaluation
 from stepwell.reference.tape.operations import OPERATIONS, meaning, of_tape
 from stepwell.reference.tape.replay import Replay
 from stepwell.source.exports.c import C
+from stepwell.source.exports.csharp import CSharp
 from stepwell.source.exports.javascript import JavaScript
 from stepwell.source.exports.plain_python import Python
 from stepwell.source.exports.rust import Rust
@@ -66,7 +67,7 @@ def same(precision: Any, a: Any, b: Any) -> bool:
     return bool(np.all(equal | (np.isnan(a) & np.isnan(b))))
 
 
-@pytest.mark.parametrize("language", [C, JavaScript, Python, Rust])
+@pytest.mark.parametrize("language", [C, CSharp, JavaScript, Python, Rust])
 def test_every_language_writes_every_operation(language: Any) -> None:
     """Comparisons have a sign, operations on bits a function of the file, others of one number a function of the language."""
     for name, kind in OPERATIONS.items():

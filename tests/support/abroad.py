@@ -24,12 +24,15 @@ PATIENCE = 300
 C_FLAGS = ["-O2", "-ffp-contract=off", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
 RUST_FLAGS = ["--edition=2021", "-C", "opt-level=1", "-C", "debuginfo=0", "-D", "warnings"]
 
-TOOLS = {"c": "cc", "javascript": "node", "rust": "rustc", "python": "python"}
+#: Without warnings of what the code of a step may leave unused.
+CSHARP_FLAGS = ["-langversion:6", "-warn:0"]
+
+TOOLS = {"c": "cc", "csharp": "mcs", "javascript": "node", "rust": "rustc", "python": "python"}
 
 
 def missing(language: str) -> bool:
     """Whether this machine cannot run a language."""
-    return language != "python" and shutil.which(TOOLS[language]) is None
+    return language != "python" and (shutil.which(TOOLS[language]) is None or (language == "csharp" and not shutil.which("mono")))
 
 
 @dataclass
@@ -110,7 +113,9 @@ def run(language: str, journeys: Sequence[Journey], folder: Path, sources: Seque
     """What comes of each: velocities, coordinates, what a control has given. ``sources`` stand in the place of the exports."""
     if sources is None:
         sources = [each.export(language, f"step_{i}").source for i, each in enumerate(journeys)]
-    lines = {"c": _c, "javascript": _javascript, "rust": _rust, "python": _python}[language](journeys, sources, folder)
+    lines = {"c": _c, "csharp": _csharp, "javascript": _javascript, "rust": _rust, "python": _python}[language](
+        journeys, sources, folder
+    )
     return [[struct.unpack("<d", struct.pack("<Q", int(word, 16)))[0] for word in line.split()] for line in lines]
 
 
@@ -173,6 +178,37 @@ def _javascript(journeys: Sequence[Journey], sources: Sequence[str], folder: Pat
         text += f"  console.log([{', '.join(f'...({part})' for part in parts)}].map(word).join(' ')); }}\n"
     (folder / "all.mjs").write_text(begin + text, encoding="utf-8")
     return executed(["node", "all.mjs"], folder).splitlines()
+
+
+def _csharp(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> list[str]:
+    text = "using System;\nstatic class All {\n    static void tell(params double[] x) {\n"
+    text += '        foreach (double each in x) Console.Write("{0:x} ", BitConverter.DoubleToInt64Bits(each));\n    }\n'
+    text += "    static void tell(float[] x) { foreach (float each in x) tell((double)each); }\n"
+    for i, (each, source) in enumerate(zip(journeys, sources, strict=True)):
+        (folder / f"step_{i}.cs").write_text(source, encoding="utf-8")
+        number, suffix = ("float", "f") if each.single else ("double", "")
+
+        def array(block: Sequence[float], number: str = number, suffix: str = suffix) -> str:
+            return f"new {number}[] {{ {', '.join(f'{x!r}{suffix}' for x in block)} }}"
+
+        start = [array(block) for block in each.blocks if block]
+        force = {of: [array(each.force)] * each.takes_force(source, f" {of}(") for of in ("Start", "Step")}
+        text += f"    static void run_{i}() {{\n        var m = new Step{i}();\n"
+        text += "".join(f"        m.{name} = {value!r}{suffix};\n" for name, value in each.changed.items())
+        text += f"        m.Prepare();\n        var s = m.Start({', '.join([*start, *force['Start']])});\n"
+        text += f"        for (int k = 0; k < {each.steps}; k++) m.Step({', '.join(['s', *force['Step']])});\n"
+        if each.carries:
+            push = [array(each.force)] * each.takes_force(source, " Finish(")
+            text += f"        tell(m.Finish({', '.join(['s', *push])}));\n"
+        elif each.blocks[0]:
+            text += "        tell(s.v);\n"
+        text += "        tell(s.y);\n" if each.blocks[1] else ""
+        text += "        tell(m.Work(s));\n" if each.works else ""
+        text += "        Console.WriteLine();\n    }\n"
+    text += f"    static void Main() {{ {' '.join(f'run_{i}();' for i in range(len(journeys)))} }}\n}}\n"
+    (folder / "all.cs").write_text(text, encoding="utf-8")
+    executed(["mcs", *CSHARP_FLAGS, "-out:all.exe", "all.cs", *(f"step_{i}.cs" for i in range(len(journeys)))], folder)
+    return executed(["mono", "all.exe"], folder).splitlines()
 
 
 def _rust(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> list[str]:

@@ -14,11 +14,11 @@ from stepwell import _core
 from stepwell.runs import engine
 from stepwell.source.exports.head import EXAMPLE
 
-from support.abroad import C_FLAGS, RUST_FLAGS, Journey, executed, missing, same
+from support.abroad import C_FLAGS, CSHARP_FLAGS, RUST_FLAGS, Journey, executed, missing, same
 from support.cases import SYSTEMS, fits, number
 from support.tracing import METHODS
 
-LANGUAGES = ["c", "javascript", "python", "rust"]
+LANGUAGES = ["c", "csharp", "javascript", "python", "rust"]
 
 
 MEMBERS, MEMBER = 3, 1
@@ -44,7 +44,7 @@ def journey(name: str, method: sw.Method, start: str | None = None, control: Any
 
 
 #: Of all pairs of a system and a method each language is tried with one in so many, each with others. Compilers take longest.
-SHARE = {"c": 29, "javascript": 18, "python": 16, "rust": 23}
+SHARE = {"c": 29, "csharp": 23, "javascript": 18, "python": 16, "rust": 23}
 
 
 #: Systems whose steps are long; they are tried with the methods whose steps are short.
@@ -131,6 +131,11 @@ def shown(step: sw.ExportedStep, folder: Path) -> float:
             (folder / "example.c").write_text(example(step), encoding="utf-8")
             executed(["cc", *C_FLAGS, "example.c", "-lm", "-o", "example"], folder)
             command: list[Any] = [folder / "example"]
+        case "C#":
+            step.save(folder / f"{step.name}.cs")
+            (folder / "example.cs").write_text(example(step), encoding="utf-8")
+            executed(["mcs", *CSHARP_FLAGS, "example.cs", f"{step.name}.cs"], folder)
+            command = ["mono", "example.exe"]
         case "JavaScript":
             step.save(folder / f"{step.name}.mjs")
             (folder / "example.mjs").write_text(example(step), encoding="utf-8")

@@ -47,4 +47,4 @@ Cost = Literal["time", "evaluations"]
 Dtypes = Literal["float64", "float32", "both"]
 
 #: Languages of exported steps.
-LanguageName = Literal["c", "javascript", "python", "rust"]
+LanguageName = Literal["c", "csharp", "javascript", "python", "rust"]

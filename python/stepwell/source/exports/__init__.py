@@ -24,6 +24,7 @@ from ...runs.findings import warn_of
 from ...runs.options import Options
 from ...runs.request import Request
 from .c import C
+from .csharp import CSharp
 from .head import head
 from .javascript import JavaScript
 from .names import Names, prefix, snake
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ExportedStep", "export"]
 
-LANGUAGES: dict[str, type[Skeleton]] = {"c": C, "javascript": JavaScript, "python": Python, "rust": Rust}
+LANGUAGES: dict[str, type[Skeleton]] = {"c": C, "csharp": CSharp, "javascript": JavaScript, "python": Python, "rust": Rust}
 
 
 def export(
@@ -67,7 +68,7 @@ def export(
     Args:
         system: the system; one trajectory of it.
         method: its name, or what ``stepwell.method`` returns.
-        language: ``"c"`` (C99), ``"javascript"`` (a module), ``"python"`` (without NumPy) or ``"rust"``.
+        language: ``"c"`` (C99), ``"csharp"``, ``"javascript"`` (a module), ``"python"`` (without NumPy) or ``"rust"``.
         dt: the initial value of the step in the file, in units of time; users may change it there, like the parameters.
         t0: the time of step 0, likewise.
         v: velocities of the example at the head of the file, shape (*block); zero if None. A control without a target keeps the
@@ -79,7 +80,7 @@ def export(
         force: True for a step with an argument ``force``, which is added to v̇ in every stage and may differ from step to step, as
             in ``World``. An array of the shape of v, or of v with the batch, is the force of the example at the head of the file.
             A method that carries something other than v needs the force in its start and finish, too.
-        fused: whether to use fused multiply-adds, as in ``integrate``. JavaScript has none, Python has them from 3.13 on.
+        fused: whether to use fused multiply-adds, as in ``integrate``. JavaScript and C# have none, Python has them from 3.13 on.
         name: the name or prefix of functions and types; None for one made from the system and the method.
         dtype: ``"float64"`` or ``"float32"``, as in ``integrate``. In float32 the numbers are C's ``float`` and Rust's ``f32``;
             JavaScript rounds each operation by ``Math.fround``, and Python needs NumPy.

@@ -21,6 +21,8 @@ lambda let long loop macro main match mod move mut native new None nonlocal not 
 protected pub public raise ref register restrict return self Self short signed sizeof static static_assert struct super switch
 synchronized template this thread_local throw throws trait transient true True try type typedef typeof union unsafe unsigned
 unsized use usize using var virtual void volatile where while with yield
+base checked decimal delegate event explicit fixed foreach implicit internal lock namespace object operator out params readonly
+sbyte sealed stackalloc string uint ulong unchecked ushort
 i386 linux unix DOMAIN HUGE HUGE_VAL INFINITY MAXFLOAT NAN NULL OVERFLOW PLOSS SING TLOSS UNDERFLOW X_TLOSS
 M_1_PI M_2_PI M_2_SQRTPI M_E M_LN10 M_LN2 M_LOG10E M_LOG2E M_PI M_PI_2 M_PI_4 M_SQRT1_2 M_SQRT2
 abs acos asin atan ceil cos errno exp f floor fma fmod i inf isnan log m math memcpy nan pow printf s signal sin sqrt stdin
@@ -31,6 +33,7 @@ stdout stderr strlen struct tan time u64
 TYPES = """
 Array ArrayBuffer BigInt BigInt64Array BigUint64Array Box Boolean Clone Copy Debug Default Error Float64Array Function Infinity
 Math NaN Number Object Option Range RangeError Result Self String Symbol TypeError ImportError ValueError Vec None True False
+ArgumentException BitConverter
 """
 
 RESERVED, HIDING = frozenset(WORDS.split()), frozenset(TYPES.split())
