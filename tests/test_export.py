@@ -343,7 +343,7 @@ def test_functions_are_called_by_name() -> None:
     for language in LANGUAGES:
         source = sw.export(Knot(1.1), "standard_euler", language, name="knot").source
         for function in FUNCTIONS:
-            assert len(re.findall(rf"\b(?:knot_)?{function}\(", source)) == 2, (
+            assert len(re.findall(rf"\b(?:knot_|_)?{function}\(", source)) == 2, (
                 language,
                 function,
             )  # where it is and where it is called
