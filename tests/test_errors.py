@@ -374,7 +374,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: sw.export(sw.Chain(10**7), "rk4", "c"),
         E.UnsupportedError,
-        "at most 400000 are written; export a smaller system",
+        "at most 3000000 are written; export a smaller system",
     ),
     (
         lambda: run(y=np.ones(1000), steps=10**12, every=1),

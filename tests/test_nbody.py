@@ -42,6 +42,7 @@ RANDOM = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:bodies .* of each other at step")
 @settings(max_examples=60, deadline=None)
 @given(**RANDOM, method=st.sampled_from(METHODS))
 def test_momentum_is_kept_by_every_method(seed: int, n: int, dim: int, force: str, method: str) -> None:

@@ -278,7 +278,7 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: Shape
             i, j = met.bodies
             if drifts:
                 text = (
-                    f"bodies {i} and {j}{of_member(index)} came to {met.distance:.3g} of each other in step {met.step} "
+                    f"bodies {i} and {j}{of_member(index)} came to {met.distance:.3g} of each other at step {met.step} "
                     f"(t = {time_of(run, met.step, index):g}), nearer than {encounters.HILL_RADII:g} Hill radii, and "
                     f'{run.method.name} does not follow close encounters; use "dop853" with tolerance='
                 )

@@ -25,8 +25,9 @@ WEAK = 0.01
 
 #: Planets nearer to each other than so many of their Hill radii move each other about as much as their orbits allow: a method
 #: that kicks them once a step off Kepler's orbits does not follow that, and Mercurius and TRACE change their method about there
-#: (Rein et al. 2019; Lu, Hernandez, Rein 2024).
-HILL_RADII = 3.0
+#: (Rein et al. 2019; Lu, Hernandez, Rein 2024). Steps in which they move by less than this share of their distance, some sixty
+#: for a turn around each other, follow it nevertheless.
+HILL_RADII, FOLLOWED = 3.0, 0.1
 
 #: A warning names the bodies that collided or passed each other if repeating the member's run takes at most this many steps ×
 #: numbers, which is a moment. Otherwise ``Run.collisions`` and ``Run.encounters`` find them.
@@ -113,6 +114,8 @@ def met_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], flo
 def near_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], float] | None:
     """The first step in which two bodies of one member, neither of which is the first, came within HILL_RADII of each other.
 
+    Steps that are short beside the encounter do not count.
+
     Args and result as of ``met_in``.
     """
     planets = [pair for pair in zip(*bodies.pairs(), strict=True) if 0 not in pair]
@@ -125,9 +128,11 @@ def near_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], fl
         share = np.clip(-(before * moved).sum(axis=-1) / (moved * moved).sum(axis=-1), 0.0, 1.0)
         nearest = before + np.nan_to_num(share)[..., np.newaxis] * moved
         distance = np.sqrt((nearest * nearest).sum(axis=-1))
+        way = np.sqrt((moved * moved).sum(axis=-1))
         place = np.sqrt(((y[1:, 1:] - y[1:, :1]) ** 2).sum(axis=-1))
         size = 0.5 * (place[:, first - 1] + place[:, second - 1])
-        near = np.argwhere(distance < HILL_RADII * size * _hill(bodies.masses, first, second))
+        passes = way > FOLLOWED * distance
+        near = np.argwhere(passes & (distance < HILL_RADII * size * _hill(bodies.masses, first, second)))
     if not len(near):
         return None
     step, pair = near[0].tolist()
