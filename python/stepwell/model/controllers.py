@@ -20,6 +20,7 @@ from ..errors import ArgumentError, DTypeError, ShapeError, TraceError, UnknownN
 from ..reference.sampled import Loop
 from ..reference.signal import Constant
 from .around import Part
+from .equations.by_name import reduced
 from .equations.namespace import rebound
 from .equations.trace import kind_of, run_function, scalars
 from .equations.values import Scalar, array, objects
@@ -140,26 +141,7 @@ class ControllerDefinition:
         return self
 
     def __reduce__(self) -> Any:
-        import sys
-
-        definition: Any = sys.modules.get(self.__module__)
-        for part in self.__qualname__.split("."):
-            definition = getattr(definition, part, None)
-        if definition is not self:
-            raise ArgumentError(
-                f"{self.name}: a controller is pickled by the name of its function, so expected one at the top of a module, got "
-                f"{self.__module__}.{self.__qualname__}"
-            )
-        return _definition, (self.__module__, self.__qualname__)
-
-
-def _definition(module: str, name: str) -> Any:
-    import importlib
-
-    definition: Any = importlib.import_module(module)
-    for part in name.split("."):
-        definition = getattr(definition, part)
-    return definition
+        return reduced(self, "a controller")
 
 
 def _arguments(function: FunctionType) -> tuple[bool, dict[str, Any], dict[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import sys
 from collections.abc import Callable
 from math import prod
 from types import FunctionType
@@ -16,6 +15,7 @@ from ...base.arrays import Shape
 from ...base.immutable import frozen
 from ...errors import ArgumentError, DTypeError, ShapeError, UnknownNameError
 from ..inputs import Sampled, Sinusoid
+from .by_name import reduced
 from .friction import Friction, FrictionOf, friction, place_of
 from .invariants import Invariant, invariant
 from .mass import MassMatrix, mass_matrix
@@ -170,24 +170,7 @@ class Definition:
         return self
 
     def __reduce__(self) -> Any:
-        definition: Any = sys.modules.get(self.__module__)
-        for part in self.__qualname__.split("."):
-            definition = getattr(definition, part, None)
-        if definition is not self:
-            raise ArgumentError(
-                f"{self.name}: an own system is pickled by the name of its function, so expected one at the top of a module, "
-                f"got {self.__module__}.{self.__qualname__}"
-            )
-        return _definition, (self.__module__, self.__qualname__)
-
-
-def _definition(module: str, name: str) -> Any:
-    import importlib
-
-    definition: Any = importlib.import_module(module)
-    for part in name.split("."):
-        definition = getattr(definition, part)
-    return definition
+        return reduced(self, "an own system")
 
 
 def _changes(value: Any) -> bool:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Collection
+from types import FunctionType
 from typing import Any, Literal, NamedTuple, get_args
 
 from ...base import checks
 from ...base.arrays import Shape
 from ...errors import ArgumentError, DTypeError
+from .of_state import parameters_of
 from .values import of_shape
 
 #: What friction acts on.
@@ -58,20 +59,6 @@ def place_of(of: Any, component: Any) -> tuple[int, ...] | None:
 
 def friction(system: str, parameters: Collection[str], function: Any, of: str, component: tuple[int, ...] | None) -> Friction:
     """The friction that a function declares, for a system of this name and parameters; see ``Definition.friction``."""
-    if not inspect.isfunction(function):
+    if not isinstance(function, FunctionType):
         raise DTypeError(f"{system}: expected a function as friction, got {type(function).__name__}")
-    name = f"{system}: {function.__name__}"
-    arguments = list(inspect.signature(function).parameters.values())
-    in_place = [each for each in arguments if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
-    expected = "(t, v, y, *, …)"
-    if in_place[:3] != arguments[:3] or len(in_place) < 3:
-        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, arguments))})")
-    checks.argument_order(name, function, ("t", "v", "y"))
-    for each in arguments[3:]:
-        if each.name not in parameters:
-            known = ", ".join(parameters) or "none"
-            raise ArgumentError(
-                f"{name}: expected a function {expected} whose further arguments are parameters of the system, got "
-                f"{each.name!r}. Known: {known}."
-            )
-    return Friction(function, tuple(each.name for each in arguments[3:]), of, component)
+    return Friction(function, parameters_of(system, ("t", "v", "y"), parameters, function, "(t, v, y, *, …)"), of, component)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Collection
 from functools import cached_property
 from itertools import count
 from math import prod
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ... import _core
-from ...base import checks
 from ...errors import ArgumentError
 from ...reference.marks import recording
 from ...reference.tape.replay import Replay
 from .function import TracedFunction
+from .of_state import arguments_in_place, parameters_of
 from .series import MarkedReplay
 
 
@@ -38,26 +38,14 @@ class Invariant(NamedTuple):
 
 def invariant(system: str, state: tuple[str, ...], parameters: Collection[str], function: Any) -> Invariant:
     """The invariant that a function declares, for a system of this name, state and parameters; see ``Definition.invariant``."""
-    if not inspect.isfunction(function):
+    if not isinstance(function, FunctionType):
         raise ArgumentError(f"{system}: expected a function as an invariant, got {type(function).__name__}")
-    name = f"{system}: {function.__name__}"
-    arguments = list(inspect.signature(function).parameters.values())
-    in_place = [each for each in arguments if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
+    in_place = arguments_in_place(function)
     # The time is one more argument before the parameters.
     takes_time = len(in_place) > len(state) and in_place[len(state)].name not in parameters
-    n = len(state) + takes_time
     expected = f"({', '.join(state)}, *, …) or (t, {', '.join(state)}, *, …)"
-    if in_place[:n] != arguments[:n] or len(in_place) < n:
-        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, arguments))})")
-    checks.argument_order(name, function, ("t", *state) if takes_time else state)
-    for each in arguments[n:]:
-        if each.name not in parameters:
-            known = ", ".join(parameters) or "none"
-            raise ArgumentError(
-                f"{name}: expected a function {expected} whose further arguments are parameters of the system, got "
-                f"{each.name!r}. Known: {known}."
-            )
-    return Invariant(function.__name__, function, tuple(each.name for each in arguments[n:]), takes_time)
+    names = parameters_of(system, ("t", *state) if takes_time else state, parameters, function, expected)
+    return Invariant(function.__name__, function, names, takes_time)
 
 
 class Traced:
