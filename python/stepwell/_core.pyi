@@ -36,7 +36,9 @@ __all__ = [
     "run",
     "series_evaluations",
     "sound",
+    "stages",
     "systems",
+    "tape_number",
     "tape_operations",
     "times",
 ]
@@ -94,6 +96,14 @@ class ModelSpec:
         acceptance: tuple[tuple[int, ...], bool, tuple[int, ...]] | None = None,
         backward: bool = False,
     ) -> ModelSpec: ...
+
+    @property
+    def rows(self) -> list[NDArray[np.float64]]:
+        """The arrays of parameters in order, whose rows are the parameters of a tape."""
+
+    @property
+    def tables(self) -> list[tuple[float, float, NDArray[np.float64]]]:
+        """The sampled inputs in order: start, interval, and a row for each sample."""
 
 @final
 class World:
@@ -333,6 +343,17 @@ def in_parts(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
 
     "rates" is by tapes of the rates, "hand" by a kernel for one member, "matrix" by products of matrices. None if it is one tape.
     """
+
+def stages(model: ModelSpec, *, choice: int = 0, attempts: bool = False) -> dict[str, Any]:
+    """The cut tapes of a run, each stage as one tape, for a machine that the core does not write code for.
+
+    ``v``, ``y``, ``kept``, ``memory``, ``tally`` and ``recorded`` are how many numbers of a member there are; ``carries`` is whether
+    the method has a carry. ``splits`` has by name, "step" and "start", "finish", "record", "begin", "judged", "by terms" where
+    they are, what ``compiled`` has as ``split``. ``tried`` is None but for attempts of float32.
+    """
+
+def tape_number(model: ModelSpec, *, choice: int = 0, attempts: bool = False) -> int:
+    """A number that stands for the tapes of a model in this process: what has the same number has the same tapes."""
 
 def operations(model: ModelSpec) -> int:
     """About how many operations a step of fixed length has, before any is traced."""

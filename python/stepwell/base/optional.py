@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import UnsupportedError
 
 #: Packages, and the extra that installs them.
-EXTRAS = {"xarray": "tables", "pandas": "tables", "zarr": "zarr", "gymnasium": "gym"}
+EXTRAS = {"xarray": "tables", "pandas": "tables", "zarr": "zarr", "gymnasium": "gym", "pyopencl": "gpu"}
 
 
 def imported(package: str, what: str) -> Any:

@@ -51,6 +51,7 @@ def integrate(
     backend: Backend = "rust",
     start_step: int | None = None,
     resume: Run | World | None = None,
+    device: str | None = None,
 ) -> Run:
     """Step a system, or a batch of it.
 
@@ -126,6 +127,9 @@ def integrate(
             the run begins anew there from this state; with a tolerance at the last time that was asked for. Another ``dt``, or
             another method where more than the state is carried, is refused. Events are given again; if one changed the state,
             ``events`` is needed, and ``[]`` goes on without. Members that diverged stay as they are, without a second warning.
+        device: "cpu", or "opencl" for the first device of OpenCL and "opencl:1" for the second; ``stepwell.devices()`` lists them.
+            None is the CPU, or what the environment variable ``STEPWELL_DEVICE`` names. The bits are those of the CPU. Fixed
+            steps of up to some 20 000 operations; needs ``pip install "stepwell[gpu]"`` (docs/howto/gpu.md).
 
     Returns:
         A ``Run``.
@@ -155,7 +159,7 @@ def integrate(
     """
     options = Options(
         v, y, dt, steps, every, tolerance, at, control, force, record, events, form, fused, dtype, t0, start, max_steps, max_step,
-        jumps, positive, progress, threads, backend, start_step, resume,
+        jumps, positive, progress, threads, backend, start_step, resume, device,
     )  # fmt: skip
     run = noticing(Request.of(system, method, options), is_heard)
     warn_of(run.findings)

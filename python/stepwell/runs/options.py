@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -55,6 +56,7 @@ class Options(NamedTuple):
     backend: Any = "rust"
     start_step: Any = None
     resume: Any = None
+    device: Any = None
 
 
 #: The share of a component by which it may be off at the start of a run whose steps have no tolerance.
@@ -104,6 +106,17 @@ def check_algebraic(system: System, y: Array, t: Any, tolerances: Any = None) ->
     relative = UNTOLD if tolerances is None else float(tolerances.relative.max())
     absolute = 0.0 if tolerances is None or tolerances.absolute is None else float(tolerances.absolute.max())
     registry.task("algebraic_start")(system, y, t, relative, absolute)
+
+
+def machine_of(device: Any, backend: str) -> Any:
+    """The machine that makes the steps, or None for the CPU; without looking for any if it is that."""
+    if device is None and not os.environ.get("STEPWELL_DEVICE") or device == "cpu" or backend != "rust":
+        if device not in (None, "cpu") and backend != "rust":
+            raise ArgumentError(f"device: works with backend='rust' only, got backend={backend!r}")
+        return None
+    from ..devices import device_of  # only such runs need it
+
+    return device_of(device)
 
 
 def arithmetic(fused: Any, dtype: Any) -> tuple[bool, bool]:

@@ -44,6 +44,7 @@ from .options import (
     controlled,
     event_list,
     last_time,
+    machine_of,
     options_of_resumed,
     quantities,
     spread,
@@ -131,7 +132,7 @@ class Request(NamedTuple):
         """A run with steps of one length."""
         (
             v, y, dt, steps, every, _, _, control, force, record, events, form, fused, dtype, t0, start, max_steps, max_step,
-            jumps, positive_components, progress, threads, backend, start_step, _,
+            jumps, positive_components, progress, threads, backend, start_step, _, device,
         ) = options  # fmt: skip
         method, system, v = checked_system(system, method, v, y)
         fused, single = arithmetic(fused, dtype)
@@ -151,6 +152,7 @@ class Request(NamedTuple):
             form = "matrix"  # which its steps are
             not_with_exact(method, force=force, events=events, control=control)
         backend = checks.known("backend", backend, BACKENDS)
+        machine = machine_of(device, backend)
         if form != "direct":
             check_matrix_form(system, method, form, force)
         watched = None if events is None else event_list(events, form)
@@ -197,8 +199,9 @@ class Request(NamedTuple):
             t0 = spread(t0, (), batch)
             rows += 1  # the times, which are each member's own
         plan = engine.Plan(
-            system, method, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused, single=single
-        )
+            system, method, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused, single=single,
+            device=machine,
+        )  # fmt: skip
         # In float32, in the matrix forms and with events quantities are computed from the saved states.
         while_stepping = tuple(record) if form == "direct" and not single and watched is None else ()
         recorded = sum(prod(system.quantities[name]) for name in record)
@@ -275,6 +278,10 @@ class Request(NamedTuple):
         sign = -1.0 if backward else 1.0
         backend = checks.known("backend", options.backend, BACKENDS)
         budget = MOST_STEPS if options.max_steps is None else checks.count("max_steps", options.max_steps, 1)
+        if machine_of(options.device, backend) is not None:
+            raise UnsupportedError(
+                "device: makes fixed steps only, dt= and steps=; for adaptive steps, tolerance= and at=, use device='cpu'"
+            )
         acceptance = Acceptance(system.groups, positive=positive.checked_places(system, options.positive, v, y))
         numbers = prod(system.v_shape) + prod(system.y_shape)
         groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))

@@ -448,6 +448,36 @@ fn compiled<'py>(
     Ok(Some(d))
 }
 
+/// The number of a model's tapes: see `_core.pyi`.
+#[pyfunction]
+#[pyo3(signature = (model, *, choice=0, attempts=false))]
+fn tape_number(py: Python<'_>, model: &ModelSpec, choice: usize, attempts: bool) -> PyResult<u64> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let how = if attempts { model.attempts() } else { model.started(choice) };
+    Ok(model.model(how, &rows, &tables)?.traced().map_err(core_error)?.number)
+}
+
+/// The cut tapes of a run: see `_core.pyi`.
+#[pyfunction]
+#[pyo3(signature = (model, *, choice=0, attempts=false))]
+fn stages<'py>(py: Python<'py>, model: &ModelSpec, choice: usize, attempts: bool) -> PyResult<Bound<'py, PyDict>> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let how = if attempts { model.attempts() } else { model.started(choice) };
+    let stages = model.model(how, &rows, &tables)?.stages().map_err(core_error)?;
+    let d = PyDict::new(py);
+    for (name, size) in stages.sizes {
+        d.set_item(name, size)?;
+    }
+    d.set_item("carries", stages.carries)?;
+    d.set_item("tried", stages.tried)?;
+    let splits = PyDict::new(py);
+    for (name, split) in &stages.splits {
+        splits.set_item(name, split_of(py, split)?)?;
+    }
+    d.set_item("splits", splits)?;
+    Ok(d)
+}
+
 /// How a step that is too long for one tape is computed; None if it is one tape: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, members, *, choice=0, attempts=false))]
@@ -488,6 +518,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(check, m)?)?;
     m.add_function(wrap_pyfunction!(compiled, m)?)?;
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
+    m.add_function(wrap_pyfunction!(stages, m)?)?;
+    m.add_function(wrap_pyfunction!(tape_number, m)?)?;
     m.add_function(wrap_pyfunction!(operations, m)?)?;
     m.add_function(wrap_pyfunction!(methods::program, m)?)?;
     m.add_function(wrap_pyfunction!(methods::define, m)?)?;

@@ -236,6 +236,18 @@ impl ModelSpec {
             backward,
         }
     }
+
+    /// The arrays of parameters, in order, whose rows are the parameters of a tape.
+    #[getter(rows)]
+    fn arrays(&self, py: Python<'_>) -> Vec<Py<PyArray2<f64>>> {
+        self.rows.iter().map(|array| array.clone_ref(py)).collect()
+    }
+
+    /// The sampled inputs, in order: start, interval, and a row for each sample.
+    #[getter(tables)]
+    fn samples(&self, py: Python<'_>) -> Vec<(f64, f64, Py<PyArray2<f64>>)> {
+        self.tables.iter().map(|(start, interval, array)| (*start, *interval, array.clone_ref(py))).collect()
+    }
 }
 
 impl ModelSpec {

@@ -220,9 +220,13 @@ def run_by_core(
             np.broadcast_to(each, (len(each), members)) for each in (rows_v, plan.memory.reshape(len(plan.memory), -1))
         )
         rows_v = np.ascontiguousarray(np.concatenate([of_v, memory]))
-    diverged = _core.run(
-        model, plan.of_core(), Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
-    )
+    arrays = Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
+    if plan.device is None:
+        diverged = _core.run(model, plan.of_core(), arrays)
+    else:
+        from ...devices import fixed  # only such runs need it
+
+        diverged = fixed.run(plan.device, model, plan.of_core(), arrays)
     by_name: dict[str, Array] = {}
     if recorded is not None:
         for name, shape in shapes.items():

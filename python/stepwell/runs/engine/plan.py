@@ -38,7 +38,8 @@ class Plan(NamedTuple):
     ``single`` is whether steps are computed in float32. With adaptive steps ``order`` is that of a series, ``acceptance`` what a
     step must satisfy, and ``backward`` whether the time of the system is the negated time of the run. ``memory`` is what a
     sampled controller remembers at the start, rows of one number for each member. ``lengths`` are the steps of members
-    that have their own, shape (*batch), or None; ``dt`` is then 1: the clock of the core counts steps.
+    that have their own, shape (*batch), or None; ``dt`` is then 1: the clock of the core counts steps. ``device`` is the machine
+    that makes the steps, of ``devices``, or None for the CPU.
     """
 
     system: System
@@ -64,6 +65,7 @@ class Plan(NamedTuple):
     backward: bool = False
     memory: Array | None = None
     lengths: Array | None = None
+    device: Any = None
 
     def t0_of(self, members: Any) -> Any:
         """The time of step 0 of these members of one batch axis, or of all."""

@@ -5,6 +5,7 @@ mod adaptive_plan;
 mod columns;
 pub(crate) mod compiled;
 pub mod fixed;
+pub mod stages;
 mod waypoints;
 mod workers;
 pub mod world;

@@ -1,6 +1,9 @@
 //! The tapes of a step and its properties, each found on first use and kept.
 
-use std::sync::{Arc, LazyLock, OnceLock};
+use std::sync::{
+    Arc, LazyLock, OnceLock,
+    atomic::{AtomicU64, Ordering::Relaxed},
+};
 
 use super::{
     attempts::TriedRows,
@@ -58,6 +61,8 @@ pub struct Tapes<T: Real = f64> {
 /// The properties and tapes of a step. Expensive ones are found on first use.
 pub struct Traced {
     key: TapeKey,
+    /// Its number among all that were found in this process: no two have the same.
+    pub number: u64,
     /// How large the blocks are.
     pub shape: Shape,
     /// How many numbers of the state stand behind v and y: those that the method keeps, and those that a sampled controller
@@ -134,7 +139,9 @@ impl TapeKey {
                 around::only_fixed(&self.signature)?;
                 method(name)?.error_order.ok_or(Error::NoEstimate)?;
             }
+            static FOUND: AtomicU64 = AtomicU64::new(0);
             let traced = Traced {
+                number: FOUND.fetch_add(1, Relaxed),
                 shape,
                 kept,
                 memory,

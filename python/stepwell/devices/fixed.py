@@ -1,0 +1,316 @@
+"""Runs of fixed steps on a device: a work item for each member, its state in private variables over all steps of a launch."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from ..base.arrays import Array
+from . import promise
+from .opencl import Machine
+from .stages import ARGUMENTS, Numbers, Stages, wide
+
+#: A launch takes about so long, in seconds: a desktop's watchdog ends longer ones, and Ctrl-C waits for one.
+LAUNCH = 0.05
+#: Steps of the first launch, which shows how long one takes, and the most of any.
+FIRST_LAUNCH, MOST_STEPS = 32, 1 << 16
+#: The most bytes of saved states and of tables of steps on the device at a time.
+MOST_SAVED, MOST_TABLE = 1 << 28, 1 << 24
+#: Velocities that are computed from a carry may be infinite once its numbers are of this size, as in the core.
+HUGE, HUGE_SINGLE = 2.0**960, 2.0**64
+#: How many texts a process keeps.
+MOST_TEXTS = 256
+
+_TEXTS: OrderedDict[Any, tuple[Stages, str]] = OrderedDict()
+
+
+class Launch(NamedTuple):
+    """Some intervals of steps, after each of which the state is saved, or not."""
+
+    intervals: int
+    length: int
+    saves: bool
+
+
+def text_of(model: Any, single: bool, choice: int) -> tuple[Stages, str]:
+    """The stages of a model, and the kernels of a run of fixed steps."""
+    key = _core.tape_number(model, choice=choice), single
+    if key not in _TEXTS:
+        stages = Stages(model, single=single, choice=choice)
+        _TEXTS[key] = stages, _kernels(stages)
+        while len(_TEXTS) > MOST_TEXTS:
+            _TEXTS.popitem(last=False)
+    return _TEXTS[key]
+
+
+def run(machine: Machine, model: Any, plan: Any, arrays: Any) -> bool:
+    """Make the run, and return whether some member has diverged, now or before: as ``_core.run``."""
+    single = arrays.saved_y.dtype == np.float32
+    promise.check(machine, single=single)
+    members = arrays.first_bad.size
+    if members == 0:
+        return False
+    stages, text = text_of(model, single, plan.choice)
+    program = machine.program(text)
+    with program.lock:
+        return _Run(machine, program, stages, model, plan, arrays).make()
+
+
+class _Run:
+    """A run as it is made."""
+
+    def __init__(self, machine: Machine, program: Any, stages: Stages, model: Any, plan: Any, arrays: Any) -> None:
+        self.machine, self.program, self.stages, self.plan, self.arrays = machine, program, stages, plan, arrays
+        self.members = members = arrays.first_bad.size
+        self.kind = np.float32 if stages.single else np.float64
+        self.bytes = np.dtype(self.kind).itemsize
+        self.numbers = Numbers(machine, stages, model, members, plan.dt)
+        sizes = stages.sizes
+        self.state = sizes["v"] + sizes["y"] + sizes["kept"] + sizes["tally"]
+        before = np.zeros((self.state, members), self.kind)
+        n_v, n_y = sizes["v"], sizes["y"]
+        before[:n_v], before[n_v : n_v + n_y] = (wide(each, members, self.kind) for each in (arrays.v[:n_v], arrays.y))
+        rest = arrays.v[n_v:]  # what is kept, or what a controller remembers at the start, which stands last
+        end = n_v + n_y + sizes["kept"]
+        before[end - len(rest) : end] = rest
+        self.now, self.next = machine.put(before), machine.room(before.nbytes)
+        self.bad = machine.put(np.ascontiguousarray(arrays.first_bad, np.int64))
+        self.saved = [machine.room(0)] * 3
+        self.group = 64 if members >= 64 else 1
+        self.size = -(-members // self.group) * self.group
+        self.table = machine.room(0)
+
+    def call(self, name: str, size: int, *arguments: Any) -> None:
+        """Start a kernel."""
+        kernel = self.program.kernel(name)
+        group = (self.group,) if size % self.group == 0 and not self.machine.is_cpu else None
+        kernel(self.machine.queue, (size,), group, *arguments)
+
+    def make(self) -> bool:
+        """Make it."""
+        plan, arrays, of_time = self.plan, self.arrays, (np.float64(self.plan.t0), np.float64(self.plan.dt))
+        self.call("prepare", 1, self.numbers.sources, self.numbers.uniforms)
+        if not arrays.carried and "start" in self.stages.texts:
+            self.call("start", self.size, *self.numbers.arguments, np.int64(plan.first), *of_time, self.now)
+        at = 0
+        if plan.every is not None:
+            self.steps(Launch(1, 0, True), 0)
+            at = self.read(0, 1)
+        done, began, pace = 0, time.perf_counter(), FIRST_LAUNCH
+        for launch in self.launches(lambda: pace):
+            self.steps(launch, done)
+            done += launch.intervals * launch.length
+            if launch.saves:
+                at = self.read(at, launch.intervals)
+            self.machine.finish()
+            now = time.perf_counter()
+            took, began = now - began, now
+            made = launch.intervals * launch.length
+            pace = min(MOST_STEPS, max(1, min(8 * made, int(made * LAUNCH / max(took, 1e-9)))))
+            if plan.progress is not None:
+                plan.progress(done / plan.steps)
+            _core.listen()
+        self.finish()
+        return bool((arrays.first_bad >= 0).any())
+
+    def launches(self, pace: Any) -> Iterator[Launch]:
+        """The launches of the run, each about as long as it may be."""
+        plan, sizes = self.plan, self.stages.sizes
+        each = (sizes["v"] + sizes["y"] + sizes["recorded"]) * self.members * self.bytes
+        at_once = max(1, min(MOST_SAVED, self.machine.largest) // max(1, each))
+        left = plan.steps
+        while left:
+            every = min(left, plan.every or plan.steps)
+            if every <= pace():
+                intervals = max(1, min(pace() // every, at_once, left // every))
+                yield Launch(intervals, every, True)
+                left -= intervals * every
+                continue
+            through = every
+            while through:
+                length = min(through, pace())
+                through -= length
+                yield Launch(1, length, through == 0)
+            left -= every
+
+    def steps(self, launch: Launch, done: int) -> None:
+        """Start a launch of steps."""
+        plan, sizes, count = self.plan, self.stages.sizes, launch.intervals * launch.length
+        first, entries = plan.first + done, len(self.stages.texts["step"].entries)
+        of_time = np.float64(plan.t0), np.float64(plan.dt)
+        if entries and count:
+            self.table = self.room(self.table, count * entries * max(self.bytes, 8))
+            self.call("table", count, *self.numbers.arguments, np.int64(first), *of_time, self.table)
+        if launch.saves:
+            rows = (sizes["v"], sizes["y"], sizes["recorded"])
+            self.saved = [
+                self.room(buffer, launch.intervals * n * self.members * self.bytes)
+                for buffer, n in zip(self.saved, rows, strict=True)
+            ]
+        most = (HUGE_SINGLE if self.stages.single else HUGE) * min(abs(plan.dt), 1.0)
+        counts = (np.int64(first), np.int64(launch.intervals), np.int64(launch.length), np.int32(launch.saves))
+        since = np.int32(done > 0)
+        self.call(
+            "steps", self.size, *self.numbers.arguments, *counts, *of_time, since, self.kind(most), self.table,
+            self.now, self.next, *self.saved, self.bad,
+        )  # fmt: skip
+        self.now, self.next = self.next, self.now
+
+    def room(self, buffer: Any, size: int) -> Any:
+        """A buffer that has so many bytes, this one if it has."""
+        return buffer if buffer.size >= size else self.machine.room(size)
+
+    def read(self, at: int, count: int) -> int:
+        """Take saved states from the device, from the ``at``-th on; returns the number of the next."""
+        arrays = self.arrays
+        n_v = self.stages.sizes["v"]
+        for to, buffer, n in zip(
+            (arrays.saved_v, arrays.saved_y, arrays.recorded), self.saved,
+            (n_v, self.stages.sizes["y"], self.stages.sizes["recorded"]), strict=True,
+        ):  # fmt: skip
+            if n == 0 or to is None:
+                continue
+            rows = to.reshape(len(to), n, self.members)[at : at + count]
+            if rows.dtype == self.kind and rows.flags.c_contiguous:
+                self.machine.get(rows, buffer)
+            else:
+                taken: Array = np.empty(rows.shape, self.kind)
+                self.machine.get(taken, buffer)
+                rows[...] = taken
+        return at + count
+
+    def finish(self) -> None:
+        """Take from the device what is left there at the end."""
+        arrays, sizes = self.arrays, self.stages.sizes
+        bad = np.empty(self.members, np.int64)
+        self.machine.get(bad, self.bad)
+        arrays.first_bad[...] = bad
+        if arrays.carry is None and arrays.tally is None:
+            return
+        last = np.empty((self.state, self.members), self.kind)
+        self.machine.get(last, self.now)
+        n_v, behind = sizes["v"], sizes["v"] + sizes["y"]
+        if arrays.carry is not None:
+            carry = np.concatenate([last[:n_v], last[behind : behind + sizes["kept"]]])
+            arrays.carry[...] = carry.reshape(arrays.carry.shape)
+        if arrays.tally is not None and arrays.tally.size:
+            arrays.tally[...] = last[behind + sizes["kept"] :].reshape(arrays.tally.shape)
+
+
+def _kernels(stages: Stages) -> str:
+    """The text of all kernels of a run."""
+    sizes, texts = stages.sizes, stages.texts
+    n_v, n_y = sizes["v"], sizes["y"]
+    slots = n_v + n_y
+    n = slots + sizes["kept"] + sizes["tally"]
+    step, finish = texts["step"], texts.get("finish")
+    entries = len(step.entries)
+    out = [stages.head]
+    uniforms = [line for text in texts.values() for line in text.uniforms]
+    out += ["__kernel void prepare(__global const double *restrict sources, __global real *restrict uniforms) {", *uniforms, "}"]
+    if entries:
+        out += [
+            f"__kernel void table({ARGUMENTS}, const long first, const double t0, const double h, __global bits *table) {{",
+            "const long g = get_global_id(0);",
+            "const double t = t0 + (double)(first + g) * h;",
+            *step.moment,
+            *(
+                f"table[g * {entries} + {i}] = {f'(bits)step_e{i}' if kind == 'row' else f'bits_of(step_e{i})'};"
+                for i, (kind, _) in enumerate(step.entries)
+            ),
+            "}",
+        ]
+    load = [f"s{i} = state[{i} * members + g];" for i in range(n)]
+
+    def beside(name: str, k: str) -> list[str]:
+        """What a stage beside the steps needs at step k, and its body."""
+        text = texts[name]
+        return [f"const double t = t0 + (double)({k}) * h; (void)t;", *text.member, *text.moment, *text.body]
+
+    if "start" in texts:
+        to = [*range(n_v), *range(slots, slots + sizes["kept"] - sizes["memory"])]
+        out += [
+            f"__kernel void start({ARGUMENTS}, const long first, const double t0, const double h, __global real *state) {{",
+            "const long g = get_global_id(0);",
+            "if (g >= members) return;",
+            *(f"real s{i};" for i in range(n)),
+            *load,
+            *beside("start", "first"),
+            *(f"state[{i} * members + g] = {texts['start'].results[i]};" for i in to),
+            "}",
+        ]
+    finite = " && ".join(f"fabs(s{i}) < INFINITY" for i in range(slots)) or "1"
+    small = " && ".join(f"fabs(s{i}) < {'most' if stages.carries else 'INFINITY'}" for i in range(slots)) or "1"
+    velocities, shown = [], [f"s{i}" for i in range(slots)]
+    if finish is not None and stages.carries:
+        velocities = beside("finish", "k")
+        shown[:n_v] = [f"w{i}" for i in range(n_v)]
+    in_words = " && ".join(f"fabs({text}) < INFINITY" for text in (finish.results[:n_v] if velocities and finish else [])) or "1"
+    seen = ["{", *velocities, f"if (!({in_words})) {{ bad[g] = k; return; }}", "}"] if velocities else []
+    save = []
+    if velocities and finish:
+        save += [*(f"real w{i};" for i in range(n_v)), "{", *velocities]
+        save += [*(f"w{i} = {finish.results[i]};" for i in range(n_v)), "}"]
+        words = " && ".join(f"fabs(w{i}) < INFINITY" for i in range(n_v)) or "1"
+        save += [f"if ((since || i >= 0) && k > first - since && !({words})) doubt = 1;"]
+    save += [f"saved_v[(at * {n_v} + {i}) * members + g] = {shown[i]};" for i in range(n_v)]
+    save += [f"saved_y[(at * {n_y} + {i}) * members + g] = {shown[n_v + i]};" for i in range(n_y)]
+    if "record" in texts:
+        # The quantities of what is saved.
+        names = [f"const real q{i} = {text};" for i, text in enumerate(shown)]
+        inner = [f"const real s{i} = q{i};" for i in range(slots)]
+        recorded = texts["record"].results[slots:]
+        save += ["{", *names, "{", *inner, *beside("record", "0")]
+        save += [f"recorded[(at * {sizes['recorded']} + {i}) * members + g] = {text};" for i, text in enumerate(recorded)]
+        save += ["}", "}"]
+    look_up = []
+    for i, (kind, _) in enumerate(step.entries):
+        value = f"table[(k - first) * {entries} + {i}]"
+        look_up.append(
+            f"const long step_e{i} = (long){value};" if kind == "row" else f"const real step_e{i} = number_of({value});"
+        )
+    out += [
+        f"__kernel void steps({ARGUMENTS}, const long first, const long intervals, const long length, const int saves, "
+        "const double t0, const double h, const int since, const real most, __global const bits *restrict table, "
+        "__global const real *restrict state, __global real *restrict next, __global real *restrict saved_v, "
+        "__global real *restrict saved_y, __global real *restrict recorded, __global long *restrict bad) {",
+        "const long g = get_global_id(0);",
+        "if (g >= members) return;",
+        *(f"real s{i};" for i in range(n)),
+        *step.member,
+        "int doubt = 0;",
+        # A second time only where a member diverged, to find at which step.
+        "for (int again = 0; again < 2; again++) {",
+        *load,
+        "long k = first;",
+        *(["if (again && since) {", *seen, "}"] if seen else []),
+        "for (long i = 0; i < intervals; i++) {",
+        "for (long j = 0; j < length; j++) {",
+        *look_up,
+        *step.body,
+        *(f"const real n{i} = {text};" for i, text in enumerate(step.results[:n])),
+        *(f"s{i} = n{i};" for i in range(n)),
+        "k++;",
+        "if (again) {",
+        f"if (!({finite})) {{ bad[g] = k; return; }}",
+        *seen,
+        "}",
+        "}",
+        "if (saves && !again) {",
+        "const long at = i;",
+        *save,
+        "}",
+        "}",
+        "if (!again) {",
+        *(f"next[{i} * members + g] = s{i};" for i in range(n)),
+        f"if (bad[g] >= 0 || (!doubt && {small})) return;",
+        "}",
+        "}",
+        "}",
+    ]
+    return "\n".join(out) + "\n"

@@ -1,0 +1,228 @@
+"""The devices of OpenCL, by pyopencl: what there is, and kernels by their text."""
+
+from __future__ import annotations
+
+import os
+import threading
+import warnings
+from collections import OrderedDict
+from functools import cache, cached_property
+from typing import Any, NamedTuple
+
+from ..base import checks
+from ..base.optional import imported
+from ..errors import ArgumentError, UnsupportedError
+
+#: Where the name of the device is read that ``device=None`` means.
+VARIABLE = "STEPWELL_DEVICE"
+#: How many built programs a process keeps.
+MOST_PROGRAMS = 64
+#: The bit of OpenCL by which a device says that single quotients and roots are correctly rounded, where that is asked for.
+ROUNDS_SINGLE = "-cl-fp32-correctly-rounded-divide-sqrt"
+
+
+class Device(NamedTuple):
+    """A device on which runs are made, one of ``stepwell.devices()``.
+
+    Attributes:
+        name: what ``device=`` takes: "cpu", "opencl:0", "opencl:1", …
+        title: its own name.
+        platform: the name and version of its driver.
+        memory: its memory, in bytes.
+        units: how many units compute at the same time; of the CPU, cores.
+        float64: "" if runs in float64 have the bits of the core, else the reason why they are refused.
+        float32: the same of runs in float32.
+    """
+
+    name: str
+    title: str
+    platform: str
+    memory: int
+    units: int
+    float64: str = ""
+    float32: str = ""
+
+
+def devices() -> list[Device]:
+    """The devices on which runs can be made, the CPU first.
+
+    Each device of OpenCL is tried for some milliseconds: it must round as the core does, keep subnormal numbers and contract
+    nothing. What it cannot promise it says in ``float64`` and ``float32``, with the reason.
+
+    Returns:
+        A list of ``Device``; only the CPU if pyopencl is missing (``pip install "stepwell[gpu]"``) or finds none.
+
+    Example:
+        >>> sw.devices()[0].name
+        'cpu'
+    """
+    from . import promise
+
+    cores = os.cpu_count() or 1
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 0
+    every = [Device("cpu", "the core of stepwell", "machine code", memory, cores)]
+    try:
+        found = _machines()
+    except UnsupportedError:
+        return every
+    for machine in found:
+        of_each = (promise.broken(machine, single) for single in (False, True))
+        of_double, of_single = of_each
+        every.append(machine.described._replace(float64=of_double, float32=of_single))
+    return every
+
+
+def device_of(name: Any) -> Machine | None:
+    """The machine of a name, or of the variable ``STEPWELL_DEVICE`` if it is None; None for the CPU.
+
+    Raises:
+        ArgumentError: if there is no such name.
+        UnsupportedError: if pyopencl or the device is missing; the message says what to install.
+    """
+    argument = "device"
+    if name is None:
+        name = os.environ.get(VARIABLE)
+        if not name:
+            return None
+        argument = VARIABLE
+    if name == "cpu":
+        return None
+    kind, _, number = str(name).partition(":")
+    if not isinstance(name, str) or kind != "opencl" or (":" in name and not number.isdigit()):
+        raise ArgumentError(
+            f"{argument}: expected 'cpu', 'opencl', or 'opencl:1' for the second device, got {checks.short(name)}"
+        )
+    every = _machines()
+    index = int(number or 0)
+    if index >= len(every):
+        names = ", ".join(f"{each.described.name} ({each.described.title})" for each in every)
+        raise UnsupportedError(f"{argument}: there is no {name}; there are {names}")
+    return every[index]
+
+
+class Machine:
+    """A device with a context and a queue of its own.
+
+    Attributes:
+        described: what ``devices`` tells of it.
+        cl: the module pyopencl.
+        device: its device.
+    """
+
+    def __init__(self, cl: Any, device: Any, name: str) -> None:
+        self.cl, self.device = cl, device
+        title, driver = device.name.strip(), f"{device.platform.name.strip()}, {device.version.strip()}"
+        self.described = Device(name, title, driver, device.global_mem_size, device.max_compute_units)
+        self._programs: OrderedDict[str, Any] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def __repr__(self) -> str:
+        return f"Machine({self.described.name!r}, {self.described.title!r})"
+
+    def __reduce__(self) -> Any:
+        return device_of, (self.described.name,)
+
+    def __deepcopy__(self, _: Any) -> Machine:
+        return self
+
+    @cached_property
+    def context(self) -> Any:
+        """Its context."""
+        return self.cl.Context([self.device])
+
+    @cached_property
+    def queue(self) -> Any:
+        """Its queue, in order."""
+        return self.cl.CommandQueue(self.context)
+
+    @property
+    def is_cpu(self) -> bool:
+        """Whether it is a CPU."""
+        return bool(self.device.type & self.cl.device_type.CPU)
+
+    @property
+    def has_doubles(self) -> bool:
+        """Whether it computes in float64."""
+        return bool(self.device.double_fp_config)
+
+    @property
+    def rounds_single(self) -> bool:
+        """Whether it can round quotients and roots of float32 correctly."""
+        return bool(self.device.single_fp_config & self.cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT)
+
+    @property
+    def largest(self) -> int:
+        """The most bytes of one array."""
+        return int(self.device.max_mem_alloc_size)
+
+    def program(self, text: str) -> Any:
+        """The program of this text, built once; pyopencl keeps what was built on disk."""
+        with self._lock:
+            if text in self._programs:
+                self._programs.move_to_end(text)
+                return self._programs[text]
+        options = ["-cl-std=CL1.2"] + [ROUNDS_SINGLE] * self.rounds_single
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of compilers, about nothing that a user can change
+            built = Program(self.cl.Program(self.context, text).build(options=options))
+        with self._lock:
+            self._programs[text] = built
+            while len(self._programs) > MOST_PROGRAMS:
+                self._programs.popitem(last=False)
+        return built
+
+    def put(self, array: Any) -> Any:
+        """A copy of an array on the device, to read and to write."""
+        flags = self.cl.mem_flags
+        if array.nbytes == 0:
+            return self.room(1)
+        return self.cl.Buffer(self.context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=array)
+
+    def room(self, size: int) -> Any:
+        """Room for so many bytes on the device."""
+        return self.cl.Buffer(self.context, self.cl.mem_flags.READ_WRITE, size=max(size, 1))
+
+    def get(self, array: Any, buffer: Any, offset: int = 0) -> None:
+        """Fill an array from the device, once all before it is done."""
+        if array.nbytes:
+            self.cl.enqueue_copy(self.queue, array, buffer, src_offset=offset)
+
+    def finish(self) -> None:
+        """Wait until all is done."""
+        self.queue.finish()
+
+
+class Program:
+    """A built program; each kernel is made once, for that takes longer than a call of it."""
+
+    def __init__(self, built: Any) -> None:
+        self._built = built
+        self._kernels: dict[str, Any] = {}
+        self.lock = threading.Lock()
+
+    def kernel(self, name: str) -> Any:
+        """A kernel, by its name."""
+        if name not in self._kernels:
+            self._kernels[name] = getattr(self._built, name)
+        return self._kernels[name]
+
+
+@cache
+def _machines() -> list[Machine]:
+    """All devices of OpenCL, GPUs first."""
+    cl = imported("pyopencl", "device")
+    every: list[Any] = []
+    try:
+        for platform in cl.get_platforms():
+            every += platform.get_devices()
+    except cl.Error as error:  # without any driver this is an error, too
+        reason = str(error)
+    else:
+        reason = "no driver has one"
+    if not every:
+        raise UnsupportedError(
+            f"device: pyopencl finds no device ({reason}); install the OpenCL driver of your GPU, or PoCL for the CPU, of Debian "
+            f"the package pocl-opencl-icd"
+        )
+    every.sort(key=lambda device: not device.type & cl.device_type.GPU)  # stable
+    return [Machine(cl, device, f"opencl:{i}") for i, device in enumerate(every)]

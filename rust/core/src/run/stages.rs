@@ -1,0 +1,57 @@
+//! The cut tapes of a step and of what is around it, for machines that the core does not write code for.
+
+use super::Model;
+use crate::{
+    error::Error,
+    step::tapes::{Tapes, Traced},
+    tape::{
+        real::{Precision, Real},
+        split::Split,
+    },
+};
+
+/// What a run is made of, whole.
+pub struct Stages {
+    /// How many numbers of a member v and y have, what the method keeps and a controller remembers behind them, how many of these
+    /// a controller remembers, what is summed up behind that, and what is recorded.
+    pub sizes: [(&'static str, usize); 6],
+    /// Whether the method has a carry instead of v between steps.
+    pub carries: bool,
+    /// Each by its name: "step", and, where there is one, "start", "finish", "record", "begin", "judged" and "by terms".
+    pub splits: Vec<(&'static str, Split)>,
+    /// Of attempts of float32, where their rows stand: numbers of the state, sampled inputs, results of the first part, and numbers
+    /// of the second before these.
+    pub tried: Option<[usize; 4]>,
+}
+
+impl Model<'_> {
+    /// The stages of a run, each as one tape, however long.
+    pub fn stages(&self) -> Result<Stages, Error> {
+        let traced = self.traced()?;
+        match self.key.precision {
+            Precision::Double => Ok(stages(&traced, &*traced.tapes_of::<f64>()?)),
+            Precision::Single => Ok(stages(&traced, &*traced.tapes_of::<f32>()?)),
+        }
+    }
+}
+
+fn stages<T: Real>(traced: &Traced, tapes: &Tapes<T>) -> Stages {
+    let mut splits = vec![("step", tapes.step.split.clone())];
+    let others = [("start", &tapes.start), ("finish", &tapes.finish), ("record", &tapes.record), ("by terms", &tapes.by_terms)];
+    splits.extend(others.into_iter().filter_map(|(name, stage)| Some((name, stage.as_ref()?.split.clone()))));
+    splits.extend(tapes.begin.as_ref().map(|stage| ("begin", stage.split.clone())));
+    splits.extend(tapes.judged.as_ref().map(|(stage, _)| ("judged", stage.split.clone())));
+    Stages {
+        sizes: [
+            ("v", traced.shape.v),
+            ("y", traced.shape.y),
+            ("kept", traced.kept),
+            ("memory", traced.memory),
+            ("tally", traced.tally),
+            ("recorded", traced.recorded),
+        ],
+        carries: traced.carries,
+        splits,
+        tried: tapes.judged.as_ref().map(|(_, rows)| [rows.state, rows.tables, rows.results, rows.judged]),
+    }
+}
