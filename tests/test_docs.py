@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 import stepwell as sw
 from support import stiff
+from support.devices import NAMES
 
 ROOT = Path(__file__).resolve().parent.parent
 AT_THE_ROOT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")
@@ -31,7 +32,7 @@ NAMED = re.compile(r"`([\w.*{},/-]+(?:/|\.(?:rs|py|pyi|md|toml|txt|png)))`")
 INTRODUCED = re.compile(r"<!-- file: (\S+) -->")
 
 #: What a page needs beside what every page may use. The extra ``test`` has it.
-NEEDS = {"interop.md": ("gymnasium", "pandas", "xarray")}
+NEEDS = {"interop.md": ("gymnasium", "pandas", "xarray"), "gpu.md": ("pyopencl",)}
 
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 
@@ -60,6 +61,8 @@ def blocks(page: Path) -> list[tuple[int, str, str]]:
 def test_python_blocks_run_and_print_what_they_say(page, tmp_path, monkeypatch):
     for package in NEEDS.get(page.name, ()):
         pytest.importorskip(package)
+    if page.name == "gpu.md" and not NAMES:
+        pytest.skip("there is no device of OpenCL here")
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": page.stem}
     for line, code, module in blocks(page):

@@ -21,6 +21,8 @@ from .analysis.stability import analyse as analyse
 from .analysis.stability import criteria as criteria
 from .analysis.stability import stability_along as stability_along
 from .analysis.stability import stability_limit as stability_limit
+from .device import Device as Device
+from .device import devices as devices
 from .errors import AccuracyWarning as AccuracyWarning
 from .errors import ControlWarning as ControlWarning
 from .errors import DivergenceWarning as DivergenceWarning

@@ -96,7 +96,6 @@ class ModelSpec:
         acceptance: tuple[tuple[int, ...], bool, tuple[int, ...]] | None = None,
         backward: bool = False,
     ) -> ModelSpec: ...
-
     @property
     def rows(self) -> list[NDArray[np.float64]]:
         """The arrays of parameters in order, whose rows are the parameters of a tape."""
@@ -347,9 +346,9 @@ def in_parts(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
 def stages(model: ModelSpec, *, choice: int = 0, attempts: bool = False) -> dict[str, Any]:
     """The cut tapes of a run, each stage as one tape, for a machine that the core does not write code for.
 
-    ``v``, ``y``, ``kept``, ``memory``, ``tally`` and ``recorded`` are how many numbers of a member there are; ``carries`` is whether
-    the method has a carry. ``splits`` has by name, "step" and "start", "finish", "record", "begin", "judged", "by terms" where
-    they are, what ``compiled`` has as ``split``. ``tried`` is None but for attempts of float32.
+    ``v``, ``y``, ``kept``, ``memory``, ``tally`` and ``recorded`` are how many numbers of a member there are; ``carries`` is
+    whether the method has a carry. ``splits`` has by name, "step" and "start", "finish", "record", "begin",
+    "judged", "by terms" where they are, what ``compiled`` has as ``split``. ``tried`` is None but for attempts of float32.
     """
 
 def tape_number(model: ModelSpec, *, choice: int = 0, attempts: bool = False) -> int:

@@ -127,9 +127,9 @@ def integrate(
             the run begins anew there from this state; with a tolerance at the last time that was asked for. Another ``dt``, or
             another method where more than the state is carried, is refused. Events are given again; if one changed the state,
             ``events`` is needed, and ``[]`` goes on without. Members that diverged stay as they are, without a second warning.
-        device: "cpu", or "opencl" for the first device of OpenCL and "opencl:1" for the second; ``stepwell.devices()`` lists them.
-            None is the CPU, or what the environment variable ``STEPWELL_DEVICE`` names. The bits are those of the CPU. Fixed
-            steps of up to some 20 000 operations; needs ``pip install "stepwell[gpu]"`` (docs/howto/gpu.md).
+        device: "cpu", or "opencl" for the first device of OpenCL and "opencl:1" for the second, as ``stepwell.devices()`` lists
+            them. None is the CPU, or what the environment variable ``STEPWELL_DEVICE`` names. The bits are those of the CPU.
+            Fixed steps of up to some 20 000 operations; needs ``pip install "stepwell[gpu]"`` (docs/howto/gpu.md).
 
     Returns:
         A ``Run``.

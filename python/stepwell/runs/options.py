@@ -110,11 +110,11 @@ def check_algebraic(system: System, y: Array, t: Any, tolerances: Any = None) ->
 
 def machine_of(device: Any, backend: str) -> Any:
     """The machine that makes the steps, or None for the CPU; without looking for any if it is that."""
-    if device is None and not os.environ.get("STEPWELL_DEVICE") or device == "cpu" or backend != "rust":
+    if (device is None and not os.environ.get("STEPWELL_DEVICE")) or device == "cpu" or backend != "rust":
         if device not in (None, "cpu") and backend != "rust":
             raise ArgumentError(f"device: works with backend='rust' only, got backend={backend!r}")
         return None
-    from ..devices import device_of  # only such runs need it
+    from ..device import device_of  # only such runs need it
 
     return device_of(device)
 

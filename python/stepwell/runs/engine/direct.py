@@ -224,7 +224,7 @@ def run_by_core(
     if plan.device is None:
         diverged = _core.run(model, plan.of_core(), arrays)
     else:
-        from ...devices import fixed  # only such runs need it
+        from ...device import fixed  # only such runs need it
 
         diverged = fixed.run(plan.device, model, plan.of_core(), arrays)
     by_name: dict[str, Array] = {}

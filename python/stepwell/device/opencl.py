@@ -43,35 +43,6 @@ class Device(NamedTuple):
     float32: str = ""
 
 
-def devices() -> list[Device]:
-    """The devices on which runs can be made, the CPU first.
-
-    Each device of OpenCL is tried for some milliseconds: it must round as the core does, keep subnormal numbers and contract
-    nothing. What it cannot promise it says in ``float64`` and ``float32``, with the reason.
-
-    Returns:
-        A list of ``Device``; only the CPU if pyopencl is missing (``pip install "stepwell[gpu]"``) or finds none.
-
-    Example:
-        >>> sw.devices()[0].name
-        'cpu'
-    """
-    from . import promise
-
-    cores = os.cpu_count() or 1
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 0
-    every = [Device("cpu", "the core of stepwell", "machine code", memory, cores)]
-    try:
-        found = _machines()
-    except UnsupportedError:
-        return every
-    for machine in found:
-        of_each = (promise.broken(machine, single) for single in (False, True))
-        of_double, of_single = of_each
-        every.append(machine.described._replace(float64=of_double, float32=of_single))
-    return every
-
-
 def device_of(name: Any) -> Machine | None:
     """The machine of a name, or of the variable ``STEPWELL_DEVICE`` if it is None; None for the CPU.
 
@@ -92,7 +63,7 @@ def device_of(name: Any) -> Machine | None:
         raise ArgumentError(
             f"{argument}: expected 'cpu', 'opencl', or 'opencl:1' for the second device, got {checks.short(name)}"
         )
-    every = _machines()
+    every = machines()
     index = int(number or 0)
     if index >= len(every):
         names = ", ".join(f"{each.described.name} ({each.described.title})" for each in every)
@@ -208,7 +179,7 @@ class Program:
 
 
 @cache
-def _machines() -> list[Machine]:
+def machines() -> list[Machine]:
     """All devices of OpenCL, GPUs first."""
     cl = imported("pyopencl", "device")
     every: list[Any] = []

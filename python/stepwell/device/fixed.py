@@ -20,7 +20,7 @@ LAUNCH = 0.05
 #: Steps of the first launch, which shows how long one takes, and the most of any.
 FIRST_LAUNCH, MOST_STEPS = 32, 1 << 16
 #: The most bytes of saved states and of tables of steps on the device at a time.
-MOST_SAVED, MOST_TABLE = 1 << 28, 1 << 24
+MOST_SAVED, MOST_TABLE = 1 << 28, 1 << 26
 #: Velocities that are computed from a carry may be infinite once its numbers are of this size, as in the core.
 HUGE, HUGE_SINGLE = 2.0**960, 2.0**64
 #: How many texts a process keeps.
@@ -84,6 +84,9 @@ class _Run:
         self.group = 64 if members >= 64 else 1
         self.size = -(-members // self.group) * self.group
         self.table = machine.room(0)
+        entries = len(stages.texts["step"].entries)
+        #: The steps of the next launch, and the most of any: their table must fit.
+        self.pace, self.most_steps = FIRST_LAUNCH, min(MOST_STEPS, max(1, MOST_TABLE // max(1, 8 * entries)))
 
     def call(self, name: str, size: int, *arguments: Any) -> None:
         """Start a kernel."""
@@ -101,8 +104,8 @@ class _Run:
         if plan.every is not None:
             self.steps(Launch(1, 0, True), 0)
             at = self.read(0, 1)
-        done, began, pace = 0, time.perf_counter(), FIRST_LAUNCH
-        for launch in self.launches(lambda: pace):
+        done, began = 0, time.perf_counter()
+        for launch in self.launches():
             self.steps(launch, done)
             done += launch.intervals * launch.length
             if launch.saves:
@@ -111,14 +114,14 @@ class _Run:
             now = time.perf_counter()
             took, began = now - began, now
             made = launch.intervals * launch.length
-            pace = min(MOST_STEPS, max(1, min(8 * made, int(made * LAUNCH / max(took, 1e-9)))))
+            self.pace = min(self.most_steps, max(1, min(8 * made, int(made * LAUNCH / max(took, 1e-9)))))
             if plan.progress is not None:
                 plan.progress(done / plan.steps)
             _core.listen()
         self.finish()
         return bool((arrays.first_bad >= 0).any())
 
-    def launches(self, pace: Any) -> Iterator[Launch]:
+    def launches(self) -> Iterator[Launch]:
         """The launches of the run, each about as long as it may be."""
         plan, sizes = self.plan, self.stages.sizes
         each = (sizes["v"] + sizes["y"] + sizes["recorded"]) * self.members * self.bytes
@@ -126,14 +129,14 @@ class _Run:
         left = plan.steps
         while left:
             every = min(left, plan.every or plan.steps)
-            if every <= pace():
-                intervals = max(1, min(pace() // every, at_once, left // every))
+            if every <= self.pace:
+                intervals = max(1, min(self.pace // every, at_once, left // every))
                 yield Launch(intervals, every, True)
                 left -= intervals * every
                 continue
             through = every
             while through:
-                length = min(through, pace())
+                length = min(through, self.pace)
                 through -= length
                 yield Launch(1, length, through == 0)
             left -= every

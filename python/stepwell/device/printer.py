@@ -119,7 +119,7 @@ class Printer:
                 if not is_truth(mask):
                     return "bits", f"({pattern(mask)} & {pattern(yes)}) | (~{pattern(mask)} & {pattern(no)})"
                 kinds = {texts[each][0] for each in (yes, no)}
-                if kinds <= {"number", "constant"} and "number" in kinds or kinds == {"constant"}:
+                if (kinds <= {"number", "constant"} and "number" in kinds) or kinds == {"constant"}:
                     return "number", f"{truth(mask)} ? {number(yes)} : {number(no)}"
                 if is_truth(yes) and is_truth(no):
                     return "truth", f"{truth(mask)} ? {truth(yes)} : {truth(no)}"

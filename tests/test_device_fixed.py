@@ -1,0 +1,281 @@
+"""Runs of fixed steps on a device of OpenCL have the bits of the core; in CI the device is the CPU, by PoCL."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _core
+from support import recorded
+from support.devices import needs_device
+
+pytestmark = needs_device
+
+B = 300
+
+
+@sw.system(order=1)
+def lorenz(t: Any, y: Any, *, sigma: Any = 10.0, rho: Any = 28.0, beta: Any = 8 / 3) -> Any:
+    return np.array([sigma * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - beta * y[2]])
+
+
+@sw.system
+def driven(t: Any, v: Any, y: Any, *, k: Any = 1.0, u: Any = 0.0) -> Any:
+    return -k * np.sin(y) + 0.3 * np.cos(0.7 * t) + u
+
+
+@sw.system
+def everything(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
+    return -np.exp(-y * y) * np.tanh(v) - k * np.sqrt(np.abs(y)) * np.where(y > 0, 1.0, -1.0) / (1.0 + v * v) + np.floor(y)
+
+
+def start(*shape: int) -> Any:
+    return np.random.default_rng(sum(shape)).normal(size=(*shape, B))
+
+
+def same(system: Any, method: str, **options: Any) -> Any:
+    """The run on the device, held against that of the core."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        got = sw.integrate(system, method, device="opencl", **options)
+        core = sw.integrate(system, method, device="cpu", **options)
+    for name in ("t", "v", "y", "first_bad_step", "status", "work", "carry"):
+        one, other = getattr(got, name), getattr(core, name)
+        assert (one is None) == (other is None), name
+        if one is not None:
+            one, other = np.asarray(one), np.asarray(other)
+            assert one.dtype == other.dtype
+            assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), name
+            if one.dtype.kind == "f":
+                assert np.array_equal(np.signbit(one) | np.isnan(one), np.signbit(other) | np.isnan(other)), name
+    assert got.recorded.keys() == core.recorded.keys()
+    for name, numbers in core.recorded.items():
+        assert np.array_equal(got.recorded[name], numbers, equal_nan=True), name
+    return got
+
+
+#: Of the recorded runs those whose kernels are compiled in a second; every so many of them here, all by `make test-long`.
+SHORT = [
+    name for name in recorded.written() if not any(word in name for word in ("large", "bodies", "tolerance", "power", "fused"))
+]
+SOME = SHORT[::9]
+
+
+def of_recorded(name: str, monkeypatch: Any) -> None:
+    monkeypatch.setenv("STEPWELL_DEVICE", "opencl")
+    assert recorded.hashes(recorded.made(recorded.runs()[name])) == recorded.written()[name], name
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_recorded_runs(name: str, monkeypatch: Any) -> None:
+    of_recorded(name, monkeypatch)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [name for name in SHORT if name not in SOME])
+def test_all_recorded_runs(name: str, monkeypatch: Any) -> None:
+    of_recorded(name, monkeypatch)
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize("fused", [False, True])
+def test_precisions(dtype: str, fused: bool) -> None:
+    rho = np.linspace(20.0, 30.0, B)
+    same(lorenz(rho=rho), "rk4", y=start(3), dt=0.01, steps=205, every=10, dtype=dtype, fused=fused)
+    same(
+        everything(k=np.linspace(0.5, 2.0, B)), "false_euler", v=start(), y=start(), dt=0.01, steps=100, dtype=dtype, fused=fused
+    )
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_inputs(dtype: str) -> None:
+    """Sinusoids, samples that all have in common, and samples of each member."""
+    rng = np.random.default_rng(2)
+    for values in (rng.normal(size=40), rng.normal(size=(40, B))):
+        for interpolation in ("hold", "linear"):
+            u = sw.Sampled(values, 0.05, interpolation=interpolation)
+            for method in ("rk4", "leapfrog" if interpolation == "hold" else "false_heun"):
+                same(driven(u=u), method, v=start(), y=start(), dt=0.02, steps=90, every=7, dtype=dtype, start_step=3)
+    same(driven(u=sw.Sinusoid(0.2, np.linspace(1, 2, B))), "rk4", v=start(), y=start(), dt=0.02, steps=90, dtype=dtype)
+
+
+def test_times_of_each_member() -> None:
+    u = sw.Sampled(np.random.default_rng(3).normal(size=40), 0.05)
+    same(driven(u=u), "rk4", v=start(), y=start(), dt=0.02, steps=60, every=20, t0=np.linspace(-1.0, 1.0, B))
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize("method", ["rk4", "leapfrog", "verlet"])
+def test_divergence_of_each_member(method: str, dtype: str) -> None:
+    """The first step that was not finite, also of velocities that are computed from a carry, and across launches."""
+    omega = np.geomspace(0.5, 3000.0, B)
+    run = same(sw.Oscillator(omega=omega), method, v=start(), y=start(), dt=0.01, steps=700, every=100, dtype=dtype)
+    assert 0 < (run.first_bad_step >= 0).sum() < B
+    assert len(np.unique(run.first_bad_step)) > 20
+
+
+def test_numbers_that_are_not_finite_or_subnormal() -> None:
+    for dtype in ("float64", "float32"):
+        kind = np.finfo(dtype)
+        sizes = [0.0, -0.0, kind.smallest_subnormal, kind.tiny / 64, -kind.tiny / 1000, kind.max / 1e8, -kind.max / 2]
+        y = np.resize(np.array(sizes, np.float64), (3, B))
+        same(lorenz(), "rk4", y=y, dt=1e-3, steps=50, every=10, dtype=dtype)
+
+
+def test_parts_of_a_system() -> None:
+    """Control, projection, force, friction, contact, a sampled controller, recorded quantities."""
+    omega = np.linspace(0.5, 2.0, B)
+    oscillator = sw.Oscillator(omega=omega)
+    for control in (sw.EnergyControl(0.3), sw.Projection()):
+        bodies: Any = {"v": start(3, 2) / 4, "y": start(3, 2), "dt": 0.01, "steps": 60, "control": control}
+        same(sw.NBody([1, 2, 1], softening=0.1), "standard_euler", record="energy", every=9, **bodies)
+    same(oscillator, "leapfrog", v=start(), y=start(), dt=0.01, steps=100, force=start())
+    particles = sw.Particles([1.0, 2.0], floor=sw.Floor(friction=0.3))
+    same(particles, "false_euler", v=start(2, 2), y=np.abs(start(2, 2)), dt=0.01, steps=120, every=40)
+    same(sw.RigidBody([1.0, 2.0, 3.0]), "rk4", v=start(3), y=start(4) / 2, dt=0.01, steps=60, record="energy", every=20)
+
+
+def test_it_goes_on_where_it_stopped() -> None:
+    for method in ("rk4", "verlet"):
+        whole = same(driven(), method, v=start(), y=start(), dt=0.02, steps=80)
+        half = sw.integrate(driven(), method, v=start(), y=start(), dt=0.02, steps=33, device="opencl")
+        for device in ("opencl", "cpu"):
+            rest = sw.integrate(driven(), method, resume=half, steps=47, device=device)
+            assert np.array_equal(rest.y, whole.y)
+            assert np.array_equal(rest.v, whole.v)
+
+
+def test_one_member_and_no_batch() -> None:
+    same(driven(), "rk4", v=0.1, y=1.0, dt=0.02, steps=80, every=1)
+    same(driven(k=[2.0]), "rk4", v=0.1, y=1.0, dt=0.02, steps=80)
+
+
+def test_a_step_of_five_thousand_operations() -> None:
+    @sw.system
+    def chain(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
+        d = np.diff(y, axis=0)
+        f = k * d + d * d * d
+        return np.concatenate([f[:1], f[1:] - f[:-1], -f[-1:]])
+
+    same(chain(), "rk4", v=start(75), y=start(75), dt=0.01, steps=20)
+
+
+def test_what_is_too_long_is_refused_before_any_work() -> None:
+    n = 200
+    with pytest.raises(sw.errors.UnsupportedError, match="too long for a kernel, which has at most 20000"):
+        sw.integrate(sw.LinearSystem(np.eye(n)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, device="opencl")
+
+
+def test_names() -> None:
+    options: Any = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1}
+    for name in ("gpu", "opencl:", "opencl:x", 3, "cuda"):
+        with pytest.raises(sw.errors.ArgumentError, match=r"device: expected 'cpu', 'opencl', or 'opencl:1'"):
+            sw.integrate(sw.Oscillator(), "rk4", device=name, **options)
+    with pytest.raises(sw.errors.UnsupportedError, match=r"device: there is no opencl:77; there are opencl:0 \("):
+        sw.integrate(sw.Oscillator(), "rk4", device="opencl:77", **options)
+    with pytest.raises(sw.errors.ArgumentError, match="device: works with backend='rust' only"):
+        sw.integrate(sw.Oscillator(), "rk4", device="opencl", backend="numpy", **options)
+
+
+def test_the_variable_names_the_device(monkeypatch: Any) -> None:
+    monkeypatch.setenv("STEPWELL_DEVICE", "nothing")
+    with pytest.raises(sw.errors.ArgumentError, match="STEPWELL_DEVICE: expected"):
+        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+    sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, device="cpu")
+
+
+def test_devices_are_listed() -> None:
+    cpu, *others = sw.devices()
+    assert cpu.name == "cpu"
+    assert not cpu.float64
+    assert [each.name for each in others] == [f"opencl:{i}" for i in range(len(others))]
+    assert all(each.memory > 0 and each.units > 0 and each.title for each in others)
+
+
+def in_a_process(code: str, **environment: str) -> str:
+    import os
+
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ | environment, timeout=120
+    )
+    return run.stdout
+
+
+RUN = """
+import sys
+{before}
+import stepwell as sw
+try:
+    sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, device="opencl")
+except sw.errors.UnsupportedError as error:
+    print(error)
+print([each.name for each in sw.devices()])
+"""
+
+
+def test_without_pyopencl() -> None:
+    said = in_a_process(RUN.format(before="sys.modules['pyopencl'] = None"))
+    assert "device: needs pyopencl, which is not installed; pip install 'stepwell[gpu]'" in said
+    assert "['cpu']" in said
+
+
+def test_without_a_device(tmp_path: Any) -> None:
+    said = in_a_process(RUN.format(before=""), OCL_ICD_VENDORS=str(tmp_path))
+    assert "device: pyopencl finds no device" in said
+    assert "pocl-opencl-icd" in said
+    assert "['cpu']" in said
+
+
+MISTAKES = {
+    "sums": ("a + b", "(real)((float)a + (float)b)", "sums are not rounded"),
+    "subnormal numbers": (
+        "a * (real)0.5",
+        "fabs(a) < (real)2.2250738585072014e-308 ? 0 : a * (real)0.5",
+        "subnormal numbers become",
+    ),
+    "contraction": ("a * b + c", "fma(a, b, c)", "products are contracted with sums"),
+    "quotients": ("a / b", "a * ((real)1 / b)", "quotients are not correctly rounded"),
+    "fused": ("fma(a, b, c)", "a * b + c", "fused multiply-adds are not rounded once"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_device_with_other_bits_is_refused(mistake: str, monkeypatch: Any) -> None:
+    from stepwell.device import device_of, promise
+
+    written, instead, reason = MISTAKES[mistake]
+    machine = device_of("opencl")
+    assert machine is not None
+    monkeypatch.setattr(promise, "TRIED", [(instead if text == written else text, why) for text, why in promise.TRIED])
+    assert reason in promise.broken.__wrapped__(machine, False)
+
+
+def test_single_numbers_need_rounded_quotients(monkeypatch: Any) -> None:
+    from stepwell.device import device_of, opencl, promise
+
+    monkeypatch.setattr(opencl.Machine, "rounds_single", False)
+    assert "float32" in promise.broken.__wrapped__(device_of("opencl"), True)
+    monkeypatch.setattr(opencl.Machine, "has_doubles", False)
+    assert promise.broken.__wrapped__(device_of("opencl"), False) == "it has no float64"
+
+
+def test_every_operation_of_a_tape_is_printed() -> None:
+    from stepwell.device import printer
+
+    known = {*printer.ARITHMETIC, *printer.COMPARISONS, *printer.OF_BITS, "choose", "shift up", "shift down"}
+    assert {name for name, operands, *_ in _core.tape_operations() if operands} - known == {"sample", "copy", "gather"}
+
+
+def test_progress_and_pieces(monkeypatch: Any) -> None:
+    """A run in many short launches has the same bits, and tells how far it is."""
+    from stepwell.device import fixed
+
+    monkeypatch.setattr(fixed, "MOST_STEPS", 3)
+    monkeypatch.setattr(fixed, "FIRST_LAUNCH", 1)
+    for every in (None, 1, 2, 7):
+        same(driven(u=0.1), "leapfrog", v=start(), y=start(), dt=0.02, steps=23, every=every)
