@@ -32,6 +32,11 @@ class Device(NamedTuple):
         units: how many units compute at the same time; of the CPU, cores.
         float64: "" if runs in float64 have the bits of the core, else the reason why they are refused.
         float32: the same of runs in float32.
+
+    Example:
+        >>> cpu = sw.devices()[0]
+        >>> cpu.name, cpu.float64, cpu.float32
+        ('cpu', '', '')
     """
 
     name: str

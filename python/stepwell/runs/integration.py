@@ -49,9 +49,9 @@ def integrate(
     progress: bool = False,
     threads: int | None = None,
     backend: Backend = "rust",
+    device: str | None = None,
     start_step: int | None = None,
     resume: Run | World | None = None,
-    device: str | None = None,
 ) -> Run:
     """Step a system, or a batch of it.
 
@@ -120,6 +120,9 @@ def integrate(
         progress: show a progress bar, in a terminal or in a notebook.
         threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
         backend: ``"rust"``, or ``"numpy"`` for the reference.
+        device: "cpu", or "opencl" for the first device of OpenCL and "opencl:1" for the second, as ``stepwell.devices()`` lists
+            them. None is the CPU, or what the environment variable ``STEPWELL_DEVICE`` names. The bits are those of the CPU.
+            Fixed steps of up to some 20 000 operations; needs ``pip install "stepwell[gpu]"`` (docs/howto/gpu.md).
         start_step: number of the first step, 0 if None: it begins at t0 + start_step·dt.
         resume: a run or a ``World`` that this one continues, as if it had never stopped, to the bit. Its state, time and step are
             known, and so are its control, force, ``start``, ``fused``, ``dtype``, and with a tolerance that and ``max_step``,
@@ -127,9 +130,6 @@ def integrate(
             the run begins anew there from this state; with a tolerance at the last time that was asked for. Another ``dt``, or
             another method where more than the state is carried, is refused. Events are given again; if one changed the state,
             ``events`` is needed, and ``[]`` goes on without. Members that diverged stay as they are, without a second warning.
-        device: "cpu", or "opencl" for the first device of OpenCL and "opencl:1" for the second, as ``stepwell.devices()`` lists
-            them. None is the CPU, or what the environment variable ``STEPWELL_DEVICE`` names. The bits are those of the CPU.
-            Fixed steps of up to some 20 000 operations; needs ``pip install "stepwell[gpu]"`` (docs/howto/gpu.md).
 
     Returns:
         A ``Run``.
@@ -159,7 +159,7 @@ def integrate(
     """
     options = Options(
         v, y, dt, steps, every, tolerance, at, control, force, record, events, form, fused, dtype, t0, start, max_steps, max_step,
-        jumps, positive, progress, threads, backend, start_step, resume, device,
+        jumps, positive, progress, threads, backend, device, start_step, resume,
     )  # fmt: skip
     run = noticing(Request.of(system, method, options), is_heard)
     warn_of(run.findings)

@@ -54,9 +54,9 @@ class Options(NamedTuple):
     progress: Any = False
     threads: Any = None
     backend: Any = "rust"
+    device: Any = None
     start_step: Any = None
     resume: Any = None
-    device: Any = None
 
 
 #: The share of a component by which it may be off at the start of a run whose steps have no tolerance.

@@ -132,7 +132,7 @@ class Request(NamedTuple):
         """A run with steps of one length."""
         (
             v, y, dt, steps, every, _, _, control, force, record, events, form, fused, dtype, t0, start, max_steps, max_step,
-            jumps, positive_components, progress, threads, backend, start_step, _, device,
+            jumps, positive_components, progress, threads, backend, device, start_step, _,
         ) = options  # fmt: skip
         method, system, v = checked_system(system, method, v, y)
         fused, single = arithmetic(fused, dtype)
