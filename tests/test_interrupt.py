@@ -9,6 +9,7 @@ import textwrap
 
 import pytest
 import stepwell as sw
+from support.devices import NAMES
 
 #: Runs that would take minutes: many members, one member, one large member, threads, and a world. A step is never cut in two, so
 #: the large member's must be well below the tenth of a second on any machine.
@@ -34,6 +35,7 @@ RUNS = {
     "matrices of many rows": "sw.stability_limit(sw.Chain(400), 'rk4')",
     "a jacobian of many operations": "sw.jacobian(sw.system(lambda t, v, y: sum(1.0 / (k + y * y) for k in range(1, 600)))(), "
     "v=0.0, y=np.ones(10**6))",
+    "a device": "sw.integrate(sw.Oscillator(np.ones(10**5)), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**7, device='opencl')",
     "the reference": "sw.integrate(sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**9, backend='numpy')",
 }
 
@@ -50,6 +52,8 @@ def aside(code: str, env: dict[str, str] | None = None) -> str:
 
 @pytest.mark.parametrize("what", RUNS)
 def test_ctrl_c(what: str) -> None:
+    if what == "a device" and not NAMES:
+        pytest.skip("there is no device of OpenCL here")
     code = f"""
         import copy, os, signal, threading, time
         import numpy as np, stepwell as sw

@@ -19,6 +19,8 @@ from .stages import ARGUMENTS, Numbers, Stages, wide
 LAUNCH = 0.05
 #: Steps of the first launch, which shows how long one takes, and the most of any.
 FIRST_LAUNCH, MOST_STEPS = 32, 1 << 16
+#: Steps of members in the first launch, at most.
+MOST_AT_FIRST = 1 << 21
 #: The most bytes of saved states and of tables of steps on the device at a time.
 MOST_SAVED, MOST_TABLE = 1 << 28, 1 << 26
 #: Velocities that are computed from a carry may be infinite once its numbers are of this size, as in the core.
@@ -86,7 +88,8 @@ class _Run:
         self.table = machine.room(0)
         entries = len(stages.texts["step"].entries)
         #: The steps of the next launch, and the most of any: their table must fit.
-        self.pace, self.most_steps = FIRST_LAUNCH, min(MOST_STEPS, max(1, MOST_TABLE // max(1, 8 * entries)))
+        self.pace = max(1, min(FIRST_LAUNCH, MOST_AT_FIRST // members))
+        self.most_steps = min(MOST_STEPS, max(1, MOST_TABLE // max(1, 8 * entries)))
 
     def call(self, name: str, size: int, *arguments: Any) -> None:
         """Start a kernel."""

@@ -202,3 +202,8 @@ def machines() -> list[Machine]:
         )
     every.sort(key=lambda device: not device.type & cl.device_type.GPU)  # stable
     return [Machine(cl, device, f"opencl:{i}") for i, device in enumerate(every)]
+
+
+if hasattr(os, "register_at_fork"):
+    # The threads of a driver do not go along into the child: there devices are found anew.
+    os.register_at_fork(after_in_child=machines.cache_clear)
