@@ -44,7 +44,7 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
         "every": task.every,
         "outcomes": [_identity(each) for each in task.outcomes],
         "axes": {axis.argument: f"along {', '.join(axis.dims)}: {_digest(axis.values)}" for axis in grid.axes},
-        "given": {name: _digest(value) for name, value in task.options.items() if name != "threads"},
+        "given": {name: _digest(value) for name, value in task.options.items() if name not in ("threads", "device")},
         "first steps": bits,
     }
     if "events" in task.options:

@@ -21,6 +21,7 @@ from ...model.methods import method as find_method
 from ...model.systems import System
 from ...runs import float32
 from ...runs.findings import is_heard, warn_of
+from ...runs.options import machine_of
 from . import adaptive, happenings, lengths
 from .adaptive import Evaluations
 from .axes import OF_THE_RUN, Chunk, Grid
@@ -51,12 +52,14 @@ WORDS: dict[str, type[Outcome]] = {
     "evaluations": Evaluations,
     "history": History,
 }
-#: Default of ``memory``, in bytes.
-MEMORY = 64 * 2**20
+#: Default of ``memory``, in bytes; and with a device, where one chunk at a time is computed.
+MEMORY, MEMORY_OF_A_DEVICE = 64 * 2**20, 2**30
 #: The most members of a chunk by default: enough that a call costs little beside their steps.
 MAX_MEMBERS = 1 << 14
 #: Likewise with a tolerance, where a chunk has pieces only between the times of ``at``, and Ctrl-C waits for a piece.
 MAX_ADAPTIVE_MEMBERS = 1 << 11
+#: And on a device, which is idle while a chunk is prepared and its results are written.
+MAX_DEVICE_MEMBERS = 1 << 22
 #: The least number of chunks for each worker, as long as each chunk has at least MIN_MEMBERS members.
 CHUNKS_OF_A_WORKER, MIN_MEMBERS = 4, 256
 
@@ -92,8 +95,9 @@ def sweep(
     engine: Any = None,
     threads: int | None = None,
     chunk: int | None = None,
-    memory: float = MEMORY,
+    memory: float | None = None,
     progress: bool = False,
+    device: str | None = None,
 ) -> xarray.Dataset:
     """Run an ensemble, and return the outcomes of its members in arrays with named dimensions.
 
@@ -145,10 +149,14 @@ def sweep(
         store: a path ending in .zarr or .nc, or None for memory. Every finished chunk is written there, and an interrupted sweep
             goes on where it stopped when it is called again. With a store the results need not fit in memory.
         engine: None for threads of this process, an ``Executor`` of ``concurrent.futures``, or a ``dask.distributed.Client``.
-        threads: the number of threads without an engine; None for as many as there are cores.
-        chunk: the most members of a chunk; None for as many as ``memory`` allows, up to 16384.
-        memory: the bytes that a chunk may take while it is computed. As many chunks are computed at once as there are workers.
+        threads: the number of threads without an engine; None for as many as there are cores, or one with a device.
+        chunk: the most members of a chunk; None for as many as ``memory`` allows, up to 16384, or 4194304 with a device.
+        memory: the bytes that a chunk may take while it is computed; None for 64 MiB, or 1 GiB with a device, of whose memory it
+            takes half at most. As many chunks are computed at once as there are workers.
         progress: whether to show a progress bar, in a terminal or in a notebook.
+        device: what steps the members, as for ``integrate``: "cpu", "opencl", "opencl:1"; None is the CPU, or what
+            ``STEPWELL_DEVICE`` names. The bits are the same. A GPU needs a hundred thousand members or more to be busy. Exponents
+            of "lyapunov" are computed by the CPU.
 
     Returns:
         An ``xarray.Dataset``. Its attributes say how it was made; ``bits`` is a hash of all results.
@@ -185,9 +193,17 @@ def sweep(
     arguments = {name: value for name, value in fixed.items() if value is not None}
     arguments |= {"t0": checks.number("t0", t0, unit="units of time"), "fused": checks.flag("fused", fused), "threads": 1}
     arguments |= {name: value for name, value in (("control", control), ("start", start)) if value is not None}
-    if checks.is_single(dtype):
+    if single := checks.is_single(dtype):
         _fits_single(grid)
         arguments["dtype"] = "float32"
+    machine = machine_of(device, "rust")
+    if machine is not None:
+        from ...device import promise  # only such sweeps need it
+
+        promise.check(machine, single=single)
+        arguments["device"] = machine.described.name
+    elif device is not None:
+        arguments["device"] = device  # "cpu", in other processes, too
     every = None if every is None else checks.count("every", every, 1)
     kept_of_each = _outcomes(outcomes, every)
     if events is not None:
@@ -212,12 +228,12 @@ def sweep(
         observe=1 if observe is None else checks.count("observe", observe, 1),
         every=every,
         outcomes=kept_of_each,
-        memory=checks.number("memory", memory, positive=True, unit="bytes"),
+        memory=_memory(memory, machine),
         at=times,
         looks=times is not None and not method.is_always_stable and is_heard(StiffnessWarning),
     )
     first, bits, names = _probe(task, grid)
-    workers = Engine(engine, threads)
+    workers = Engine(engine, 1 if machine is not None and engine is None and threads is None else threads)
     mixed = times is None and lengths.together(first, method, kept_of_each, arguments)
     shape = grid.chunk_shape(_members(task, first, grid, workers.workers, chunk), mixed=mixed)
     layout = layout_of(task, grid, first, bits, named)
@@ -231,6 +247,14 @@ def sweep(
     _compute(task, grid, workers, results, checks.flag("progress", progress))
     dataset: xarray.Dataset = results.finish()
     return dataset
+
+
+def _memory(memory: float | None, machine: Any) -> float:
+    """The bytes that a chunk may take; on a device at most half of its memory."""
+    if memory is None:
+        memory = MEMORY if machine is None else MEMORY_OF_A_DEVICE
+    most: float = np.inf if machine is None else machine.described.memory / 2
+    return min(checks.number("memory", memory, positive=True, unit="bytes"), most)
 
 
 def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any], needed: tuple[str, ...]) -> None:
@@ -321,6 +345,8 @@ def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | 
         )
     if chunk is not None:
         return min(checks.count("chunk", chunk, 1), most)
+    if task.on_device:
+        return min(most, MAX_DEVICE_MEMBERS)
     parts = CHUNKS_OF_A_WORKER * workers
     largest = MAX_MEMBERS if task.at is None else MAX_ADAPTIVE_MEMBERS
     return min(most, largest, max(MIN_MEMBERS, -(-grid.members // parts)))

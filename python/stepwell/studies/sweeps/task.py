@@ -42,6 +42,8 @@ COPIES_OF_A_STATE = 4
 COPIES_OF_A_MEMBER = 12
 
 
+#: Arguments of ``integrate`` that a run does not carry.
+GIVEN_AGAIN = ("threads", "backend", "max_steps", "device")
 #: Makes a piece of a run: by its number of steps, the interval of the states that it saves, and the arguments of ``integrate``.
 Make = Callable[..., Run]
 
@@ -87,6 +89,11 @@ class Task(NamedTuple):
     def single(self) -> bool:
         """Whether steps are computed in float32."""
         return self.options.get("dtype") == "float32"
+
+    @property
+    def on_device(self) -> bool:
+        """Whether a device makes the steps, and not the CPU."""
+        return bool(self.options.get("device", "cpu") != "cpu")
 
     def rounded(self, dt: Array) -> Array:
         """The lengths of steps, rounded to the precision of the task."""
@@ -263,7 +270,8 @@ def _pieces(
 ) -> Iterator[Run]:
     """A run of ``steps`` fixed steps in pieces; a piece ends where a state is saved."""
     length = max(1, MAX_STEPS_OF_MEMBERS // members)
-    if "events" in start:  # a member that an event stopped cannot be resumed
+    if "events" in start or (task.on_device and between is None):
+        # A member that an event stopped cannot be resumed; a run on a device hears by itself that the sweep is stopped.
         length = steps
     elif between is not None:
         length = between * max(1, min(length // between, task.states_at_once(system, members) - 1))
@@ -296,7 +304,7 @@ def _pieces_between_times(
 
 def _going_on(options: dict[str, Any], run: Run) -> dict[str, Any]:
     """The arguments that resume a run; those that it does not carry, such as threads, are repeated."""
-    return {"resume": run} | {name: value for name, value in options.items() if name in ("threads", "backend", "max_steps")}
+    return {"resume": run} | {name: value for name, value in options.items() if name in GIVEN_AGAIN}
 
 
 @contextmanager
@@ -344,15 +352,20 @@ def probed(task: Task, values: dict[str, Any]) -> Probed:
         raise UnsupportedError("every: expected how many steps are between the states of a history")
     if task.at is not None:
         few = min(PROBED_STEPS, options.get("max_steps", PROBED_STEPS))
-        begun = quietly(system, task.method, at=task.at, **(options | {"max_steps": few}))
+        begun = step(_by_cpu(Request.of(system, task.method, Options(at=task.at, **(options | {"max_steps": few})))))
         _as_many(begun, 1)
         assert begun.controller_state is not None
         return Probed(begun.system, (begun.controller_state.v, begun.controller_state.y), _names(task, begun))
     request = Request.of(system, task.method, Options(steps=min(PROBED_STEPS, task.transient + task.steps), **options))
-    first = step(request)
+    first = step(_by_cpu(request))
     _as_many(first, 1)
     strong = of_a_strong_control(request.system, request.v, request.y, request.plan.dt)
     return Probed(first.system, (first.v[-1], first.y[-1]), _names(task, first), tuple(strong))
+
+
+def _by_cpu(request: Request) -> Request:
+    """The request for the CPU: for a few steps of one member no kernel is built, and the bits are the same."""
+    return request._replace(plan=request.plan._replace(device=None))
 
 
 def _names(task: Task, run: Run) -> set[str]:
