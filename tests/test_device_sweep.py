@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.devices import devices
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.studies.sweeps import ensemble
+from support.devices import NAMES, needs_device
 
 pytest.importorskip("xarray")
 
-NAMES = [each.name for each in devices() if each.name != "cpu" and not each.float64]
-pytestmark = pytest.mark.skipif(not NAMES, reason="there is no device of OpenCL here")
+pytestmark = needs_device
 
 
 @sw.system
