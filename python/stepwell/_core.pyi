@@ -363,8 +363,13 @@ def series_evaluations(model: ModelSpec, *, attempts: bool = False) -> int:
 def forget() -> None:
     """Begin with new caches of tapes and machine code: what another thread holds at a fork is never released in the child."""
 
-def program(method: str, *, attempts: bool = False) -> tuple[list[tuple[str, list[int], float]], list[int]]:
+def program(
+    method: str, *, attempts: bool = False, stage: str = "step", choice: int = 0
+) -> tuple[list[tuple[str, list[int], float]], list[int]]:
     """What a method does to blocks, and the places of the new blocks; of attempts also those of estimates of the error.
+
+    The stages beside "step" are "start", which turns v into what stands in its place between steps, with the blocks that are
+    kept behind it, and "finish", which turns that into v; ``choice`` is the number of the way to start.
 
     Names are "v", "y", "dv" and "dy" (with the time, as a share of the step; operands are v and y), "velocity", "add",
     "subtract", "scale" (with the factor), "series of v" and "series of y" (with the order of the coefficient), "kept v" and

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import _core
 from ..base.arrays import Array
-from . import promise
+from . import bodies, promise
 from .opencl import Machine
 from .stages import ARGUMENTS, Numbers, Stages, wide
 
@@ -52,6 +52,8 @@ def text_of(model: Any, single: bool, choice: int) -> tuple[Stages, str]:
 
 def run(machine: Machine, model: Any, plan: Any, arrays: Any) -> bool:
     """Make the run, and return whether some member has diverged, now or before: as ``_core.run``."""
+    if bodies.takes(model, plan):
+        return bodies.run(machine, plan, arrays)
     single = arrays.saved_y.dtype == np.float32
     promise.check(machine, single=single)
     members = arrays.first_bad.size

@@ -41,12 +41,18 @@ type BlockOperation = (&'static str, Vec<usize>, f64);
 
 /// The operations of a method on blocks: names, operands, times or factors, and the indices of the results; see `_core.pyi`.
 #[pyfunction]
-#[pyo3(signature = (method, *, attempts=false))]
-pub(crate) fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<usize>)> {
+#[pyo3(signature = (method, *, attempts=false, stage="step", choice=0))]
+pub(crate) fn program(method: &str, attempts: bool, stage: &str, choice: usize) -> PyResult<(Vec<BlockOperation>, Vec<usize>)> {
     let record =
         stepwell_core::model::methods::method(method).map_err(|_| argument_error(format!("method: there is no {method:?}")))?;
-    let made = if attempts { record.attempt() } else { Some(record.program()) };
-    let Program { entries, results } = made.ok_or_else(|| core_error(Error::NoEstimate))?;
+    let missing = || argument_error(format!("stage: {method} has no {stage} of number {choice}"));
+    let Program { entries, results } = match stage {
+        "step" if attempts => record.attempt().ok_or_else(|| core_error(Error::NoEstimate))?,
+        "step" => record.program(),
+        "start" => record.start(choice).ok_or_else(missing)?,
+        "finish" => record.finish(choice).ok_or_else(missing)?,
+        _ => return Err(missing()),
+    };
     let entry = |entry: &Entry| {
         let (name, number) = match *entry {
             Entry::V => ("v", 0.0),

@@ -1,0 +1,143 @@
+"""What a method does to blocks, as kernels: a work item for each number, a kernel between two evaluations of the rates.
+
+A second-order system needs one evaluation, h·v̇ at some places; h·ẏ is h·v. So all that stands between two evaluations is
+elementwise, and a kernel computes the places of the next one, or the new state, from the state and all h·v̇ up to there. What it
+needs twice is computed twice, which is less than the memory would take.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .. import _core
+from ..errors import UnsupportedError
+
+#: The operations of a method that are written here.
+WRITTEN = frozenset({"v", "y", "kept v", "kept y", "dv", "dy", "velocity", "add", "subtract", "scale", "mass"})
+
+
+class Pass(NamedTuple):
+    """A kernel over all numbers of a block.
+
+    Attributes:
+        name: the name of the kernel.
+        reads: the blocks that it reads.
+        writes: the blocks that it writes; none if it computes places.
+        asks: the block of h·v̇ at the places that it computes; "" if it computes none.
+    """
+
+    name: str
+    reads: list[str]
+    writes: list[str]
+    asks: str
+
+
+class Stage(NamedTuple):
+    """A stage of a method.
+
+    Attributes:
+        passes: its kernels, in order.
+        text: their text.
+        again: the block of h·v̇ at the places at the start, and that at those at the end, or None: the next step begins with the
+            second.
+    """
+
+    passes: list[Pass]
+    text: str
+    again: tuple[str, str] | None
+
+
+def unwritten(method: str) -> str:
+    """An operation of a method that is not written here, or ""."""
+    return next((name for name, _, _ in _core.program(method)[0] if name not in WRITTEN), "")
+
+
+def stage_of(method: str, stage: str, choice: int, results: list[str]) -> Stage:
+    """The kernels of a stage, which writes these blocks.
+
+    The blocks of the state are "v", which is what the method carries in its place, "y", and "kept0", "kept1", …
+    """
+    operations, places = _core.program(method, stage=stage, choice=choice)
+    if any(name not in WRITTEN for name, _, _ in operations):
+        raise UnsupportedError(f"device: many bodies make no steps by {method} there; use device='cpu'")
+    # What an operation is: a block, or a text of what it computes from others.
+    block: dict[int, str] = {}
+    text: dict[int, tuple[str, list[int]]] = {}
+    same = list(range(len(operations)))  # masses of these equations are units
+    evaluations: dict[int, str] = {}
+    order: list[int] = []
+    for i, (name, operands, number) in enumerate(operations):
+        of = [same[each] for each in operands]
+        match name:
+            case "v" | "y":
+                block[i] = name
+            case "kept v" | "kept y":
+                block[i] = f"kept{int(number)}"
+            case "dv":
+                if of[1] not in evaluations:
+                    evaluations[of[1]] = f"{stage}{len(order)}"
+                    order.append(of[1])
+                block[i] = evaluations[of[1]]
+            case "dy":
+                text[i] = "h * {}", of[:1]
+            case "velocity":
+                text[i] = "{} / h", of
+            case "add":
+                text[i] = "{} + {}", of
+            case "subtract":
+                text[i] = "{} - {}", of
+            case "scale":
+                text[i] = f"({float(number).hex()}) * {{}}", of
+            case _:
+                same[i] = of[0]
+
+    def computed(targets: list[int]) -> tuple[list[str], list[str]]:
+        """The blocks that these operations need, and the statements that compute them."""
+        needed, open_ = set(), list(targets)
+        while open_:
+            i = open_.pop()
+            if i not in needed:
+                needed.add(i)
+                open_ += text[i][1] if i in text else []
+        blocks = list(dict.fromkeys(block[i] for i in sorted(needed) if i in block))
+        lines = [f"const real {name} = of_{name}[g];" for name in blocks]
+        for i in sorted(needed):
+            if i in text:
+                pattern, of = text[i]
+                lines.append(f"const real x{i} = {pattern.format(*(value(each) for each in of))};")
+        return blocks, lines
+
+    def value(i: int) -> str:
+        return block.get(i, f"x{i}")
+
+    passes, texts = [], []
+    for turn, place in enumerate(order):
+        reads, lines = computed([place])
+        made = Pass(f"{stage}_pass{turn}", reads, [], f"{stage}{turn}")
+        passes.append(made)
+        texts.append(_kernel(made, [*lines, f"put_place({value(place)}, g, all, n, ranks, places, round);"]))
+    targets = [same[i] for i in places]
+    reads, lines = computed(targets)
+    last = Pass(f"{stage}_last", reads, results, "")
+    to = [f"to_{name}[g] = {value(i)};" for name, i in zip(results, targets, strict=True)]
+    y = next((i for i, name in block.items() if name == "y"), -1)
+    end = targets[results.index("y")] if "y" in results else -1
+    again = (evaluations[y], evaluations[end]) if y in evaluations and end in evaluations and end != y else None
+    return Stage([*passes, last], "\n".join([*texts, _kernel(last, [*lines, *to])]), again)
+
+
+def _kernel(made: Pass, body: list[str]) -> str:
+    """The text of a kernel. Blocks that are written may be among those that are read: each work item has numbers of its own."""
+    reads = [f"__global const real *of_{name}" for name in made.reads]
+    writes = [f"__global real *to_{name}" for name in made.writes]
+    if made.asks:
+        writes = ["const int all", "const int n", "__global const int *ranks", "__global real *places", "__global real *round"]
+    return "\n".join(
+        [
+            f"__kernel void {made.name}(const long count, const real h, {', '.join([*reads, *writes])}) {{",
+            "const long g = get_global_id(0);",
+            "if (g >= count) return;",
+            *body,
+            "}",
+        ]
+    )
