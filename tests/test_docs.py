@@ -32,7 +32,7 @@ NAMED = re.compile(r"`([\w.*{},/-]+(?:/|\.(?:rs|py|pyi|md|toml|txt|png)))`")
 INTRODUCED = re.compile(r"<!-- file: (\S+) -->")
 
 #: What a page needs beside what every page may use. The extra ``test`` has it.
-NEEDS = {"interop.md": ("gymnasium", "pandas", "xarray"), "gpu.md": ("pyopencl",)}
+NEEDS = {"interop.md": ("gymnasium", "pandas", "xarray"), "gpu.md": ("pyopencl", "xarray")}
 
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 
