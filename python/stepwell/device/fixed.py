@@ -50,9 +50,12 @@ def text_of(model: Any, single: bool, choice: int) -> tuple[Stages, str]:
     return _TEXTS[key]
 
 
-def run(machine: Machine, model: Any, plan: Any, arrays: Any) -> bool:
-    """Make the run, and return whether some member has diverged, now or before: as ``_core.run``."""
-    if bodies.takes(model, plan):
+def run(machine: Machine, model: Any, plan: Any, arrays: Any, numbers: Numbers | None = None) -> bool:
+    """Make the run, and return whether some member has diverged, now or before: as ``_core.run``.
+
+    ``numbers`` are those of the model if they are on the device already, for a world.
+    """
+    if numbers is None and bodies.takes(model, plan):
         return bodies.run(machine, plan, arrays)
     single = arrays.saved_y.dtype == np.float32
     promise.check(machine, single=single)
@@ -62,18 +65,18 @@ def run(machine: Machine, model: Any, plan: Any, arrays: Any) -> bool:
     stages, text = text_of(model, single, plan.choice)
     program = machine.program(text)
     with program.lock:
-        return _Run(machine, program, stages, model, plan, arrays).make()
+        return _Run(machine, program, stages, plan, arrays, numbers or Numbers(machine, stages, model, members, plan.dt)).make()
 
 
 class _Run:
     """A run as it is made."""
 
-    def __init__(self, machine: Machine, program: Any, stages: Stages, model: Any, plan: Any, arrays: Any) -> None:
+    def __init__(self, machine: Machine, program: Any, stages: Stages, plan: Any, arrays: Any, numbers: Numbers) -> None:
         self.machine, self.program, self.stages, self.plan, self.arrays = machine, program, stages, plan, arrays
         self.members = members = arrays.first_bad.size
         self.kind = np.float32 if stages.single else np.float64
         self.bytes = np.dtype(self.kind).itemsize
-        self.numbers = Numbers(machine, stages, model, members, plan.dt)
+        self.numbers = numbers
         sizes = stages.sizes
         self.state = sizes["v"] + sizes["y"] + sizes["kept"] + sizes["tally"]
         before = np.zeros((self.state, members), self.kind)

@@ -421,6 +421,7 @@ class Request(NamedTuple):
             dt = float32.step(system, method, "direct", dt)
         if before is not None:
             continuation.goes_on_alike(before, method, dt)
+        machine = machine_of(options.device, "rust")
         t0 = 0.0 if options.t0 is None else checks.number("t0", options.t0, unit="units of time")
         batch = checks.shape_of("y", y)[len(system.y_shape) :]
         v = np.empty((0, *batch), np.dtype(kind)) if velocities(system, v) is not v else v
@@ -458,7 +459,9 @@ class Request(NamedTuple):
         if before is None and first == 0:
             check_algebraic(stepped, y, t0)
         seen = stepped.over_steps(method, t0, dt)
-        plan = engine.Plan(seen, method, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
+        plan = engine.Plan(
+            seen, method, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single, device=machine
+        )
         if seen.controller is not None:
             plan = plan._replace(memory=_memory(seen, batch, before))
             if slot is not None and plan.memory is not None:

@@ -54,6 +54,10 @@ class World:
         resume: a world or a run with fixed steps that this one continues, to the bit: all of the above but ``events`` is then
             known, and may be given again, as for ``integrate``. Its arrays are copies; with ``v`` and ``y`` of your own it begins
             from these, in place.
+        device: what makes the steps, as for ``integrate``: "cpu", "opencl", "opencl:1"; None is the CPU, or what
+            ``STEPWELL_DEVICE`` names. The bits are the same. Your arrays stay in the memory of the host: each call of ``step``
+            takes the state to the device and back, about a millisecond and more for many members. So this pays for a hundred
+            thousand members, or for many steps a call. Parameters go there again where they have changed.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -103,11 +107,12 @@ class World:
         fused: bool | None = None,
         dtype: Any = None,
         events: Any = None,
+        device: str | None = None,
         resume: Run | World | None = None,
     ) -> None:
         options = Options(
             v=v, y=y, dt=dt, t0=t0, start_step=start_step, start=start, control=control, force=force, fused=fused, dtype=dtype,
-            events=events, resume=resume,
+            events=events, resume=resume, device=device,
         )  # fmt: skip
         request = Request.in_place(system, method, options)
         plan = request.plan
@@ -115,7 +120,7 @@ class World:
         self._v, self._y = v, y = request.v, request.y
         # Views: the core knows rows, not axes.
         force = None if plan.force is None else plan.force.reshape(-1)
-        self._core = loop = _core.World(engine.model(plan), plan, v.reshape(-1), y.reshape(-1), request.slot, force)
+        self._core = loop = _loop(plan, v.reshape(-1), y.reshape(-1), request.slot, force)
         if plan.memory is not None and request.slot is None:
             loop.remember(plan.memory.astype(y.dtype).reshape(-1))
         self._frames = None
@@ -451,13 +456,14 @@ class World:
         return facts("World", [*pairs, ("t", f"{self.t:g}"), ("shape of y", self._y.shape)])
 
     def __copy__(self) -> World:
-        return _again(self._standing(), self._events, self._control)
+        return _again(*self.__reduce__()[1])
 
     def __deepcopy__(self, memo: dict[int, Any]) -> World:
         return self.__copy__()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _again, (self._standing(), self._events, self._control)
+        machine = self._plan.device
+        return _again, (self._standing(), self._events, self._control, "cpu" if machine is None else machine.described.name)
 
     @property
     def v(self) -> Array:
@@ -499,7 +505,17 @@ class World:
         return self._core.step_number
 
 
-def _again(standing: Continuation, events: Any, control: Any = None) -> World:
-    world = World(standing.system, standing.method, events=events, resume=standing)  # type: ignore[arg-type]  # a world's state
+def _loop(plan: engine.Plan, v: Array, y: Array, slot: Array | None, force: Array | None) -> _core.World:
+    """The loop of the core, or of a device."""
+    model = engine.model(plan)
+    if plan.device is None:
+        return _core.World(model, plan, v, y, slot, force)
+    from ..device.world import World as OnDevice  # only such worlds need it
+
+    return OnDevice(plan.device, model, plan, v, y, slot, force)  # type: ignore[return-value]  # it has the same methods
+
+
+def _again(standing: Continuation, events: Any, control: Any = None, device: str | None = None) -> World:
+    world = World(standing.system, standing.method, events=events, resume=standing, device=device)  # type: ignore[arg-type]  # a world's state
     world._control = control
     return world
