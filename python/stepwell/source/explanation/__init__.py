@@ -24,17 +24,17 @@ from ...model.systems.base import a_system
 from ...runs import engine, float32
 from ...runs.engine.counted import written
 from ...runs.engine.linear import matrix_model
-from ...runs.options import Options
+from ...runs.options import Options, machine_of
 from ...runs.request import Request
 from .beside import lines_beside
 from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape
 from .naming import matrix_of
-from .result import Explanation, MachineCode, Packing
+from .result import Explanation, Kernel, MachineCode, Packing
 
 if TYPE_CHECKING:
     from ...base.literals import StepForm
 
-__all__ = ["Explanation", "Line", "MachineCode", "Packing", "Section", "explain"]
+__all__ = ["Explanation", "Kernel", "Line", "MachineCode", "Packing", "Section", "explain"]
 
 
 def explain(
@@ -49,6 +49,7 @@ def explain(
     start: str | None = None,
     record: str | Sequence[str] | None = (),
     dtype: Any = "float64",
+    device: str | None = None,
 ) -> Explanation:
     """Explain what a step of a system by a method computes, and its machine code on this machine.
 
@@ -71,6 +72,7 @@ def explain(
         record: quantities that the core can record, whose computation is listed, too: "energy", and others in the system's
             ``quantities``.
         dtype: ``"float64"`` or ``"float32"``, as in ``integrate``.
+        device: as in ``integrate``: for a device, what it runs is in ``kernel``, with the text. Steps of fixed length only.
 
     Returns:
         An ``Explanation``.
@@ -109,6 +111,11 @@ def explain(
     options = Options(control=control, fused=fused, form=form, start=start, dtype=dtype)
     plan = Request.one_step(system, method, options, batch).plan
     explained = _explained(plan, attempt)
+    machine = machine_of(device, "rust")
+    if machine is not None and attempt and device is not None:
+        raise UnsupportedError("device: explains a step of fixed length, so it goes without attempt=True")
+    if machine is not None and not attempt:
+        explained = replace(explained, kernel=_kernel(machine, plan))
     if explained.parts is not None or attempt:
         return explained
     return replace(explained, beside=lines_beside(plan, plan.choice, quantities))
@@ -165,6 +172,19 @@ def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
         code=code,
         interpreted_because=why,
     )
+
+
+def _kernel(machine: Any, plan: engine.Plan) -> Kernel:
+    """What a device runs."""
+    from ...device import fixed, promise  # only such explanations need it
+
+    promise.check(machine, single=plan.single)
+    model = matrix_model(plan, **matrix_of(plan)) if plan.form == "matrix" else engine.model(plan)
+    stages, text = fixed.text_of(model, plan.single, plan.choice)
+    numbers = sum(stages.sizes[name] for name in ("v", "y", "kept", "tally"))
+    size = 4 if plan.single else 8
+    member_bytes = size * (2 * numbers + len(stages.params)) + 8
+    return Kernel(machine.described.name, machine.described.title, numbers, member_bytes, text.count("\n"), text)
 
 
 def _why(word: str) -> str:

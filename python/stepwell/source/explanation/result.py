@@ -106,6 +106,34 @@ class Packing(ValueEquality):
         )
 
 
+@dataclass(frozen=True)
+class Kernel(ValueEquality):
+    """What a device runs.
+
+    Attributes:
+        device: the name of the device, such as "opencl:0".
+        title: its own name.
+        numbers: numbers of a member that stay in private memory over all steps of a launch: its state, and what the method keeps.
+        member_bytes: bytes of a member in the memory of the device: its state, before and after a launch, its own parameters, and
+            the step at which it diverged.
+        lines: the lines of the text.
+        text: the kernels, in OpenCL C.
+    """
+
+    device: str
+    title: str
+    numbers: int
+    member_bytes: int
+    lines: int
+    text: str
+
+    def __str__(self) -> str:
+        return (
+            f"On {self.device} ({self.title}) a work item makes the steps of a member, with {self.numbers} numbers in private "
+            f"memory; a member takes {self.member_bytes} bytes in the memory of the device; the kernels have {self.lines} lines."
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Explanation(ValueEquality):
     """The operations of a step and its machine code on this machine. ``print`` it.
@@ -135,6 +163,7 @@ class Explanation(ValueEquality):
         parts: for a step that is too long for one tape: ``"rates"`` if its rates are tapes of their own, ``"hand"`` if they are a
             loop that was compiled beforehand, ``"matrix"`` if it is products of large matrices. None if it is one tape.
         about: about how many operations such a step has; 0 if it is one tape, whose operations are counted.
+        kernel: what a device runs, by ``device=``, with its text; None without one.
         beside: the computations beside the steps, by ``when``: for a method with a carry, ``"start"``, which computes the carry
             from v at the start of a run, and ``"finish"``, which computes v from it where a state is saved; and the quantities of
             ``record=``, such as ``"record energy"``. A sampled input is written as a function, a(t).
@@ -169,6 +198,7 @@ class Explanation(ValueEquality):
     form: str = "direct"
     beside: tuple[Section, ...] = ()
     dtype: str = "float64"
+    kernel: Kernel | None = None
 
     @property
     def listing(self) -> str:
@@ -248,7 +278,11 @@ class Explanation(ValueEquality):
             out.append(self._hoisted())
         if self.beside:
             out += ["", self._listed(self.beside), ""]
-        return "\n".join([*out, self.machine, *self.words()])
+        return "\n".join([*out, *self._machines(), *self.words()])
+
+    def _machines(self) -> list[str]:
+        """How the step is executed, on the CPU and on a device."""
+        return [self.machine, *([] if self.kernel is None else [str(self.kernel)])]
 
     def _hoisted(self) -> str:
         counts = [f"{n} {self._when(Section(when, ()))}" for when, n in self.hoisted.items() if n]
@@ -299,6 +333,7 @@ class Explanation(ValueEquality):
             "sections": sections,
             "beside": beside,
             "code": code,
+            "kernel": None if self.kernel is None else asdict(self.kernel),
         }
 
     def to_json(self, path: str | Path) -> None:
@@ -323,7 +358,7 @@ class Explanation(ValueEquality):
             ]
             head = "<tr><th>operations of a step</th><th>written</th><th>computed</th></tr>"
             html += f"<table>{head}{''.join(counts)}</table><p>{self._hoisted()}</p>"
-        return html + "".join(f"<p>{escape(each)}</p>" for each in (self.machine, *self.words()))
+        return html + "".join(f"<p>{escape(each)}</p>" for each in (*self._machines(), *self.words()))
 
 
 def _members(count: int) -> str:
