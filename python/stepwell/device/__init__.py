@@ -2,8 +2,8 @@
 
 ``opencl`` finds devices and builds kernels, ``listing`` tells what there is, ``promise`` tries what a device does with the bits
 of numbers, ``printer`` writes the operations of a tape as OpenCL C. ``stages`` has the tapes of a run and the numbers that they
-read, and ``fixed`` makes runs of fixed steps; those of many bodies are made by ``bodies``, by a method's operations on
-``blocks``. They take models, plans and arrays as ``_core`` does, and fill the same arrays.
+read; ``fixed`` makes runs of fixed steps, and ``adaptive`` those with a tolerance; runs of many bodies are made by ``bodies``,
+by a method's operations on ``blocks``. They take models, plans and arrays as ``_core`` does, and fill the same arrays.
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ class Stages:
         self.texts = {name: self._text(name, split) for name, split in made["splits"].items()}
 
     def _text(self, stage: str, split: Any) -> Text:
-        own = "j" if stage == "judged" else ""
+        own = stage == "judged"
         printer = Printer(self.single and not own)
         at = f"{stage.replace(' ', '_')}_"
         sources = [self._place(self.sources, tuple(each)) for each in split["given"]]
@@ -87,6 +87,8 @@ class Stages:
         def of_clock(name: str, number: int, _: str) -> str:
             return shared(number, "") if name == "uniform" else "t"
 
+        if own:
+            return self._judged(split, printer, sources)
         uniforms, results = printer.body(split["run"], lambda name, number, _: shared(number), f"{at}u")
         uniforms += [f"uniforms[{first + i}] = {text};" for i, text in enumerate(results)]
         self.uniforms += len(results)
@@ -97,10 +99,7 @@ class Stages:
         if wide or of_wide:
             # The clock of a step of float32 computes in float64.
             moment += [line.replace("const real ", "const double ").replace("const bits ", "const ulong ") for line in wide]
-            moment = [
-                line.replace("number_of(", "as_double(").replace("bits_of(", "as_ulong(") if f" {at}c" in line else line
-                for line in moment
-            ]
+            moment = [in_double(line) if f" {at}c" in line else line for line in moment]
         values = values + of_wide
         entries = [tuple(each) for each in split["entries"]]
         for i, ((kind, table), value) in enumerate(zip(entries, values, strict=True)):
@@ -130,6 +129,16 @@ class Stages:
         return Text(uniforms, member, moment, body, entries, results)
 
     @staticmethod
+    def _judged(split: Any, printer: Printer, sources: list[int]) -> Text:
+        """The text of the decision about an attempt of float32, all in float64: its state is d0, d1, …"""
+        before, uniforms = printer.body(split["run"], lambda name, number, _: f"sources[{sources[number]}]", "judged_u")
+        body, results = printer.body(
+            split["body"], lambda name, number, _: f"d{number}" if name == "state" else uniforms[number], "judged_x"
+        )
+        before, body, results = ([in_double(line) for line in lines] for lines in (before, body, results))
+        return Text([], before, [], body, [], results)
+
+    @staticmethod
     def _place(every: list[Any], one: Any) -> int:
         if one not in every:
             every.append(one)
@@ -139,6 +148,13 @@ class Stages:
     def head(self) -> str:
         """What stands before the kernels."""
         return HEAD + TYPES[self.single] + SAMPLES
+
+
+def in_double(line: str) -> str:
+    """A statement of float32 as one of float64."""
+    for single, double in (("const real ", "const double "), ("const bits ", "const ulong ")):
+        line = line.replace(single, double)
+    return line.replace("number_of(", "as_double(").replace("bits_of(", "as_ulong(")
 
 
 #: A sample of a member, by the number of its row among those of all tables.

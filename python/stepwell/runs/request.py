@@ -278,10 +278,7 @@ class Request(NamedTuple):
         sign = -1.0 if backward else 1.0
         backend = checks.known("backend", options.backend, BACKENDS)
         budget = MOST_STEPS if options.max_steps is None else checks.count("max_steps", options.max_steps, 1)
-        if machine_of(options.device, backend) is not None:
-            raise UnsupportedError(
-                "device: makes fixed steps only, dt= and steps=; for adaptive steps, tolerance= and at=, use device='cpu'"
-            )
+        machine = machine_of(options.device, backend)
         acceptance = Acceptance(system.groups, positive=positive.checked_places(system, options.positive, v, y))
         numbers = prod(system.v_shape) + prod(system.y_shape)
         groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))
@@ -376,6 +373,7 @@ class Request(NamedTuple):
         plan = engine.Plan(
             system, method, batch, 1.0, begin, threads=workers, backend=backend, fused=fused, order=order, acceptance=acceptance,
             backward=backward, force=None if force is None else spread(force, system.v_shape, batch), single=single,
+            device=machine,
         )  # fmt: skip
         at = np.ascontiguousarray(sign * times)
         pacing = engine.Pacing(at, budget, pace is None, None if jumps is None else np.sort(sign * jumps, axis=0))

@@ -343,13 +343,22 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, ends, None, steps, waypoints)
     core_pacing, core_plan = pacing_of_core(plan, pacing), plan._replace(t0=0.0)
     spec = model(core_plan)
-    if not _core.adapt(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
+    if not _adapt_by_core(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
         before = numbers_of(begun(plan, paces, v, y)).reshape(numbers, members)
-        _core.adapt(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
+        _adapt_by_core(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
     each = _evaluations_of_attempt(plan)
     last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
     paces = last_paces.reshape(numbers, *plan.batch)
     return Adapted(saved_v, saved_y, last_v, last_y, paces, status, each, steps, waypoints)
+
+
+def _adapt_by_core(model: _core.ModelSpec, plan: Plan, pacing: CorePacing, arrays: AdaptiveArrays) -> bool:
+    """Make the run by the core, or on the device of the plan: see ``_core.adapt``."""
+    if plan.device is None:
+        return _core.adapt(model, plan, pacing, arrays)
+    from ...device import adaptive  # only such runs need it
+
+    return adaptive.adapt(plan.device, model, plan, pacing, arrays)
 
 
 def _evaluations_of_attempt(plan: Plan) -> int:
