@@ -210,6 +210,10 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]),
         diverged,
     ],
+    "Device": [
+        lambda: sw.Device("opencl:0", "a GPU", "a driver", 1 << 30, 64),
+        lambda: sw.Device("opencl:0", "a GPU", "a driver", 1 << 30, 64, float32="it rounds otherwise"),
+    ],
     "Paces": [
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]).paces,
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]).paces,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import threading
-import warnings
 from collections import OrderedDict
 from functools import cache, cached_property
 from typing import Any, NamedTuple
@@ -138,9 +137,7 @@ class Machine:
                 self._programs.move_to_end(text)
                 return self._programs[text]
         options = ["-cl-std=CL1.2"] + [ROUNDS_SINGLE] * self.rounds_single
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of compilers, about nothing that a user can change
-            built = Program(self.cl.Program(self.context, text).build(options=options))
+        built = Program(self.cl.Program(self.context, text).build(options=options))
         with self._lock:
             self._programs[text] = built
             while len(self._programs) > MOST_PROGRAMS:
