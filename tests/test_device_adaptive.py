@@ -17,7 +17,7 @@ from stepwell.errors import StepwellError
 from stepwell.runs import engine
 from stepwell.runs.result import Status
 from support.cases import ADAPTIVE, SYSTEMS
-from support.devices import needs_device
+from support.devices import assert_same, needs_device
 from support.families import family
 
 pytestmark = needs_device
@@ -45,13 +45,7 @@ def same(system: Any, method: str, **options: Any) -> Any:
         warnings.simplefilter("ignore")
         core = sw.integrate(system, method, device="cpu", **options)
         got = sw.integrate(system, method, device="opencl", **options)
-    for name in ("t", "v", "y", "status", "first_bad_step", "work"):
-        one, other = getattr(got, name), getattr(core, name)
-        assert (one is None) == (other is None), name
-        if one is not None:
-            one, other = np.asarray(one), np.asarray(other)
-            assert one.dtype == other.dtype
-            assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), name
+    assert_same(got, core, "t", "v", "y", "status", "first_bad_step", "work")
     for name, one, other in zip(core.paces._fields, got.paces, core.paces, strict=True):  # type: ignore[union-attr, arg-type]
         assert np.array_equal(one, other, equal_nan=True), name
     for name in ("v", "y", "paces"):

@@ -12,7 +12,7 @@ import pytest
 import stepwell as sw
 from stepwell import _core
 from support import recorded
-from support.devices import needs_device
+from support.devices import assert_same, needs_device
 
 pytestmark = needs_device
 
@@ -44,15 +44,7 @@ def same(system: Any, method: str, **options: Any) -> Any:
         warnings.simplefilter("ignore")
         got = sw.integrate(system, method, device="opencl", **options)
         core = sw.integrate(system, method, device="cpu", **options)
-    for name in ("t", "v", "y", "first_bad_step", "status", "work", "carry"):
-        one, other = getattr(got, name), getattr(core, name)
-        assert (one is None) == (other is None), name
-        if one is not None:
-            one, other = np.asarray(one), np.asarray(other)
-            assert one.dtype == other.dtype
-            assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), name
-            if one.dtype.kind == "f":
-                assert np.array_equal(np.signbit(one) | np.isnan(one), np.signbit(other) | np.isnan(other)), name
+    assert_same(got, core, "t", "v", "y", "first_bad_step", "status", "work", "carry")
     assert got.recorded.keys() == core.recorded.keys()
     for name, numbers in core.recorded.items():
         assert np.array_equal(got.recorded[name], numbers, equal_nan=True), name
@@ -279,3 +271,15 @@ def test_progress_and_pieces(monkeypatch: Any) -> None:
     monkeypatch.setattr(fixed, "FIRST_LAUNCH", 1)
     for every in (None, 1, 2, 7):
         same(driven(u=0.1), "leapfrog", v=start(), y=start(), dt=0.02, steps=23, every=every)
+
+
+def test_what_does_not_fit_and_what_does_not_compile_is_said(monkeypatch: Any) -> None:
+    from stepwell.device import device_of, opencl
+
+    machine = device_of("opencl")
+    assert machine is not None
+    with pytest.raises(sw.errors.UnsupportedError, match=r"device: the compiler of opencl:0 .* fails at a step of 1 statements"):
+        machine.program("this is no C;")
+    monkeypatch.setattr(opencl.Machine, "largest", 1000)
+    with pytest.raises(sw.errors.TooLargeError, match=r"device: an array of the run takes .* has at most .* for one"):
+        sw.integrate(lorenz(), "rk4", y=start(3), dt=0.1, steps=1, device="opencl")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 import pytest
 from stepwell.device import devices
 
@@ -9,3 +12,18 @@ from stepwell.device import devices
 NAMES = [each.name for each in devices() if each.name != "cpu" and not each.float64]
 
 needs_device = pytest.mark.skipif(not NAMES, reason="there is no device of OpenCL here")
+
+
+def assert_same(got: Any, core: Any, *names: str) -> None:
+    """These arrays of two runs are the same to the last bit, but for the bits of a NaN."""
+    for name in names:
+        one, other = getattr(got, name), getattr(core, name)
+        assert (one is None) == (other is None), name
+        if one is None:
+            continue
+        one, other = np.asarray(one), np.asarray(other)
+        assert one.dtype == other.dtype
+        is_float = one.dtype.kind == "f"
+        assert np.array_equal(one, other, equal_nan=is_float), name
+        if is_float:
+            assert np.array_equal(np.signbit(one) | np.isnan(one), np.signbit(other) | np.isnan(other)), name

@@ -268,7 +268,7 @@ def _kernels(stages: Stages) -> str:
         save += [*(f"real w{i};" for i in range(n_v)), "{", *velocities]
         save += [*(f"w{i} = {finish.results[i]};" for i in range(n_v)), "}"]
         words = " && ".join(f"fabs(w{i}) < INFINITY" for i in range(n_v)) or "1"
-        save += [f"if ((since || i >= 0) && k > first - since && !({words})) doubt = 1;"]
+        save += [f"if (k > first - since && !({words})) doubt = 1;"]
     save += [f"saved_v[(at * {n_v} + {i}) * members + g] = {shown[i]};" for i in range(n_v)]
     save += [f"saved_y[(at * {n_y} + {i}) * members + g] = {shown[n_v + i]};" for i in range(n_y)]
     if "record" in texts:

@@ -9,8 +9,9 @@ from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 from ..base import checks
+from ..base.available_memory import in_bytes
 from ..base.optional import imported
-from ..errors import ArgumentError, UnsupportedError
+from ..errors import ArgumentError, TooLargeError, UnsupportedError
 
 #: Where the name of the device is read that ``device=None`` means.
 VARIABLE = "STEPWELL_DEVICE"
@@ -137,7 +138,13 @@ class Machine:
                 self._programs.move_to_end(text)
                 return self._programs[text]
         options = ["-cl-std=CL1.2"] + [ROUNDS_SINGLE] * self.rounds_single
-        built = Program(self.cl.Program(self.context, text).build(options=options))
+        try:
+            built = Program(self.cl.Program(self.context, text).build(options=options))
+        except self.cl.Error as error:
+            raise UnsupportedError(
+                f"device: the compiler of {self.described.name} ({self.described.title}) fails at a step of {text.count(';')} "
+                f"statements, {str(error).splitlines()[0]}; use device='cpu'"
+            ) from None
         with self._lock:
             self._programs[text] = built
             while len(self._programs) > MOST_PROGRAMS:
@@ -147,13 +154,23 @@ class Machine:
     def put(self, array: Any) -> Any:
         """A copy of an array on the device, to read and to write."""
         flags = self.cl.mem_flags
+        self._fits(array.nbytes)
         if array.nbytes == 0:
             return self.room(1)
         return self.cl.Buffer(self.context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=array)
 
     def room(self, size: int) -> Any:
         """Room for so many bytes on the device."""
+        self._fits(size)
         return self.cl.Buffer(self.context, self.cl.mem_flags.READ_WRITE, size=max(size, 1))
+
+    def _fits(self, size: int) -> None:
+        """Raise if an array of so many bytes is larger than any of the device."""
+        if size > self.largest:
+            raise TooLargeError(
+                f"device: an array of the run takes {in_bytes(size)}, and {self.described.name} ({self.described.title}) has "
+                f"at most {in_bytes(self.largest)} for one; split the batch, or use device='cpu'"
+            )
 
     def get(self, array: Any, buffer: Any, offset: int = 0) -> None:
         """Fill an array from the device, once all before it is done."""

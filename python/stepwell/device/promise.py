@@ -53,8 +53,8 @@ def broken(machine: Machine, single: bool) -> str:
     results = "\n".join(f"    out[{i} * n + g] = {text};" for i, (text, _) in enumerate(TRIED))
     try:
         program = machine.program(HEAD + TYPES[single] + TEXT.replace("RESULTS", results))
-    except machine.cl.Error as error:
-        return f"its compiler fails ({str(error).splitlines()[0]})"
+    except UnsupportedError as error:
+        return str(error).removeprefix("device: ")
     n = len(numbers)
     out = np.empty((len(TRIED), n), numbers.dtype)
     room = machine.room(out.nbytes)
