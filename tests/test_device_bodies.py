@@ -13,7 +13,8 @@ from stepwell import _core
 from stepwell.device import blocks, bodies
 from stepwell.errors import UnsupportedError
 from support import recorded
-from support.devices import needs_device
+from support.devices import assert_same, needs_device
+from test_own_methods import adams_bashforth_2
 
 pytestmark = needs_device
 
@@ -36,11 +37,7 @@ def same(system: Any, method: Any, **options: Any) -> Any:
         warnings.simplefilter("ignore")
         got = sw.integrate(system, method, device="opencl", **options)
         core = sw.integrate(system, method, device="cpu", **options)
-    for name in ("t", "v", "y", "first_bad_step", "carry"):
-        one, other = getattr(got, name), getattr(core, name)
-        assert (one is None) == (other is None), name
-        if one is not None:
-            np.testing.assert_array_equal(one, other, err_msg=name)
+    assert_same(got, core, "t", "v", "y", "first_bad_step", "carry", "work")
     for name, values in core.recorded.items():
         np.testing.assert_array_equal(got.recorded[name], values, err_msg=name)
     return got
@@ -68,12 +65,8 @@ def test_numbers_of_bodies(n: int, force: Any, calls: list[str]) -> None:
     assert "pairs" in calls
 
 
-#: Of the recorded runs those of many bodies that are made here: those without a control.
-RECORDED = [
-    name
-    for name in recorded.written()
-    if re.search(r"\d+ bodies in .*large", name) and not re.search("nacozy|scaling|limited|, 100 bodies in 3-D, printed", name)
-]
+#: Of the recorded runs those of many bodies.
+RECORDED = [name for name in recorded.written() if re.search(r"\d+ bodies in .*large", name)]
 
 
 @pytest.mark.parametrize("name", RECORDED)
@@ -183,7 +176,6 @@ def test_a_step_that_begins_where_the_last_ended_asks_once(calls: list[str], mon
     ("options", "what"),
     [
         ({"fused": True}, "fused=True"),
-        ({"control": sw.EnergyControl(0.5)}, "control="),
     ],
 )
 def test_what_is_not_there_is_refused(options: Any, what: str) -> None:
@@ -195,3 +187,116 @@ def test_surfaces_are_refused() -> None:
     system = sw.NBody(masses(100), floor=sw.Floor(normal=[0.0, 1.0], offset=-9.0))
     with pytest.raises(UnsupportedError, match="surfaces on device='cpu' only"):
         sw.integrate(system, "leapfrog", dt=0.01, steps=2, device="opencl", **state(100, 2))
+
+
+#: Methods in whose stages v and y belong to one time, those where a control comes between steps, and one that keeps blocks.
+CONTROLLED = ["standard_euler", "false_euler", "standard_heun", "rk4", "pefrl", "dop853", adams_bashforth_2]
+CONTROLS = [
+    sw.EnergyControl(3.0), sw.EnergyControl(2.0, "printed"), sw.EnergyControl(relative=0.1, target=-1.0),
+    sw.Projection("scaling"), sw.Projection("nacozy"), sw.Projection("nacozy", target=0.5),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("method", CONTROLLED)
+@pytest.mark.parametrize("control", CONTROLS, ids=repr)
+def test_controls(method: Any, control: Any, calls: list[str]) -> None:
+    system = sw.NBody(masses(64), force="newton", softening=0.05)
+    got = same(system, method, dt=0.05, steps=5, every=2, control=control, record=["energy"], **state(64, 2))
+    assert got.work is not None
+    assert np.all(got.work != 0.0)
+    assert "pairs_and_wells" in calls
+
+
+@pytest.mark.parametrize("n", [64, 65, 100, 500])
+@pytest.mark.parametrize("force", ["newton", "logarithmic", "printed"])
+def test_controls_of_numbers_of_bodies(n: int, force: Any) -> None:
+    """One slab of distances and several, opposite bodies and none, in the plane and in space."""
+    for control in (sw.EnergyControl(0.5), sw.Projection("scaling"), sw.Projection("nacozy")):
+        same(sw.NBody(masses(n), force=force), "rk4", dt=0.02, steps=2, control=control, **state(n, 2 + n // 65 % 2))
+    same(sw.NBody(masses(513), force=force), "pefrl", dt=0.02, steps=2, control=sw.EnergyControl(0.5), **state(513, 3))
+
+
+@pytest.mark.parametrize("massive", [0, 1, 7, 40, 150])
+@pytest.mark.parametrize("control", CONTROLS, ids=repr)
+def test_controls_of_bodies_without_mass(massive: int, control: Any) -> None:
+    rng = np.random.default_rng(massive)
+    some = np.zeros(300)
+    some[rng.permutation(300)[:massive]] = rng.uniform(0.5, 2.0, massive)
+    if massive == 0 and getattr(control, "relative", None) is not None:
+        return  # there is no kinetic energy to relate a gain to
+    same(sw.NBody(some, softening=0.1), "standard_heun", dt=0.01, steps=3, every=2, control=control, **state(300, 2))
+
+
+def test_controls_of_batches_each_with_its_numbers() -> None:
+    strength = np.array([[1.0], [2.0]])
+    system = sw.NBody(masses(70, 2, 3), force="newton", G=strength, softening=0.1 * strength)
+    push = np.random.default_rng(1).normal(size=(70, 3, 2, 3))
+    for control in (
+        sw.EnergyControl(np.array([0.1, 0.2, 0.4])), sw.Projection("scaling", target=np.array([[1.0], [0.7]])),
+        sw.Projection("nacozy"),
+    ):  # fmt: skip
+        for method in ("rk4", "pefrl"):
+            for force in (None, push):
+                same(system, method, dt=0.01, steps=4, every=3, force=force, control=control, **state(70, 3, 2, 3))
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=repr)
+def test_controlled_runs_go_on(control: Any) -> None:
+    system, start = sw.NBody(masses(70), softening=0.1), state(70, 3)
+    for method in ("rk4", adams_bashforth_2):
+        whole = same(system, method, dt=0.01, steps=9, control=control, **start)
+        first = sw.integrate(system, method, dt=0.01, steps=4, device="opencl", control=control, **start)
+        rest = sw.integrate(system, method, dt=0.01, steps=5, resume=first, device="opencl")
+        core = sw.integrate(system, method, dt=0.01, steps=5, resume=first)
+        assert_same(rest, core, "v", "y", "work")
+        np.testing.assert_array_equal(rest.v[-1], whole.v[-1])
+
+
+@pytest.mark.parametrize("control", [sw.EnergyControl(0.5), *(sw.Projection(way) for way in ("scaling", "nacozy"))], ids=repr)
+def test_the_first_bad_step_under_a_control(control: Any) -> None:
+    """What is added is counted once, though the steps are made again to find which was bad."""
+    start = state(70, 2)
+    v, y = np.zeros((70, 2, 3)), np.stack([start["y"]] * 3, axis=-1)
+    y[1] = y[0] + np.array([0.5, 0.0])[:, np.newaxis]
+    v[0, 0] = [1.0, 0.5, 0.0]
+    some = np.stack([np.full(70, 1e-30), np.full(70, 1e-30), masses(70)], axis=-1)
+    for every in (None, 3):
+        system = sw.NBody(some, force="newton", softening=np.array([0.0, 0.0, 0.1]))
+        got = same(system, "standard_heun", dt=0.125, steps=20, every=every, control=control, v=v, y=y)
+        assert got.work is not None
+        assert np.isfinite(got.work[2])
+        assert got.work[2] != 0.0
+        np.testing.assert_array_equal(np.asarray(got.first_bad_step) > 0, [True, True, False])
+
+
+@pytest.mark.parametrize("control", [sw.EnergyControl(0.5), sw.Projection("scaling"), sw.Projection("nacozy")], ids=repr)
+def test_a_step_that_begins_where_the_last_ended_keeps_its_energy(control: Any, calls: list[str]) -> None:
+    @sw.method
+    def velocity_verlet(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
+        half = v + 0.5 * s.dv(t, v, y)
+        moved = y + s.dy(t, half, y)
+        return half + 0.5 * s.dv(t + h, half, moved), moved
+
+    push = np.random.default_rng(1).normal(size=(70, 2))
+    for force in (None, push):
+        same(sw.NBody(masses(70)), velocity_verlet, dt=0.01, steps=6, every=4, control=control, force=force, **state(70, 2))
+
+
+def test_a_push_is_of_velocities_and_counts_each_evaluation() -> None:
+    @sw.method
+    def twice(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
+        one = v + s.dv(t, v, y)
+        other = v + s.dv(t, one, y)
+        late = v + s.dv(t + h, v, y)
+        return (one + other + late) / 3.0, y + s.dy(t, one, y)
+
+    same(sw.NBody(masses(70)), twice, dt=0.01, steps=3, control=sw.EnergyControl(3.0, target=0.0), **state(70, 2))
+
+
+@pytest.mark.parametrize("pairs", [1, 1000, 30_000])
+def test_controlled_launches_are_cut_anywhere(pairs: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bodies, "FIRST_LAUNCH", pairs)
+    monkeypatch.setattr(bodies, "MOST_PAIRS", pairs)
+    n = 520 if pairs > 1 else 66
+    for control in (sw.EnergyControl(0.5), sw.Projection("nacozy")):
+        same(sw.NBody(masses(n), softening=0.1), "rk4", dt=0.01, steps=2, control=control, **state(n, 2))

@@ -283,3 +283,64 @@ def test_what_does_not_fit_and_what_does_not_compile_is_said(monkeypatch: Any) -
     monkeypatch.setattr(opencl.Machine, "largest", 1000)
     with pytest.raises(sw.errors.TooLargeError, match=r"device: an array of the run takes .* has at most .* for one"):
         sw.integrate(lorenz(), "rk4", y=start(3), dt=0.1, steps=1, device="opencl")
+
+
+def failed(cl: Any, routine: str, code: int) -> Any:
+    """An error as pyopencl raises it."""
+    return cl.MemoryError(cl._cl._ErrorRecord(msg="no room", code=code, routine=routine))
+
+
+class Full:
+    """A device's module that stands for one with no room: what it does after some calls raises pyopencl's own error."""
+
+    def __init__(self, cl: Any, code: int, after: int) -> None:
+        self._cl, self._code, self._left = cl, code, after
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in ("Buffer", "enqueue_copy"):
+            return getattr(self._cl, name)
+        self._left -= 1
+        if self._left >= 0:
+            return getattr(self._cl, name)
+
+        def fails(*_: Any, **__: Any) -> Any:
+            raise failed(self._cl, name, self._code)
+
+        return fails
+
+
+@pytest.mark.parametrize("code", [-4, -5, -6, -61])
+@pytest.mark.parametrize("after", [0, 3, 9])
+def test_a_device_that_is_full_says_so(code: int, after: int, monkeypatch: Any) -> None:
+    """Each array fits, all together do not: drivers say so when an array is made, or when it is used."""
+    from stepwell.device import device_of
+
+    machine = device_of("opencl")
+    assert machine is not None
+    sw.integrate(lorenz(), "rk4", y=start(3), dt=0.1, steps=4, every=1, device="opencl")
+    monkeypatch.setattr(machine, "cl", Full(machine.cl, code, after))
+    with pytest.raises(sw.errors.TooLargeError, match=r"device: opencl:0 .* has no room for all arrays of the run \(.*no room"):
+        sw.integrate(lorenz(), "rk4", y=start(3), dt=0.1, steps=4, every=1, device="opencl")
+
+
+def test_other_errors_of_a_device_stay(monkeypatch: Any) -> None:
+    from stepwell.device import device_of
+
+    machine = device_of("opencl")
+    assert machine is not None
+    monkeypatch.setattr(machine, "cl", Full(machine.cl, -38, 2))
+    with pytest.raises(machine.cl.Error, match="INVALID_MEM_OBJECT"):
+        sw.integrate(lorenz(), "rk4", y=start(3), dt=0.1, steps=4, device="opencl")
+
+
+def test_a_kernel_for_which_there_is_no_room_says_so() -> None:
+    from stepwell.device import device_of
+
+    machine = device_of("opencl")
+    assert machine is not None
+
+    def kernel(*_: Any) -> None:
+        raise failed(machine.cl, "clEnqueueNDRangeKernel", -4)
+
+    with pytest.raises(sw.errors.TooLargeError, match="MEM_OBJECT_ALLOCATION_FAILURE"):
+        machine.start(kernel, 1, None)

@@ -315,6 +315,17 @@ def test_controls_act_between_steps(control: Any) -> None:
         assert abs(energies[1] - scene.system.energy(scene.v, scene.y)) < abs(energies[0] - scene.system.energy(scene.v, scene.y))
 
 
+def test_a_strong_control_is_told_of_where_a_run_goes_on() -> None:
+    """The velocities stand before what the method keeps."""
+    scene = sw.scenes.clover()
+    control = sw.EnergyControl(gain=1000.0, form="printed")
+    for method in KEEPING:
+        with pytest.warns(sw.ControlWarning, match="h·C·K"):
+            run = sw.integrate(scene.system, method, v=scene.v, y=scene.y, dt=0.01, steps=1, control=control)
+        with pytest.warns(sw.ControlWarning, match="h·C·K"):
+            sw.integrate(scene.system, method, resume=run, steps=1)
+
+
 def test_a_member_that_diverges_is_named_with_its_step() -> None:
     steps = []
     for backend in ("rust", "numpy"):

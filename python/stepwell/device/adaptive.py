@@ -134,8 +134,8 @@ class _Run:
     def call(self, name: str, items: int, group: int, *arguments: Any) -> None:
         """Start a kernel."""
         size = -(-items // group) * group
-        local = None if self.machine.is_cpu or group == 1 else (group,)
-        self.program.kernel(name)(self.machine.queue, (size,), local, *arguments)
+        local = None if self.machine.is_cpu or group == 1 else group
+        self.machine.start(self.program.kernel(name), size, local, *arguments)
 
     def share(self, share: Share) -> None:
         """Step some members to their ends."""

@@ -7,7 +7,7 @@ needs twice is computed twice, which is less than the memory would take.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .. import _core
 from ..errors import UnsupportedError
@@ -38,13 +38,14 @@ class Stage(NamedTuple):
     Attributes:
         passes: its kernels, in order.
         text: their text.
-        again: the block of h·v̇ at the places at the start, and that at those at the end, or None: the next step begins with the
-            second.
+        first: the block of h·v̇ at the places at the start; "" if it is not asked for, or depends on more than places.
+        last: likewise that at the places at the end, with which the next step may begin.
     """
 
     passes: list[Pass]
     text: str
-    again: tuple[str, str] | None
+    first: str
+    last: str
 
 
 def unwritten(method: str) -> str:
@@ -52,10 +53,11 @@ def unwritten(method: str) -> str:
     return next((name for name, _, _ in _core.program(method)[0] if name not in WRITTEN), "")
 
 
-def stage_of(method: str, stage: str, choice: int, results: list[str]) -> Stage:
+def stage_of(method: str, stage: str, choice: int, results: list[str], *, pushed: bool) -> Stage:
     """The kernels of a stage, which writes these blocks.
 
-    The blocks of the state are "v", which is what the method carries in its place, "y", and "kept0", "kept1", …
+    The blocks of the state are "v", which is what the method carries in its place, "y", and "kept0", "kept1", … What is
+    ``pushed`` by a control has rates that depend on v, too: each evaluation is then one of its own, at places and velocities.
     """
     operations, places = _core.program(method, stage=stage, choice=choice)
     if any(name not in WRITTEN for name, _, _ in operations):
@@ -64,8 +66,8 @@ def stage_of(method: str, stage: str, choice: int, results: list[str]) -> Stage:
     block: dict[int, str] = {}
     text: dict[int, tuple[str, list[int]]] = {}
     same = list(range(len(operations)))  # masses of these equations are units
-    evaluations: dict[int, str] = {}
-    order: list[int] = []
+    evaluations: dict[Any, str] = {}
+    order: list[list[int]] = []
     for i, (name, operands, number) in enumerate(operations):
         of = [same[each] for each in operands]
         match name:
@@ -74,10 +76,11 @@ def stage_of(method: str, stage: str, choice: int, results: list[str]) -> Stage:
             case "kept v" | "kept y":
                 block[i] = f"kept{int(number)}"
             case "dv":
-                if of[1] not in evaluations:
-                    evaluations[of[1]] = f"{stage}{len(order)}"
-                    order.append(of[1])
-                block[i] = evaluations[of[1]]
+                key = (i,) if pushed else of[1]  # a push counts what it takes away, evaluation by evaluation
+                if key not in evaluations:
+                    evaluations[key] = f"{stage}{len(order)}"
+                    order.append([of[1], of[0]] if pushed else [of[1]])
+                block[i] = evaluations[key]
             case "dy":
                 text[i] = "h * {}", of[:1]
             case "velocity":
@@ -111,27 +114,30 @@ def stage_of(method: str, stage: str, choice: int, results: list[str]) -> Stage:
         return block.get(i, f"x{i}")
 
     passes, texts = [], []
-    for turn, place in enumerate(order):
-        reads, lines = computed([place])
+    for turn, where in enumerate(order):
+        reads, lines = computed(where)
         made = Pass(f"{stage}_pass{turn}", reads, [], f"{stage}{turn}")
         passes.append(made)
-        texts.append(_kernel(made, [*lines, f"put_place({value(place)}, g, all, n, ranks, places, round);"]))
+        lines.append(f"put_place({value(where[0])}, g, all, n, ranks, places, round);")
+        lines += [f"speeds[g] = {value(velocity)};" for velocity in where[1:]]
+        texts.append(_kernel(made, lines, pushed))
     targets = [same[i] for i in places]
     reads, lines = computed(targets)
     last = Pass(f"{stage}_last", reads, results, "")
     to = [f"to_{name}[g] = {value(i)};" for name, i in zip(results, targets, strict=True)]
     y = next((i for i, name in block.items() if name == "y"), -1)
     end = targets[results.index("y")] if "y" in results else -1
-    again = (evaluations[y], evaluations[end]) if y in evaluations and end in evaluations and end != y else None
-    return Stage([*passes, last], "\n".join([*texts, _kernel(last, [*lines, *to])]), again)
+    at_end = evaluations.get(end, "") if end != y else ""
+    return Stage([*passes, last], "\n".join([*texts, _kernel(last, [*lines, *to])]), evaluations.get(y, ""), at_end)
 
 
-def _kernel(made: Pass, body: list[str]) -> str:
+def _kernel(made: Pass, body: list[str], pushed: bool = False) -> str:
     """The text of a kernel. Blocks that are written may be among those that are read: each work item has numbers of its own."""
     reads = [f"__global const real *of_{name}" for name in made.reads]
     writes = [f"__global real *to_{name}" for name in made.writes]
     if made.asks:
         writes = ["const int all", "const int n", "__global const int *ranks", "__global real *places", "__global real *round"]
+        writes += ["__global real *speeds"] * pushed
     return "\n".join(
         [
             f"__kernel void {made.name}(const long count, const real h, {', '.join([*reads, *writes])}) {{",

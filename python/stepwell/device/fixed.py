@@ -98,9 +98,8 @@ class _Run:
 
     def call(self, name: str, size: int, *arguments: Any) -> None:
         """Start a kernel."""
-        kernel = self.program.kernel(name)
-        group = (self.group,) if size % self.group == 0 and not self.machine.is_cpu else None
-        kernel(self.machine.queue, (size,), group, *arguments)
+        group = self.group if size % self.group == 0 and not self.machine.is_cpu else None
+        self.machine.start(self.program.kernel(name), size, group, *arguments)
 
     def make(self) -> bool:
         """Make it."""

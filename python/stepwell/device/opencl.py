@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import threading
 from collections import OrderedDict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
@@ -19,6 +21,8 @@ VARIABLE = "STEPWELL_DEVICE"
 MOST_PROGRAMS = 64
 #: The bit of OpenCL by which a device says that single quotients and roots are correctly rounded, where that is asked for.
 ROUNDS_SINGLE = "-cl-fp32-correctly-rounded-divide-sqrt"
+#: The errors of OpenCL that a full device raises: drivers allocate when an array is made, or when it is used first.
+FULL = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY", "INVALID_BUFFER_SIZE")
 
 
 class Device(NamedTuple):
@@ -157,12 +161,20 @@ class Machine:
         self._fits(array.nbytes)
         if array.nbytes == 0:
             return self.room(1)
-        return self.cl.Buffer(self.context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=array)
+        with self._in_words():
+            return self.cl.Buffer(self.context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=array)
+
+    def set(self, buffer: Any, array: Any) -> None:
+        """Fill a buffer of the device from an array, once all before it is done."""
+        if array.nbytes:
+            with self._in_words():
+                self.cl.enqueue_copy(self.queue, buffer, array)
 
     def room(self, size: int) -> Any:
         """Room for so many bytes on the device."""
         self._fits(size)
-        return self.cl.Buffer(self.context, self.cl.mem_flags.READ_WRITE, size=max(size, 1))
+        with self._in_words():
+            return self.cl.Buffer(self.context, self.cl.mem_flags.READ_WRITE, size=max(size, 1))
 
     def _fits(self, size: int) -> None:
         """Raise if an array of so many bytes is larger than any of the device."""
@@ -175,11 +187,37 @@ class Machine:
     def get(self, array: Any, buffer: Any, offset: int = 0) -> None:
         """Fill an array from the device, once all before it is done."""
         if array.nbytes:
-            self.cl.enqueue_copy(self.queue, array, buffer, src_offset=offset)
+            with self._in_words():
+                self.cl.enqueue_copy(self.queue, array, buffer, src_offset=offset)
+
+    def copy(self, to: Any, buffer: Any) -> None:
+        """Copy from one buffer of the device to another, once all before it is done."""
+        with self._in_words():
+            self.cl.enqueue_copy(self.queue, to, buffer)
+
+    def start(self, kernel: Any, size: int, group: int | None, *arguments: Any) -> None:
+        """Start a kernel of so many work items, in groups of that size, or of one that the driver chooses."""
+        with self._in_words():
+            kernel(self.queue, (size,), None if group is None else (group,), *arguments)
 
     def finish(self) -> None:
         """Wait until all is done."""
-        self.queue.finish()
+        with self._in_words():
+            self.queue.finish()
+
+    @contextmanager
+    def _in_words(self) -> Iterator[None]:
+        """Raise an error of our own where the device is full."""
+        try:
+            yield
+        except self.cl.Error as error:
+            if not any(each in str(error) for each in FULL):
+                raise
+            raise TooLargeError(
+                f"device: {self.described.name} ({self.described.title}) has no room for all arrays of the run "
+                f"({str(error).splitlines()[0]}); it has {in_bytes(self.described.memory)} in all; split the batch, or use "
+                f"device='cpu'"
+            ) from None
 
 
 class Program:

@@ -58,7 +58,7 @@ def broken(machine: Machine, single: bool) -> str:
     n = len(numbers)
     out = np.empty((len(TRIED), n), numbers.dtype)
     room = machine.room(out.nbytes)
-    program.kernel("tried")(machine.queue, (n,), None, machine.put(numbers), room, np.int32(n))
+    machine.start(program.kernel("tried"), n, None, machine.put(numbers), room, np.int32(n))
     machine.get(out, room)
     for got, expected, (_, reason) in zip(out, _expected(numbers), TRIED, strict=True):
         if not np.array_equal(_bits(got), _bits(expected)):

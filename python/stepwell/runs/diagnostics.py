@@ -72,7 +72,7 @@ def findings_of(
     noticed = list(run.findings)  # of events that it came to rest at
     if run.paces is None:
         if run.system.keeper is not None:
-            noticed += of_a_strong_control(run.system, request.v, request.y, run.dt)
+            noticed += of_a_strong_control(run.system, _velocities(request), request.y, run.dt)
         if np.count_nonzero(run.status) and (diverged := _of_divergence(run, request)) is not None:
             noticed.append(diverged)
     else:
@@ -139,6 +139,14 @@ def _only(run: Run, index: Shape) -> Any:
     members = np.zeros(run.status.shape, dtype=bool)
     members[index] = True
     return members
+
+
+def _velocities(request: Request) -> Array:
+    """Those at the start of a run, behind which stands what a method keeps in one that goes on."""
+    plan, v = request.plan, request.v
+    if not (request.carried and plan.keeps):
+        return v
+    return v[: prod(plan.system.v_shape)].reshape(*plan.system.v_shape, *plan.batch)
 
 
 def of_a_strong_control(system: System, v: Array, y: Array, dt: float) -> list[Finding]:
