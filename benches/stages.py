@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 import stepwell as sw
 from stepwell import _core
-from stepwell.runs import engine
+from stepwell.runs import engine, prepared
 from stepwell.scenes.builtin.arenstorf import MU
 
 from .compare.chosen.orbits import arenstorf
 
+#: A short run, and how it can be made.
+SHORT_TITLE, SHORT_STEPS = "A short run: one oscillator, False Euler, 20 steps", 20
 HEAD = ["stage, µs", "one oscillator", "1000", "100 000"]
 TITLE = "A call by stages: oscillators, False Euler, 1000 steps"
 MEMBERS = (1, 1000, 100_000)
@@ -56,6 +58,7 @@ def stages(members: int) -> dict[str, float]:
         return made
 
     def call(steps: int) -> sw.Run:
+        prepared._recent.clear()  # as at the first call: later ones are in the table of short runs
         return sw.integrate(system, method, v=v, y=y, dt=0.01, steps=steps, threads=1)
 
     within: dict[int, float] = {}
@@ -119,6 +122,19 @@ def adaptive_stages(name: str) -> dict[str, float]:
     }
 
 
+def short_table() -> tuple[str, list[str], list[list[str]]]:
+    """A short run by ``integrate``, for the first time and later, and by ``prepare``."""
+    system, method = sw.Oscillator(), sw.method("false_euler")
+    options: Any = {"v": 0.0, "y": 1.0, "dt": 0.01, "steps": SHORT_STEPS}
+    again = sw.prepare(system, method, **options)
+    ways: dict[str, Callable[[], Any]] = {
+        "`integrate`, of a new system each time": lambda: sw.integrate(sw.Oscillator(), method, **options),
+        "`integrate`, of the same system": lambda: sw.integrate(system, method, **options),
+        "`prepare(…)(v, y)`": lambda: again(0.0, 1.0),
+    }
+    return SHORT_TITLE, ["way", "µs"], [[name, f"{least(call):.3g}"] for name, call in ways.items()]
+
+
 def adaptive_table() -> tuple[str, list[str], list[list[str]]]:
     """Those of a call with a tolerance, a column for each method."""
     found = [adaptive_stages(name) for name in ABLE]
@@ -136,4 +152,5 @@ if __name__ == "__main__":
     from .compare import report
 
     report.show(*table())
+    report.show(*short_table())
     report.show(*adaptive_table())

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
-from stepwell.runs.integration import noticing, quietly
+from stepwell.runs.making import noticing, quietly
 from stepwell.runs.options import Options
 from stepwell.runs.request import Request
 

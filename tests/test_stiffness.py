@@ -15,7 +15,7 @@ from stepwell.analysis import stiffness
 from stepwell.model import methods as all_methods
 from stepwell.runs import engine
 from stepwell.runs.adaptive import adaptive_run
-from stepwell.runs.integration import quietly
+from stepwell.runs.making import quietly
 from stepwell.runs.options import Options
 from stepwell.runs.request import Request
 from support.stiff import EXPLICIT, PROBLEMS, follows, hires, lorenz, robertson, tame, van_der_pol

@@ -67,6 +67,8 @@ from .model.systems.transfer import parallel as parallel
 from .model.systems.transfer import series as series
 from .runs.events import Event as Event
 from .runs.integration import integrate as integrate
+from .runs.prepared import PreparedRun as PreparedRun
+from .runs.prepared import prepare as prepare
 from .runs.result import Run as Run
 from .runs.result import Status as Status
 from .runs.world import World as World

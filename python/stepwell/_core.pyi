@@ -15,6 +15,7 @@ from .runs.engine import AdaptiveArrays, Arrays, CorePacing, Plan
 __all__ = [
     "Equations",
     "ModelSpec",
+    "Prepared",
     "Symbol",
     "Tape",
     "World",
@@ -31,6 +32,7 @@ __all__ = [
     "isa_levels",
     "listen",
     "operations",
+    "prepared",
     "program",
     "recorded",
     "run",
@@ -103,6 +105,17 @@ class ModelSpec:
     @property
     def tables(self) -> list[tuple[float, float, NDArray[np.float64]]]:
         """The sampled inputs in order: start, interval, and a row for each sample."""
+
+@final
+class Prepared:
+    """A run of fixed steps without its start."""
+
+    def run(self, v: object, y: object, saved_v: NDArray[Any], saved_y: NDArray[Any], carry: NDArray[Any] | None) -> int:
+        """Make the run from a start, fill the saved states and what the method carries, and say what is known of it.
+
+        0: nothing was made, since the start is not of floats of the prepared shapes, or a number was not finite, or another
+        thread makes the run now. 2: it is certain that no member has grown much. 1: neither.
+        """
 
 @final
 class World:
@@ -302,6 +315,12 @@ def adapt(model: ModelSpec, plan: Plan, pacing: CorePacing, arrays: AdaptiveArra
     """Make a run with a tolerance. Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything.
 
     False if nothing was done, since the start is to be found and an attempt is too long for one tape.
+    """
+
+def prepared(model: ModelSpec, plan: Plan, members: int, shapes: list[list[int]]) -> Prepared | None:
+    """A run of so many members without its start; None if it is not a short one.
+
+    Of the plan it reads what ``run`` does; ``shapes`` are those of v and y, with the batch.
     """
 
 def recorded(

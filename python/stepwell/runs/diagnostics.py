@@ -15,6 +15,7 @@ from ..base.arrays import Array, Shape, Whole
 from ..base.reprs import first_of, in_words, of_member, share
 from ..errors import AccuracyWarning, ControlWarning, DivergenceWarning, StiffnessWarning, ToleranceWarning
 from ..model.controls import EnergyControl
+from ..model.methods import Method
 from ..model.parameters import aligned
 from ..model.systems import NBody, System
 from . import encounters, engine, known_energy
@@ -94,6 +95,12 @@ def findings_of(
     if run.paces is None and start is not None and (growth := registry.task("growth_of")(run, start)) is not None:
         noticed.append(growth)
     return tuple(noticed)
+
+
+def finds_growth_only(system: System, method: Method, steps: int) -> bool:
+    """Whether nothing but growth can be found of a run of fixed steps, from its start, of which all numbers are finite."""
+    may_pass = known_energy.may_pass_barriers(system, method, steps)
+    return not isinstance(system, NBody) and type(system).doubt is System.doubt and system.keeper is None and not may_pass
 
 
 def _of_nonsense(run: Run, start: State | None, request: Request, heard: Callable[[type[Warning]], bool]) -> list[Finding]:

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..base.arrays import Array
 from ..model.controls import AnyControl
 from ..model.methods import Method
 from ..model.systems import System
-from .adaptive import adaptive_run
-from .diagnostics import findings_of
 from .findings import is_heard, warn_of
-from .fixed import fixed_run
+from .making import noticing
 from .options import Options
+from .prepared import recent
 from .request import Request
 from .result import Run
 
 if TYPE_CHECKING:
     from ..base.literals import Backend, RunForm
     from .world import World
+
+
+#: The default of ``record``.
+NOTHING = ()
 
 
 def integrate(
@@ -159,28 +161,11 @@ def integrate(
         array([ 1.      ,  0.283658, -0.839075])
     """
     options = Options(
-        v, y, dt, steps, every, tolerance, at, control, force, record, events, form, fused, dtype, t0, start, max_steps, max_step,
-        jumps, positive, progress, threads, backend, device, start_step, resume,
+        v, y, dt, steps, every, tolerance, at, control, force, None if record is NOTHING else record, events, form, fused, dtype,
+        t0, start, max_steps, max_step, jumps, positive, progress, threads, backend, device, start_step, resume,
     )  # fmt: skip
-    run = noticing(Request.of(system, method, options), is_heard)
-    warn_of(run.findings)
+    prepared = recent(system, method, options)
+    run = noticing(Request.of(system, method, options), is_heard) if prepared is None else prepared.run(v, y)
+    if run.findings:
+        warn_of(run.findings)
     return run
-
-
-def step(request: Request, waypoints: list[Array] | None = None) -> Run:
-    """The requested run, without findings and warnings; ``waypoints`` gets where members with adaptive steps stood on the way."""
-    return fixed_run(request) if request.step_control is None else adaptive_run(request, waypoints)
-
-
-def noticing(request: Request, heard: Callable[[type[Warning]], bool] = lambda _: True) -> Run:
-    """The requested run with its findings; what takes a while to find is searched only if its warning is ``heard``."""
-    waypoints: list[Array] = []
-    run = step(request, waypoints)
-    if findings := findings_of(run, request, heard, waypoints):
-        run.findings = findings
-    return run
-
-
-def quietly(system: System, method: str | Method, **options: Any) -> Run:
-    """``integrate`` without findings and warnings, for callers that judge a run themselves."""
-    return step(Request.of(system, method, Options(**options)))

@@ -11,6 +11,7 @@ import numpy as np
 from ..base.arrays import Array, Shape, Whole
 from ..base.reprs import in_words, share
 from ..errors import AccuracyWarning
+from ..model.methods import Method
 from ..model.systems import Pendulum, RigidBody, System
 from ..reference.acceptance import Acceptance
 from .engine import ABSOLUTE, PACE_NUMBERS, RELATIVE
@@ -64,6 +65,12 @@ def keeps_energy(run: Run) -> bool:
     return isinstance(system, RigidBody) or not system.given_inputs()
 
 
+def may_pass_barriers(system: System, method: Method, steps: int) -> bool:
+    """Whether a run of fixed steps may pass a barrier, and is long enough to look for that; most systems have none."""
+    has_barriers = isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS
+    return method.limit != 0.0 and has_barriers and method.evaluations * steps >= FEW_EVALUATIONS
+
+
 def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[type[Warning]], bool]) -> About | None:
     """What shows that members did not follow the motion, and which members; None if nothing does.
 
@@ -77,8 +84,8 @@ def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[t
         heard: whether a warning would be shown.
     """
     system, paces = run.system, run.paces
-    if paces is None and (run.method.limit == 0.0 or not (isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS)):
-        return None  # other systems have no barrier
+    if paces is None and not may_pass_barriers(system, run.method, run.steps):
+        return None
     if system.keeper is not None or not (names := _names(system)) or not run.status.size:
         return None
     evaluations = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))

@@ -32,7 +32,7 @@ from ..model.methods import Method, of_operations
 from ..model.systems import System
 from ..model.systems.base import TINY, a_system
 from ..reference.acceptance import Acceptance
-from . import continuation, engine, positive
+from . import continuation, engine
 from .options import (
     BACKENDS,
     FORMS,
@@ -244,7 +244,7 @@ class Request(NamedTuple):
     @classmethod
     def adaptive(cls, system: System, method: str | Method, options: Options, before: Continuation | None = None) -> Request:
         """A run in which every member has steps of its own."""
-        from . import adaptive_options  # only such runs need it
+        from . import adaptive_options, positive  # only such runs need them
 
         method, system, v = checked_system(system, method, options.v, options.y)
         fused, single = arithmetic(options.fused, options.dtype)

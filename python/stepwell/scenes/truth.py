@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..errors import ArgumentError, UnsupportedError
-from ..runs.integration import quietly
+from ..runs.making import quietly
 from ..runs.result import Run, Status
 from .base import Scene
 

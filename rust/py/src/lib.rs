@@ -2,6 +2,7 @@
 
 mod methods;
 mod model;
+mod prepared;
 mod tape;
 mod world;
 
@@ -529,6 +530,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<model::Equations>()?;
     m.add_class::<tape::Tape>()?;
     m.add_class::<tape::Symbol>()?;
+    m.add_function(wrap_pyfunction!(prepared::prepared, m)?)?;
+    m.add_class::<prepared::Prepared>()?;
     m.add_class::<world::World>()?;
     Ok(())
 }

@@ -564,7 +564,7 @@ impl World {
 }
 
 /// What the loops of worlds may use.
-fn machine() -> PyResult<Machine> {
+pub(crate) fn machine() -> PyResult<Machine> {
     Ok(Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: 1 })
 }
 

@@ -18,7 +18,7 @@ from ...runs import engine
 from ...runs.adaptive_options import check_times
 from ...runs.diagnostics import may_be_stiff, why_steps_are_short
 from ...runs.engine import PACE_NUMBERS, WAYPOINTS
-from ...runs.integration import step
+from ...runs.making import step
 from ...runs.options import Options
 from ...runs.request import Request
 from ...runs.result import Run, Status

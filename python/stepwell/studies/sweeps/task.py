@@ -23,7 +23,7 @@ from ...model.systems import System
 from ...model.systems.base import a_system
 from ...runs.diagnostics import of_a_strong_control
 from ...runs.findings import Finding
-from ...runs.integration import quietly, step
+from ...runs.making import quietly, step
 from ...runs.options import Options, spread
 from ...runs.request import Request
 from ...runs.result import Run

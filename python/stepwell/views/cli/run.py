@@ -18,7 +18,7 @@ from ...base import paths
 from ...base.pictures import new_figure
 from ...errors import ArgumentError
 from ...model.controls import WAYS, AnyControl, EnergyControl, Projection
-from ...runs.integration import noticing
+from ...runs.making import noticing
 from ...runs.options import FORMS, Options
 from ...runs.request import Request
 from ...runs.result import Run

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...analysis.stability import stability_limit
 from ...model.systems.aircraft import Aircraft
-from ...runs.integration import quietly
+from ...runs.making import quietly
 from ...scenes import scene
 from ..charts import run_picture
 from . import Finding, Section

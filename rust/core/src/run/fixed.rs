@@ -92,7 +92,7 @@ const LARGE_MEMBER_NUMBERS: i64 = 1 << 16;
 /// If a member diverged between two checks, the steps between them are repeated with so many checks in between, and so on.
 const RETRACE_INTERVALS: i64 = 16;
 /// Numbers × steps below which a second thread costs more time than it saves.
-const MIN_NUMBER_STEPS_FOR_THREADS: f64 = 3e6;
+pub const MIN_NUMBER_STEPS_FOR_THREADS: f64 = 3e6;
 
 /// Numbers that groups step.
 pub trait Steppable: Traceable {
@@ -526,7 +526,7 @@ impl<T: Real> Job<'_, '_, T> {
     /// Infinities and NaN persist in the slots, so it is enough to check at intervals. Velocities that are computed from a
     /// method's carry may be infinite and later finite again, but only if its numbers are [`Real::HUGE`].
     fn is_suspect(&self) -> bool {
-        let most = if self.carries { T::of(T::HUGE.wide() * self.plan.clock.h.abs().min(1.0)) } else { T::INFINITY };
+        let most = if self.carries { huge(self.plan.clock.h) } else { T::INFINITY };
         self.any_new(most)
     }
 
@@ -599,8 +599,13 @@ impl<T: Real> Job<'_, '_, T> {
     }
 }
 
+/// From this size of what a method carries on, the velocities that are computed from it may be infinite.
+pub(crate) fn huge<T: Real>(h: f64) -> T {
+    T::of(T::HUGE.wide() * h.abs().min(1.0))
+}
+
 /// Whether all numbers are smaller. All numbers of a chunk are compared, which is vector code.
-fn all_below<T: Real>(numbers: &[T], size: T) -> bool {
+pub(crate) fn all_below<T: Real>(numbers: &[T], size: T) -> bool {
     numbers.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & x.is_below(size)))
 }
 

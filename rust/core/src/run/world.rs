@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use super::{
     Model,
-    fixed::Steppable,
+    fixed::{Steppable, all_below, huge, kept, save},
     workers::{self, GoOn, Workers},
 };
 use crate::{
@@ -62,6 +62,17 @@ pub struct World<T = f64> {
     stop: Stop,
     /// The number of the first row of the force among all parameters, if there is one.
     force: Option<usize>,
+}
+
+/// The steps of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct RunSteps {
+    /// Number of the first.
+    pub first: i64,
+    /// How many.
+    pub steps: i64,
+    /// After how many a state is saved, and at the start; the last alone if none.
+    pub every: Option<i64>,
 }
 
 /// How often a world will be stepped is unknown; kernels are chosen for many steps.
@@ -132,6 +143,11 @@ impl<T: Steppable> World<T> {
     /// How many numbers each array holds.
     pub fn sizes(&self) -> (usize, usize) {
         self.sizes
+    }
+
+    /// How many members there are.
+    pub fn members(&self) -> usize {
+        self.members
     }
 
     /// The number of the step at which the world stands.
@@ -242,6 +258,33 @@ impl<T: Steppable> World<T> {
             self.written.1.copy_from_slice(y);
             self.is_written = true;
         }
+    }
+
+    /// A run of some steps from this start, both by rows of one number per member, and all states that it saves. Returns what
+    /// the method carries at the end, and keeps, or none if some number is not finite: then [`super::fixed::run`] finds whose, and
+    /// when.
+    pub fn run(&mut self, steps: RunSteps, start: [&[T]; 2], saved_v: &mut [T], saved_y: &mut [T]) -> Option<Vec<T>> {
+        let RunSteps { first, steps, every } = steps;
+        let (members, [v, y]) = (self.members, start);
+        for share in &mut self.shares {
+            share.load(v, y, members);
+            share.group.start(first);
+        }
+        let (mut made, (p, q)) = (0, self.sizes);
+        for i in 0..kept(steps, every) {
+            let until = save(steps, every, i);
+            for share in &mut self.shares {
+                share.group.advance(first + made, until - made);
+            }
+            made = until;
+            self.publish(first + made, &mut saved_v[i * p..][..p], &mut saved_y[i * q..][..q]);
+        }
+        // The slots are no longer those of the caller's arrays.
+        self.is_written = false;
+        let held = if self.carries { self.held() } else { Vec::new() };
+        let finite = |numbers: &[T]| all_below(numbers, T::INFINITY);
+        let is_finite = finite(saved_v) && finite(saved_y) && all_below(&held, huge(self.clock.h));
+        is_finite.then_some(held)
     }
 
     /// `n` steps, in place. `v` and `y` are rows of one number per member.

@@ -1,0 +1,244 @@
+"""Runs that differ in their start alone: everything else is checked and prepared once."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+from weakref import ref
+
+import numpy as np
+
+from .. import _core
+from ..base import checks
+from ..base.arrays import Array, Shape
+from ..errors import ArgumentError
+from ..model.methods import Method
+from ..model.systems import NBody, System
+from . import engine
+from .diagnostics import findings_of, finds_growth_only
+from .findings import is_heard, warn_of
+from .fixed import fixed_run
+from .making import noticing
+from .options import Options
+from .request import Request
+from .result import Run
+
+
+class PreparedRun:
+    """A run whose arguments were checked once, to be made from many starts: what ``stepwell.prepare`` returns.
+
+    Example:
+        >>> swing = sw.prepare(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=20)
+        >>> swing(0.0, 2.0).y.round(6)
+        array([-0.832291])
+    """
+
+    def __init__(self, system: System, method: str | Method, options: Options) -> None:
+        self._system, self._method, self._options = system, method, options
+        self._short: _ShortRun | None = None
+        #: The shapes of the blocks of a call for which it was tried whether the run is a short one.
+        self._tried: Any = None
+
+    def __repr__(self) -> str:
+        """Of one line."""
+        name = self._method if isinstance(self._method, str) else self._method.name
+        return f"<prepared run of {self._system!r} by {name}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy, which may be in another process, is prepared at its first call."""
+        return PreparedRun, (self._system, self._method, self._options)
+
+    def __call__(self, v: Any = None, y: Any = None) -> Run:
+        """The run from this start: to the bit, and with the errors and warnings, that ``integrate`` makes of it.
+
+        Args:
+            v: velocity block at the start, as for ``integrate``; None for a system of first order.
+            y: coordinate block at the start, likewise.
+
+        Raises:
+            ArgumentError: as ``integrate`` does.
+
+        Example:
+            >>> orbit = sw.prepare(sw.Oscillator(2.0), "leapfrog", v=0.0, y=1.0, dt=0.1, steps=10)
+            >>> orbit(1.0, 0.0).v.shape
+            (1,)
+        """
+        run = self.run(v, y)
+        if run.findings:
+            warn_of(run.findings)
+        return run
+
+    def run(self, v: Any, y: Any) -> Run:
+        """The run with its findings, without warnings."""
+        short = self._short
+        if short is not None and (run := short.run(v, y)) is not None:
+            return run
+        request = Request.of(self._system, self._method, self._options._replace(v=v, y=y))
+        shapes = _shapes(request, v, y)
+        if shapes != self._tried:
+            self._tried, self._short = shapes, _short_run(request, shapes)
+        return noticing(request, is_heard)
+
+
+def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = None, **options: Any) -> PreparedRun:
+    """Check and prepare a run once, to make it from many starts: ``prepare(…)(v, y)`` is ``integrate(…)`` in less time.
+
+    The call takes a few microseconds beside the steps for short runs of fixed steps in the direct form, without control, force,
+    events and recorded quantities; other runs take as long as by ``integrate``.
+
+    Args:
+        system: the system to step.
+        method: its name, or what ``stepwell.method`` returns.
+        v: velocity block of a start like those to come, shape (*block, *batch), or one number for all; a first-order system has
+            none.
+        y: coordinate block, likewise.
+        **options: all others of ``integrate``, but ``resume``.
+
+    Returns:
+        A ``PreparedRun``. Starts of another shape are taken too, and prepared anew.
+
+    Raises:
+        ArgumentError: if an argument is wrong, as ``integrate`` does.
+
+    Example:
+        >>> swing = sw.prepare(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=20)
+        >>> swing
+        <prepared run of Oscillator(omega=1.0, form='canonical') by rk4>
+        >>> [float(swing(v, 0.0).y[-1].round(6)) for v in (0.5, 1.0, 2.0)]
+        [0.454649, 0.909298, 1.818596]
+    """
+    if unknown := [name for name in options if name not in Options._fields]:
+        raise ArgumentError(f"prepare: expected arguments of integrate, got {unknown[0]}=")
+    if options.get("resume") is not None:
+        raise ArgumentError(
+            "resume: a prepared run begins at the start of its call; to go on with a run use integrate"
+        )
+    request = Request.of(system, method, Options(v=v, y=y, **options))
+    prepared = PreparedRun(system, method, Options(**options))
+    prepared._tried = shapes = _shapes(request, v, y)
+    prepared._short = _short_run(request, shapes)
+    return prepared
+
+
+class _ShortRun:
+    """A run of so few steps that all else takes longer, without its start."""
+
+    def __init__(self, request: Request, core: _core.Prepared) -> None:
+        self.request, self.core, plan = request, core, request.plan
+        run = fixed_run(request)
+        #: All attributes of a run that do not depend on the start.
+        self.attributes = vars(run)
+        self.t, self.status = run.t, np.zeros(plan.batch, np.int8)
+        self.first_bad: Any = np.full(plan.batch, -1)
+        self.shapes = run.v.shape, run.y.shape
+        self.shape_of_carry = None if run.carry is None else run.carry.shape
+        self.dtype = plan.dtype
+        self.is_plain = finds_growth_only(request.system, plan.method, plan.steps)
+
+    def run(self, v: Any, y: Any) -> Run | None:
+        """The run from this start; None if it is to be made as any other."""
+        dtype = self.dtype
+        saved_v, saved_y = np.empty(self.shapes[0], dtype), np.empty(self.shapes[1], dtype)
+        carry = None if self.shape_of_carry is None else np.empty(self.shape_of_carry, dtype)
+        outcome = self.core.run(v, y, saved_v, saved_y, carry)
+        if outcome == NOT_MADE:
+            return None
+        run = object.__new__(Run)
+        attributes = run.__dict__
+        attributes.update(self.attributes)
+        attributes.update(
+            t=self.t.copy(), v=saved_v, y=saved_y, status=self.status.copy(), first_bad_step=self.first_bad.copy(), carry=carry,
+            recorded={}, events={},
+        )  # fmt: skip
+        if outcome != TAME or not self.is_plain:
+            request = self.request
+            request = request._replace(v=_block(v, request.v), y=_block(y, request.y))
+            if findings := findings_of(run, request, is_heard):
+                run.findings = findings
+        return run
+
+
+class _Recent:
+    """A run that ``integrate`` made."""
+
+    __slots__ = ("is_large", "kinds", "method", "run", "system")
+
+    def __init__(self, system: System, method: str | Method, kinds: tuple[type, ...]) -> None:
+        #: The numbers of both objects are in its key, and may be those of others once these are gone.
+        self.system, self.method = ref(system), method
+        #: The types of its options: 1, 1.0 and True are equal.
+        self.kinds = kinds
+        #: Made at the second time, unless it would keep much memory.
+        self.run: PreparedRun | None = None
+        self.is_large = False
+
+
+#: Those made last.
+_recent: dict[Any, _Recent] = {}
+#: So many are kept, of systems whose parameters have at most so many bytes.
+MOST_RECENT, MOST_BYTES = 32, 1 << 17
+#: Options of these types are what they were.
+_PLAIN = frozenset({type(None), bool, int, float, str})
+
+
+def _bytes(system: System) -> int:
+    """The memory of the arrays of a system."""
+    attributes = list(vars(system).values())
+    in_dictionaries = [each for attribute in attributes if isinstance(attribute, dict) for each in attribute.values()]
+    return sum(getattr(each, "nbytes", 0) for each in attributes + in_dictionaries)
+
+
+def recent(system: System, method: str | Method, options: Options) -> PreparedRun | None:
+    """The run of this system with all these options but the start, if ``integrate`` made it lately.
+
+    It is prepared at the second time, since most runs are made once.
+    """
+    others = options[2:]
+    kinds = tuple(map(type, others))
+    if not _PLAIN.issuperset(kinds) or os.environ.get("STEPWELL_DEVICE"):
+        return None
+    key = (id(system), method if isinstance(method, str) else id(method), *others)
+    known = _recent.get(key)
+    if known is not None and known.kinds == kinds and known.system() is system:
+        if known.run is None and not known.is_large:
+            known.is_large = _bytes(system) > MOST_BYTES
+            known.run = None if known.is_large else PreparedRun(system, method, options._replace(v=None, y=None))
+        return known.run
+    if isinstance(system, System):
+        while len(_recent) >= MOST_RECENT:
+            _recent.pop(next(iter(_recent)), None)
+        _recent[key] = _Recent(system, method, kinds)
+    return None
+
+
+#: What the core says of a short run: it was not made; or it is certain that no member has grown.
+NOT_MADE, TAME = 0, 2
+
+
+def _block(block: Any, like: Array) -> Array:
+    """A block as a request has it, of the shape of another."""
+    array = np.asarray(0.0 if block is None else block, np.float64)
+    return array if array.shape == like.shape else checks.over(array, like.shape)
+
+
+def _shapes(request: Request, v: Any, y: Any) -> tuple[Shape, Shape]:
+    """The shapes of the blocks as they are in the call."""
+    return (request.v.shape if v is None else np.shape(v)), np.shape(y)
+
+
+def _short_run(request: Request, shapes: tuple[Shape, Shape]) -> _ShortRun | None:
+    """What the run is without its start; None if that is not known to be short."""
+    plan, system = request.plan, request.system
+    depends_on_the_start = system.control is not None or system.keeper is not None or system.mass_matrix is not None
+    asks_for_more = plan.force is not None or plan.record or request.record or request.events is not None or request.progress
+    goes_elsewhere = (
+        plan.form != "direct" or plan.backend != "rust" or plan.device is not None or request.step_control is not None
+    )
+    has_own = isinstance(plan.t0, np.ndarray) or plan.memory is not None or request.before is not None or request.carried
+    if depends_on_the_start or asks_for_more or goes_elsewhere or has_own or isinstance(system, NBody) or not plan.members:
+        return None
+    # A block of another shape may mean another batch, or another system.
+    if any(shape not in ((), whole.shape) for shape, whole in zip(shapes, (request.v, request.y), strict=True)):
+        return None
+    core = _core.prepared(engine.model(plan), plan, plan.members, list(map(list, shapes)))
+    return None if core is None else _ShortRun(request, core)

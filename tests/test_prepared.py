@@ -1,0 +1,258 @@
+"""A prepared run is that of ``integrate``: to the bit, with its errors, findings and warnings; and ``integrate`` itself prepares."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import threading
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.runs import prepared as module
+
+OPTIONS: list[dict[str, Any]] = [
+    {}, {"every": 1}, {"every": 7}, {"dtype": "float32"}, {"fused": True}, {"t0": 3.0, "start_step": 5, "every": 3},
+    {"record": "energy", "every": 2}, {"form": "matrix"}, {"backend": "numpy"}, {"threads": 2}, {"dt": -0.05},
+]  # fmt: skip
+DT = {"dt": 0.05, "steps": 20}
+
+
+@sw.system(order=1)
+def lorenz(t: Any, y: Any, *, rho: Any = 28.0) -> Any:
+    """Lorenz's equations."""
+    return np.array([10.0 * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]])
+
+
+@sw.system
+def duffing(t: Any, v: Any, y: Any, *, beta: Any = 1.0) -> Any:
+    """A driven spring that stiffens."""
+    return 0.3 * np.cos(1.2 * t) - 0.3 * v + y - beta * y * y * y
+
+
+@pytest.fixture(autouse=True)
+def nothing_recent() -> None:
+    """No test knows the runs of another."""
+    module._recent.clear()
+
+
+def assert_same(run: sw.Run, other: sw.Run) -> None:
+    """All attributes are equal, arrays to the bit."""
+    assert vars(run).keys() == vars(other).keys()
+    for name, value in vars(run).items():
+        of_other = vars(other)[name]
+        if isinstance(value, np.ndarray):
+            assert (value.dtype, value.shape, value.tobytes()) == (of_other.dtype, of_other.shape, of_other.tobytes()), name
+        elif name == "recorded":
+            assert {key: each.tobytes() for key, each in value.items()} == {key: each.tobytes() for key, each in of_other.items()}
+        elif not callable(value):
+            assert value == of_other, name
+    assert run.findings == other.findings
+
+
+def whole(*arguments: Any, **options: Any) -> sw.Run:
+    """What ``integrate`` makes without anything that it kept."""
+    module._recent.clear()
+    return sw.integrate(*arguments, **options)
+
+
+def with_warnings(call: Any) -> tuple[sw.Run, list[str]]:
+    """The run and what was warned of, with the file of the line."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run = call()
+    return run, [f"{each.filename} {each.category.__name__} {each.message}" for each in caught]
+
+
+def is_short(run: Any) -> bool:
+    return run._short is not None
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=lambda options: " ".join(f"{k}={v}" for k, v in options.items()) or "plain")
+@pytest.mark.parametrize("method", sw.methods())
+def test_it_makes_the_run_of_integrate(method: str, options: dict[str, Any]) -> None:
+    """Every method, with each option, for one member and for many."""
+    for system in (sw.Oscillator(1.3), sw.Oscillator(np.linspace(0.5, 2.0, 37)), sw.Pendulum(2.0), duffing(beta=np.ones(3))):
+        arguments = {**DT, **options}
+        try:
+            expected = [whole(system, method, v=v, y=y, **arguments) for v, y in ((0.1, 1.0), (0.3, -2.0), (0.0, 0.0))]
+        except sw.StepwellError as error:
+            with pytest.raises(type(error)) as raised:
+                sw.prepare(system, method, v=0.1, y=1.0, **arguments)
+            assert str(raised.value) == str(error)
+            continue
+        run = sw.prepare(system, method, v=0.1, y=1.0, **arguments)
+        assert is_short(run) == (not {"record", "form", "backend"} & options.keys() and not sw.method(method).is_exact)
+        for (v, y), other in zip(((0.1, 1.0), (0.3, -2.0), (0.0, 0.0)), expected, strict=True):
+            assert_same(run(v, y), other)
+
+
+def test_systems_of_first_order_have_no_velocities() -> None:
+    """v is left out, by place or by name."""
+    run = sw.prepare(lorenz(), "rk4", y=[1.0, 1.0, 1.0], dt=0.01, steps=10)
+    for y in ([1.0, 2.0, 3.0], np.array([1.0, 2.0, 3.0])):
+        assert_same(run(y=y), whole(lorenz(), "rk4", y=y, dt=0.01, steps=10))
+        assert_same(run(None, y), run(y=y))
+    assert is_short(run)
+
+
+def test_starts_of_other_shapes_mean_what_they_mean_for_integrate() -> None:
+    """One number for all, an array for each member, other batches, and arrays that broadcast."""
+    many, one = sw.Oscillator(np.linspace(0.5, 2.0, 5)), sw.Oscillator(1.1)
+    starts: list[tuple[Any, Any]] = [
+        (0.0, 1.0), (0.0, np.ones(5)), (np.arange(5.0), np.ones(5)), (np.arange(5.0), 1.0), (0, 1), (np.float64(0.5), 1.0),
+        (np.zeros((1,)), np.ones(5)), (np.arange(10.0)[::2], np.ones(5)), (np.zeros(5, np.float32), 1.0), (np.array(0.5), 1.0),
+    ]  # fmt: skip
+    for system in (many, one):
+        run = sw.prepare(system, "rk4", v=0.0, y=1.0, **DT)
+        for start in [*starts, *reversed(starts)]:
+            assert_same(run(*start), whole(system, "rk4", v=start[0], y=start[1], **DT))
+
+
+def test_errors_are_those_of_integrate() -> None:
+    """Of the start at each call, of everything else at once."""
+    system, arguments = sw.Oscillator(), {"dt": 0.1, "steps": 5}
+    run = sw.prepare(system, "rk4", v=0.0, y=1.0, **arguments)
+    starts: list[tuple[Any, Any]] = [
+        ("a", 1.0), (0.0, None), (None, 1.0), (np.nan, 1.0), (0.0, np.inf), (0.0, np.array(np.nan)), (np.zeros(2), np.zeros(3)), (1j, 1.0),
+    ]  # fmt: skip
+    for v, y in starts:
+        with pytest.raises(sw.StepwellError) as expected:
+            whole(system, "rk4", v=v, y=y, **arguments)
+        with pytest.raises(type(expected.value)) as raised:
+            run(v, y)
+        assert str(raised.value) == str(expected.value)
+    with pytest.raises(sw.errors.ArgumentError, match=r"prepare: expected arguments of integrate, got step="):
+        sw.prepare(system, "rk4", v=0.0, y=1.0, dt=0.1, step=5)
+    with pytest.raises(sw.errors.ArgumentError, match=r"resume: a prepared run begins at the start of its call"):
+        sw.prepare(system, "rk4", dt=0.1, steps=5, resume=whole(system, "rk4", v=0.0, y=1.0, **arguments))
+    with pytest.raises(sw.errors.ArgumentError, match="steps"):
+        sw.prepare(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=0)
+    single = sw.prepare(system, "rk4", v=0.0, y=1.0, dtype="float32", **arguments)
+    with pytest.raises(sw.errors.ArgumentError) as expected:
+        whole(system, "rk4", v=0.0, y=1e39, dtype="float32", **arguments)
+    with pytest.raises(sw.errors.ArgumentError) as raised:
+        single(0.0, 1e39)
+    assert str(raised.value) == str(expected.value)
+
+
+@pytest.mark.parametrize(
+    ("system", "method", "start", "arguments"),
+    [
+        (lorenz(), "euler", (None, [1.0, 1.0, 1e9]), {"dt": 1.0, "steps": 20}),  # diverges
+        (lorenz(), "euler", (None, [1e-3, 1e-3, 1e-3]), {"dt": 1.0, "steps": 20}),
+        (sw.Oscillator(), "euler", (0.0, 1.0), {"dt": 3.0, "steps": 60}),  # grows by its steps alone
+        (sw.Oscillator(), "euler", (0.0, 1e-200), {"dt": 3.0, "steps": 13}),
+        (sw.Oscillator([1.0, 3.0]), "rk4", (0.0, 1.0), {"dt": 1.0, "steps": 400}),
+        (sw.Pendulum(), "rk4", (1e300, 1.0), {"dt": 1.0, "steps": 3}),  # an angle without a sine
+        (sw.Pendulum(), "verlet", (0.0, 3.1), {"dt": 0.5, "steps": 3000}),
+    ],
+    ids=str,
+)
+def test_warnings_are_those_of_integrate(system: Any, method: str, start: Any, arguments: Any) -> None:
+    """The same words, at the line of the caller, from the first call and from later ones."""
+    expected, said = with_warnings(lambda: whole(system, method, v=start[0], y=start[1], **arguments))
+    gentle = (None, [1.0, 1.0, 1.0]) if start[0] is None else (0.0, 1e-3)
+    run = sw.prepare(system, method, v=gentle[0], y=gentle[1], **arguments)
+    for _ in range(3):
+        got, warned = with_warnings(lambda: run(*start))
+        assert_same(got, expected)
+        assert warned == said
+        again, warned = with_warnings(lambda: sw.integrate(system, method, v=start[0], y=start[1], **arguments))
+        assert_same(again, expected)
+        assert warned == said
+
+
+def test_runs_share_no_arrays() -> None:
+    """What is written into one run is not seen in another."""
+    run = sw.prepare(sw.Oscillator(np.ones(3)), "leapfrog", v=0.0, y=1.0, dt=0.1, steps=4, every=2)
+    first, expected = run(0.0, 1.0), whole(sw.Oscillator(np.ones(3)), "leapfrog", v=0.0, y=1.0, dt=0.1, steps=4, every=2)
+    for array in (first.t, first.v, first.y, first.status, first.first_bad_step, first.carry):
+        assert array is not None
+        array[...] = 7
+    first.recorded["own"] = first.y
+    assert_same(run(0.0, 1.0), expected)
+
+
+def test_a_prepared_run_goes_on_as_any_other() -> None:
+    """By ``resume``, to the bit."""
+    system = sw.Oscillator(1.7)
+    run = sw.prepare(system, "verlet", v=0.0, y=1.0, dt=0.1, steps=4)
+    whole_run = whole(system, "verlet", v=0.0, y=1.0, dt=0.1, steps=10)
+    assert sw.integrate(system, "verlet", resume=run(0.0, 1.0), steps=6).y.tobytes() == whole_run.y.tobytes()
+
+
+def test_copies_make_the_same_runs() -> None:
+    """Also in another process, by pickle."""
+    run = sw.prepare(sw.Oscillator(1.7), "rk4", v=0.0, y=1.0, dt=0.1, steps=4)
+    for other in (copy.copy(run), copy.deepcopy(run), pickle.loads(pickle.dumps(run))):
+        assert repr(other) == repr(run) == "<prepared run of Oscillator(omega=1.7, form='canonical') by rk4>"
+        for _ in range(2):
+            assert_same(other(0.5, 1.0), run(0.5, 1.0))
+
+
+def test_threads_may_call_it_at_once() -> None:
+    """Every call has its own start and result."""
+    run = sw.prepare(sw.Oscillator(np.linspace(1.0, 2.0, 200)), "rk4", v=0.0, y=1.0, dt=0.01, steps=300)
+    expected = [run(0.0, float(i)).y for i in range(8)]
+    wrong: list[int] = []
+
+    def work(i: int) -> None:
+        wrong.extend(i for _ in range(50) if not np.array_equal(run(0.0, float(i)).y, expected[i]))
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_only_what_depends_on_the_start_is_checked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A prepared run makes no request, and nor does ``integrate`` from its third call on."""
+    system = sw.Oscillator()
+    run, expected = sw.prepare(system, "rk4", v=0.0, y=1.0, **DT), whole(system, "rk4", v=0.5, y=1.5, **DT)
+    for _ in range(2):
+        sw.integrate(system, "rk4", v=0.0, y=1.0, **DT)
+    monkeypatch.setattr("stepwell.runs.request.Request.of", None)
+    assert_same(run(0.5, 1.5), expected)
+    assert_same(sw.integrate(system, "rk4", v=0.5, y=1.5, **DT), expected)
+
+
+def test_integrate_knows_a_run_by_all_of_its_options() -> None:
+    """Equal numbers of other types, other systems at the same place, and options that are written to."""
+    system = sw.Oscillator(1.5)
+    for _ in range(3):
+        sw.integrate(system, "rk4", v=0.0, y=1.0, dt=1.0, steps=1)
+    with pytest.raises(sw.StepwellError, match="steps"):
+        sw.integrate(system, "rk4", v=0.0, y=1.0, dt=1.0, steps=True)
+    with pytest.raises(sw.StepwellError, match="fused"):
+        sw.integrate(system, "rk4", v=0.0, y=1.0, dt=1.0, steps=1, fused=0)  # type: ignore[arg-type]
+    for omega in np.linspace(0.5, 2.0, 50):
+        for _ in range(3):
+            run = sw.integrate(sw.Oscillator(omega), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
+        assert_same(run, whole(sw.Oscillator(omega), "rk4", v=0.0, y=1.0, dt=0.1, steps=3))
+    push = np.zeros(())
+    for size in (0.0, 1.0, 2.0):
+        push[...] = size
+        assert_same(
+            sw.integrate(system, "rk4", v=0.0, y=1.0, force=push, dt=0.1, steps=3),
+            whole(system, "rk4", v=0.0, y=1.0, force=size, dt=0.1, steps=3),
+        ) if size == 0.0 else None
+        run = sw.integrate(system, "rk4", v=0.0, y=1.0, force=push, dt=0.1, steps=3)
+        assert run.y.tobytes() == whole(system, "rk4", v=0.0, y=1.0, force=size, dt=0.1, steps=3).y.tobytes()
+
+
+def test_integrate_keeps_little_memory() -> None:
+    """Some runs, of systems with few parameters, and of others nothing."""
+    systems = [sw.Oscillator(1.0 + i) for i in range(100)]
+    for system in systems:
+        for _ in range(3):
+            sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.01, steps=3)
+    assert len(module._recent) <= module.MOST_RECENT
+    large = sw.Oscillator(np.ones(100_000))
+    for _ in range(3):
+        sw.integrate(large, "rk4", v=0.0, y=1.0, dt=0.01, steps=3)
+    assert all(each.run is None or each.run._system is not large for each in module._recent.values())
