@@ -320,7 +320,11 @@ def test_others_are_not(name: str) -> None:
 def test_every_public_class_is_here() -> None:
     """Exceptions are Python's own, a world and a prepared run are no values; advice and stability are elsewhere."""
     public = {name for module in (sw, charts) for name in module.__all__ if isinstance(getattr(module, name), type)}
-    elsewhere = {name for name in public if issubclass(getattr(sw, name, int), (Exception, Warning))} | {"World", "PreparedRun", "System"}
+    elsewhere = {name for name in public if issubclass(getattr(sw, name, int), (Exception, Warning))} | {
+        "World",
+        "PreparedRun",
+        "System",
+    }
     parts = {
         "Curve",
         "Held",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from typing import Any
 from weakref import ref
@@ -19,7 +20,7 @@ from .diagnostics import findings_of, finds_growth_only
 from .findings import is_heard, warn_of
 from .fixed import fixed_run
 from .making import noticing
-from .options import Options
+from .options import Options, spread
 from .request import Request
 from .result import Run
 
@@ -34,10 +35,12 @@ class PreparedRun:
     """
 
     def __init__(self, system: System, method: str | Method, options: Options) -> None:
-        self._system, self._method, self._options = system, method, options
+        copies = {name: copy.copy(each) for name, each in options._asdict().items() if isinstance(each, (np.ndarray, list))}
+        self._system, self._method, self._options = system, method, options._replace(**copies)
+        #: The last request that was checked as a whole, with the shapes of its blocks in the call; None if others would not be
+        #: the same but for the start.
+        self._request: tuple[Request, tuple[Shape, Shape]] | None = None
         self._short: _ShortRun | None = None
-        #: The shapes of the blocks of a call for which it was tried whether the run is a short one.
-        self._tried: Any = None
 
     def __repr__(self) -> str:
         """Of one line."""
@@ -73,18 +76,26 @@ class PreparedRun:
         short = self._short
         if short is not None and (run := short.run(v, y)) is not None:
             return run
+        known = self._request
+        if known is not None and (request := _from(*known, v, y)) is not None:
+            return noticing(request, is_heard)
+        return noticing(self.request(v, y), is_heard)
+
+    def request(self, v: Any, y: Any) -> Request:
+        """The request from this start, checked as a whole, after which others of these shapes are checked in less time."""
         request = Request.of(self._system, self._method, self._options._replace(v=v, y=y))
-        shapes = _shapes(request, v, y)
-        if shapes != self._tried:
-            self._tried, self._short = shapes, _short_run(request, shapes)
-        return noticing(request, is_heard)
+        if _is_free(request):
+            shapes = (request.v.shape if v is None else np.shape(v)), np.shape(y)
+            self._request, self._short = (request, shapes), _short_run(request, shapes)
+        return request
 
 
 def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = None, **options: Any) -> PreparedRun:
     """Check and prepare a run once, to make it from many starts: ``prepare(…)(v, y)`` is ``integrate(…)`` in less time.
 
     The call takes a few microseconds beside the steps for short runs of fixed steps in the direct form, without control, force,
-    events and recorded quantities; other runs take as long as by ``integrate``.
+    events and recorded quantities. Others save the checks of arguments; and nothing is saved where more than the state depends on
+    the start: with a control, algebraic equations, ``force``, ``positive``, or in float32 if it is not short.
 
     Args:
         system: the system to step.
@@ -110,13 +121,9 @@ def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = Non
     if unknown := [name for name in options if name not in Options._fields]:
         raise ArgumentError(f"prepare: expected arguments of integrate, got {unknown[0]}=")
     if options.get("resume") is not None:
-        raise ArgumentError(
-            "resume: a prepared run begins at the start of its call; to go on with a run use integrate"
-        )
-    request = Request.of(system, method, Options(v=v, y=y, **options))
+        raise ArgumentError("resume: a prepared run begins at the start of its call; to go on with a run use integrate")
     prepared = PreparedRun(system, method, Options(**options))
-    prepared._tried = shapes = _shapes(request, v, y)
-    prepared._short = _short_run(request, shapes)
+    prepared.request(v, y)
     return prepared
 
 
@@ -221,21 +228,39 @@ def _block(block: Any, like: Array) -> Array:
     return array if array.shape == like.shape else checks.over(array, like.shape)
 
 
-def _shapes(request: Request, v: Any, y: Any) -> tuple[Shape, Shape]:
-    """The shapes of the blocks as they are in the call."""
-    return (request.v.shape if v is None else np.shape(v)), np.shape(y)
+def _is_free(request: Request) -> bool:
+    """Whether nothing of a request depends on the start but the start, so that it holds for others of the same shapes."""
+    plan, system = request.plan, request.system
+    has_target = system.control is not None or system.keeper is not None or system.mass_matrix is not None
+    goes_on = request.before is not None or request.carried
+    return not (has_target or goes_on or plan.force is not None or plan.acceptance.positive)
+
+
+def _from(request: Request, shapes: tuple[Shape, Shape], v: Any, y: Any) -> Request | None:
+    """The request from another start; None if the blocks have other shapes, which may mean another batch or another system."""
+    system, batch = request.system, request.plan.batch
+    v = 0.0 if v is None and system.v_shape == (0,) else v
+    is_known = not request.plan.single  # in which the start is rounded, and checked, in other places, too
+    if not is_known or not all(isinstance(block, (float, np.ndarray)) for block in (v, y)):
+        return None
+    own = request.v.shape if shapes[0] == request.v.shape == (0, *batch) else np.shape(v)
+    if (own, np.shape(y)) != shapes:
+        return None
+    v = spread(checks.block("v", v, system.v_shape, system.axes), system.v_shape, batch)
+    y = spread(checks.block("y", y, system.y_shape, system.axes), system.y_shape, batch)
+    control = request.step_control
+    if control is not None:
+        control = control._replace(start=(control.start[0], v, y))
+    return request._replace(v=v, y=y, step_control=control)
 
 
 def _short_run(request: Request, shapes: tuple[Shape, Shape]) -> _ShortRun | None:
     """What the run is without its start; None if that is not known to be short."""
-    plan, system = request.plan, request.system
-    depends_on_the_start = system.control is not None or system.keeper is not None or system.mass_matrix is not None
-    asks_for_more = plan.force is not None or plan.record or request.record or request.events is not None or request.progress
-    goes_elsewhere = (
-        plan.form != "direct" or plan.backend != "rust" or plan.device is not None or request.step_control is not None
-    )
-    has_own = isinstance(plan.t0, np.ndarray) or plan.memory is not None or request.before is not None or request.carried
-    if depends_on_the_start or asks_for_more or goes_elsewhere or has_own or isinstance(system, NBody) or not plan.members:
+    plan = request.plan
+    asks_for_more = plan.record or request.record or request.events is not None or request.progress
+    is_other = plan.form != "direct" or plan.backend != "rust" or plan.device is not None or request.step_control is not None
+    has_own = isinstance(plan.t0, np.ndarray) or plan.memory is not None
+    if asks_for_more or is_other or has_own or isinstance(request.system, NBody) or not plan.members:
         return None
     # A block of another shape may mean another batch, or another system.
     if any(shape not in ((), whole.shape) for shape, whole in zip(shapes, (request.v, request.y), strict=True)):
