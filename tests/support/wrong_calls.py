@@ -344,6 +344,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         },
     ),
     "integrate matrix": (sw.integrate, FREE | {"dt": 0.1, "steps": 10, "form": "matrix"}),
+    "prepare": (sw.prepare, FREE | {"dt": 0.1, "steps": 10, "every": 5, "record": ["energy"]}),
     "integrate power": (sw.integrate, FREE | {"dt": 0.1, "steps": 10, "form": "power", "every": 5}),
     "integrate tolerance": (
         sw.integrate,

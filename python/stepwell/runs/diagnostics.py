@@ -22,7 +22,6 @@ from . import encounters, engine, known_energy
 from .findings import Finding
 from .request import Request
 from .result import Run
-from .stops import of_derivatives, of_stops, of_the_start
 from .tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance
 
 #: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
@@ -77,6 +76,8 @@ def findings_of(
         if np.count_nonzero(run.status) and (diverged := _of_divergence(run, request)) is not None:
             noticed.append(diverged)
     else:
+        from .stops import of_stops  # only runs with adaptive steps need it
+
         noticed += of_stops(run, partial(why_steps_are_short, run, request, waypoints))
         if (stiff := _of_stiffness(run, request, waypoints, heard)) is not None:
             noticed.append(stiff)
@@ -182,6 +183,8 @@ def _of_divergence(run: Run, request: Request) -> Finding | None:
     if not request.carried and step == run.start_step + 1 and not why:
         start = request.v, request.y
         place = run.status.shape, run.t0 + run.start_step * run.dt, start, first
+        from .stops import of_derivatives, of_the_start  # only runs that diverged at once need it
+
         if wrong := of_the_start(run.system, *place) or of_derivatives(run.system, run.method, *place):
             why = f"; {wrong} at the start, t = {time_of(run, run.start_step, first):g}"
     if run.method.splits and isinstance(run.system, NBody) and run.system.force == "newton":

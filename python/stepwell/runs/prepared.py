@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 from typing import Any
 from weakref import ref
@@ -12,6 +11,7 @@ import numpy as np
 from .. import _core
 from ..base import checks
 from ..base.arrays import Array, Shape
+from ..base.immutable import frozen
 from ..errors import ArgumentError
 from ..model.methods import Method
 from ..model.systems import NBody, System
@@ -35,8 +35,7 @@ class PreparedRun:
     """
 
     def __init__(self, system: System, method: str | Method, options: Options) -> None:
-        copies = {name: copy.copy(each) for name, each in options._asdict().items() if isinstance(each, (np.ndarray, list))}
-        self._system, self._method, self._options = system, method, options._replace(**copies)
+        self._system, self._method, self._options = system, method, Options(*map(_own, Options._fields, options))
         #: The last request that was checked as a whole, with the shapes of its blocks in the call; None if others would not be
         #: the same but for the start.
         self._request: tuple[Request, tuple[Shape, Shape]] | None = None
@@ -125,6 +124,13 @@ def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = Non
     prepared = PreparedRun(system, method, Options(**options))
     prepared.request(v, y)
     return prepared
+
+
+def _own(name: str, option: Any) -> Any:
+    """An option into which nobody writes any more."""
+    if isinstance(option, np.ndarray):
+        return frozen(name, option)
+    return option.copy() if isinstance(option, list) else option
 
 
 class _ShortRun:
