@@ -98,6 +98,20 @@ def test_jumps_are_exact(method: str) -> None:
     assert np.array_equal(run.y, reference.y)
 
 
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_jumps_of_all_and_of_each_member_with_times_of_each(backend: str) -> None:
+    """Over two batch axes, of which the jumps and the starts may have the last alone; each member is as it would be alone."""
+    ask: dict[str, Any] = {"tolerance": 1e-6, "at": [1.5], "backend": backend}
+    of_some = np.array([[0.3, 0.31, 0.32], [0.5, 0.51, 0.52]])
+    for jumps in (np.array([0.3, 0.5]), of_some, np.concatenate([of_some, of_some + 0.5])):
+        for t0 in (0.1, np.array([0.0, 0.1, 0.2]), np.array([[0.0, 0.1, 0.2], [0.05, 0.1, 0.15]])):
+            run = sw.integrate(sw.Oscillator(), "merson", v=np.zeros((2, 3)), y=1.0, t0=t0, jumps=jumps, **ask)
+            for i, j in np.ndindex(2, 3):
+                own = float(np.broadcast_to(t0, (2, 3))[i, j]), jumps if jumps.ndim == 1 else jumps[:, j]
+                alone = sw.integrate(sw.Oscillator(), "merson", v=0.0, y=1.0, t0=own[0], jumps=own[1], **ask)
+                assert alone.y[-1] == run.y[-1, i, j]
+
+
 def test_a_jump_at_the_start_and_at_saved_times() -> None:
     """Both sides are on their sides, whether the jump counts to the left or to the right of its time."""
     for at in ([5.0, 6.0, 7.0], [7.0]):

@@ -137,3 +137,15 @@ def test_a_wrong_device() -> None:
         sw.sweep(driven, AXES, "rk4", v=0.0, dt=0.02, steps=20, device="gpu")
     with pytest.raises(UnsupportedError, match="device: there is no opencl:99"):
         sw.sweep(driven, AXES, "rk4", v=0.0, dt=0.02, steps=20, device="opencl:99")
+
+
+@pytest.mark.parametrize("more", [{"dt": 0.1, "steps": 5}, {"tolerance": 1e-3, "at": [1.0]}])
+def test_what_is_too_long_is_refused_before_any_work(more: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ensemble, "_compute", lambda *_: pytest.fail("work"))
+
+    def chains(k: Any) -> sw.System:
+        return sw.Springs([(i, i + 1) for i in range(300)], stiffness=k, rest=1.0, dim=3)
+
+    start = {"v": 0.0, "y": np.arange(903.0).reshape(301, 3, 1)}
+    with pytest.raises(UnsupportedError, match="too long for a kernel, which has at most 20000"):
+        sw.sweep(chains, {"k": ("k", [1.0, 2.0])}, "dop853", device=NAMES[0], **start, **more)

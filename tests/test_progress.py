@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.base import progress
+from support.devices import NAMES, needs_device
 
 OPTIONS: dict[str, Any] = {"v": 0.0, "y": np.ones(200), "dt": 0.1, "steps": 3000, "progress": True, "backend": "numpy"}
 
@@ -98,3 +99,42 @@ def test_ipython_in_a_terminal_is_no_notebook(monkeypatch: pytest.MonkeyPatch) -
     assert not progress.in_notebook()
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))
     assert not progress.in_notebook()
+
+
+def test_what_is_waited_for_stands_beside_the_title(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a notebook, in a line and with rich; and no longer when the work goes on, or the bar is gone."""
+    monkeypatch.setattr(progress, "MIN_SECONDS_BETWEEN", 0.0)
+
+    def work() -> None:
+        with progress.bar("a run") as report:
+            progress.waits_for("compiling")
+            progress.waits_for("compiling")
+            progress.waits_for("")
+            report(0.5)
+        progress.waits_for("nothing")
+
+    with monkeypatch.context() as page:
+        handle = in_a_notebook(page)
+        work()
+    titles = [text.split(" <")[0] for text in handle.shown]
+    assert titles == ["a run", "a run, compiling", "a run", "a run", ""]
+    pytest.importorskip("rich")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    work()
+    assert "a run, compiling" in terminal.getvalue()
+    assert "nothing" not in terminal.getvalue()
+    without_rich(monkeypatch)
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    work()
+    assert [line.count("compiling") for line in terminal.getvalue().split("\r")] == [0, 0, 1, 0, 0, 0]
+
+
+@needs_device
+def test_a_kernel_that_is_compiled_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    handle = in_a_notebook(monkeypatch)
+    system = sw.Oscillator(np.linspace(1.0, 2.0, 5), drag=0.1)
+    for more in ({"dt": 0.1, "steps": 10}, {"tolerance": 1e-3, "at": [1.0]}):
+        handle.shown.clear()
+        sw.integrate(system, "fehlberg_5", v=0.0, y=1.0, device=NAMES[0], progress=True, **more)
+        assert ["compiling for opencl:0" in text for text in handle.shown[:3]] == [False, True, False]

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from html import escape
 from typing import Any
 
@@ -20,13 +21,43 @@ MIN_SECONDS_BETWEEN = 0.1
 #: The length of a bar of text, in characters.
 BAR_LENGTH = 30
 
+#: What takes the share of the work that is done, and what takes a text beside the title.
+Both = tuple[Callable[[float], object], Callable[[str], object]]
+
 #: The least time, and the least share, after which the rest of the time is told.
 SURE_SECONDS, SURE_SHARE = 1.0, 0.02
+
+
+#: What is shown in this thread; it takes a text that stands beside the title.
+_SHOWN: ContextVar[Callable[[str], object]] = ContextVar("shown", default=lambda text: None)
 
 
 @contextmanager
 def bar(title: str) -> Iterator[Callable[[float], object]]:
     """Show a bar; yields the function that takes the share of the work that is done, from 0 to 1."""
+    shown = ""
+    with _bar(title) as (share, beside):
+
+        def changes(text: str) -> None:
+            nonlocal shown
+            if text != shown:
+                shown = text
+                beside(text)
+
+        before = _SHOWN.set(changes)
+        try:
+            yield share
+        finally:
+            _SHOWN.reset(before)
+
+
+def waits_for(text: str) -> None:
+    """Tell in the bar of this thread, if there is one, what its work waits for; "" if it goes on."""
+    _SHOWN.get()(text)
+
+
+@contextmanager
+def _bar(title: str) -> Iterator[Both]:
     if in_notebook():
         yield from _in_a_page(title)
         return
@@ -42,8 +73,17 @@ def bar(title: str) -> Iterator[Callable[[float], object]]:
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(title, total=1.0, left="")
-        yield lambda share: progress.update(task, completed=share, left=left(share))
+        # What is waited for may keep the thread that draws from running.
+        yield (
+            lambda share: progress.update(task, completed=share, left=left(share)),
+            lambda text: progress.update(task, description=_beside(title, text), refresh=True),
+        )
         progress.update(task, completed=1.0)
+
+
+def _beside(title: str, text: str) -> str:
+    """The title, and what is waited for."""
+    return f"{title}, {text}" if text else title
 
 
 def _time_left() -> Callable[[float], str]:
@@ -66,30 +106,31 @@ def in_notebook() -> bool:
     return hasattr(shell, "kernel")
 
 
-def _in_a_page(title: str) -> Iterator[Callable[[float], object]]:
+def _in_a_page(title: str) -> Iterator[Both]:
     """An element that the kernel changes; needs no widgets."""
     from IPython.display import HTML, display
 
-    def element(share: float) -> Any:
-        return HTML(f'{escape(title)} <progress value="{share:.3f}" max="1"></progress> {100 * share:.0f} %')
+    def element(share: float, text: str = "") -> Any:
+        name = escape(_beside(title, text))
+        return HTML(f'{name} <progress value="{share:.3f}" max="1"></progress> {100 * share:.0f} %')
 
     handle = display(element(0.0), display_id=True)
-    yield _at_intervals(lambda share: handle.update(element(share)))
+    yield _at_intervals(lambda share, text="": handle.update(element(share, text)))
     handle.update(HTML(""))
 
 
-def _in_a_line(title: str) -> Iterator[Callable[[float], object]]:
+def _in_a_line(title: str) -> Iterator[Both]:
     """A line of a terminal that is written over, and removed at the end."""
     if not shows_escapes(sys.stderr):
-        yield lambda share: None
+        yield (lambda share: None), (lambda text: None)
         return
 
     left = _time_left()
 
-    def line(share: float) -> None:
+    def line(share: float, text: str = "") -> None:
         full = round(BAR_LENGTH * share)
         bar = "━" * full + "·" * (BAR_LENGTH - full)
-        print(f"\r\033[K{title} {bar} {left(share)} {100 * share:3.0f} %", end="", file=sys.stderr, flush=True)
+        print(f"\r\033[K{_beside(title, text)} {bar} {left(share)} {100 * share:3.0f} %", end="", file=sys.stderr, flush=True)
 
     line(0.0)
     try:
@@ -98,14 +139,14 @@ def _in_a_line(title: str) -> Iterator[Callable[[float], object]]:
         print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
-def _at_intervals(show: Callable[[float], object]) -> Callable[[float], object]:
-    """A function that passes a share on to ``show`` if the last one was passed on long enough ago."""
-    last = time.monotonic()
+def _at_intervals(show: Callable[..., object]) -> Both:
+    """Functions that pass on to ``show`` a share, if the last one was passed on long enough ago, and a text beside the last."""
+    last, shown = time.monotonic(), 0.0
 
     def show_if_due(share: float) -> None:
-        nonlocal last
+        nonlocal last, shown
         if (now := time.monotonic()) - last >= MIN_SECONDS_BETWEEN:
-            last = now
-            show(min(1.0, max(0.0, share)))
+            last, shown = now, min(1.0, max(0.0, share))
+            show(shown)
 
-    return show_if_due
+    return show_if_due, lambda text: show(shown, text)

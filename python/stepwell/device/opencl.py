@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from ..base import checks
 from ..base.available_memory import in_bytes
 from ..base.optional import imported
+from ..base.progress import waits_for
 from ..errors import ArgumentError, TooLargeError, UnsupportedError
 
 #: Where the name of the device is read that ``device=None`` means.
@@ -141,6 +142,8 @@ class Machine:
             if text in self._programs:
                 self._programs.move_to_end(text)
                 return self._programs[text]
+        # Some compile it here, and some where it is first called: until what it computes is waited for.
+        waits_for(f"compiling for {self.described.name}")
         options = ["-cl-std=CL1.2"] + [ROUNDS_SINGLE] * self.rounds_single
         try:
             built = Program(self.cl.Program(self.context, text).build(options=options))
@@ -189,6 +192,7 @@ class Machine:
         if array.nbytes:
             with self._in_words():
                 self.cl.enqueue_copy(self.queue, array, buffer, src_offset=offset)
+        waits_for("")
 
     def copy(self, to: Any, buffer: Any) -> None:
         """Copy from one buffer of the device to another, once all before it is done."""
@@ -204,6 +208,7 @@ class Machine:
         """Wait until all is done."""
         with self._in_words():
             self.queue.finish()
+        waits_for("")
 
     @contextmanager
     def _in_words(self) -> Iterator[None]:

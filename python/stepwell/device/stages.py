@@ -22,6 +22,16 @@ from .printer import HEAD, TYPES, Printer
 MOST_OPERATIONS = 20_000
 
 
+def check_length(model: Any) -> None:
+    """Raise if a step of the model is too long for a kernel."""
+    operations = _core.operations(model)
+    if operations > MOST_OPERATIONS:
+        raise UnsupportedError(
+            f"device: a step of about {operations} operations is too long for a kernel, which has at most {MOST_OPERATIONS}; use "
+            f"device='cpu'"
+        )
+
+
 class Text(NamedTuple):
     """What is printed of a stage.
 
@@ -52,12 +62,7 @@ class Stages:
     """
 
     def __init__(self, model: Any, *, single: bool, choice: int = 0, attempts: bool = False) -> None:
-        operations = _core.operations(model)
-        if operations > MOST_OPERATIONS:
-            raise UnsupportedError(
-                f"device: a step of about {operations} operations is too long for a kernel, which has at most {MOST_OPERATIONS}; "
-                f"use device='cpu'"
-            )
+        check_length(model)
         made = _core.stages(model, choice=choice, attempts=attempts)
         self.single, self.tried = single, made["tried"]
         self.sizes = {name: int(made[name]) for name in ("v", "y", "kept", "memory", "tally", "recorded")}

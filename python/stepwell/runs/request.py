@@ -350,6 +350,8 @@ class Request(NamedTuple):
                 "give a smaller max_steps= or a larger every=, or split the batch",
             )
         t0, times = adaptive_options.times_of_run(t0, times, batch)
+        if jumps is not None and (t0.ndim or jumps.ndim > 1):  # bracketed by the times of each member
+            jumps = spread(jumps, jumps.shape[:1], batch)
         since = sign * t0 if pace is None else np.maximum(pace[engine.TARGET], sign * t0)
         adaptive_options.check_ascending(sign * times, since, sign, pace is not None)
         v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)

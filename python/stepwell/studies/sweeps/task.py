@@ -21,6 +21,7 @@ from ...model.compatibility import velocities
 from ...model.methods import Method
 from ...model.systems import System
 from ...model.systems.base import a_system
+from ...runs import engine
 from ...runs.diagnostics import of_a_strong_control
 from ...runs.findings import Finding
 from ...runs.making import quietly, step
@@ -364,8 +365,20 @@ def probed(task: Task, values: dict[str, Any]) -> Probed:
 
 
 def _by_cpu(request: Request) -> Request:
-    """The request for the CPU: for a few steps of one member no kernel is built, and the bits are the same."""
-    return request._replace(plan=request.plan._replace(device=None))
+    """The request for the CPU: for a few steps of one member no kernel is built, and the bits are the same.
+
+    Raises:
+        UnsupportedError: if its steps are too long for a kernel of the device.
+    """
+    plan = request.plan._replace(device=None)
+    if request.plan.device is not None:
+        from ...device.bodies import takes  # only such sweeps need them
+        from ...device.stages import check_length
+
+        model = engine.model(plan.of_core())
+        if request.step_control is not None or not takes(model, plan):
+            check_length(model)
+    return request._replace(plan=plan)
 
 
 def _names(task: Task, run: Run) -> set[str]:

@@ -1,0 +1,64 @@
+"""Every method, system, control and record that the comparison of graphs covers has the bits of the core on a device of OpenCL.
+
+That comparison shows that core and reference are one graph; these runs show that what is printed of the graph and compiled
+computes it, among them with infinite, subnormal and missing numbers. Of thousands of runs, most of a second, some are made that
+show every method, every family of systems, every control and record, each with all kinds of numbers and steps; by
+``make test-long`` the others.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from stepwell.device import printer
+from support import device_proof, families
+from support.device_proof import Proof
+from support.devices import assert_same, needs_device
+
+pytestmark = needs_device
+
+CHOSEN = device_proof.chosen()
+
+
+def assert_proven(proof: Proof) -> None:
+    """The run of the device is that of the core; what the core refuses is refused in the same words."""
+    if refusal := proof.refusal():
+        assert proof.refusal("opencl") == refusal, proof
+        return
+    got, core = proof.runs()
+    assert_same(got, core, "t", "v", "y", "first_bad_step", "status", "work", "carry")
+    assert got.recorded.keys() == core.recorded.keys()
+    pairs = [(got.recorded[name], each) for name, each in core.recorded.items()]
+    if core.paces is not None and got.paces is not None:
+        pairs += zip(got.paces, core.paces, strict=True)
+    for one, other in pairs:
+        assert np.array_equal(one, other, equal_nan=True), proof
+
+
+@pytest.mark.parametrize("proof", [] if families.LONG else sorted(CHOSEN, key=str), ids=str)
+def test_some(proof: Proof) -> None:
+    assert_proven(proof)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", device_proof.SYSTEMS if families.LONG else [])
+def test_all(name: str) -> None:
+    """Every run of a system whose step is short enough."""
+    for proof in device_proof.every():
+        if proof.system == name and proof not in CHOSEN and proof.operations() <= device_proof.MOST:
+            assert_proven(proof)
+
+
+def test_every_method_family_control_and_record_is_among_the_chosen() -> None:
+    """What the others could show beside, those of long steps left out, is nothing."""
+    shown = {each for proof in CHOSEN for each in proof.shows()}
+    missing = {each for proof in device_proof.every() for each in proof.shows() if each not in shown}
+    assert not missing
+
+
+@pytest.mark.mutant
+def test_a_wrong_statement_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(printer.ARITHMETIC, "subtract", "{} + -{} * (real)1.0000001")
+    proof = next(each for each in sorted(CHOSEN, key=str) if each.method == "rk4" and not each.single)
+    with pytest.raises(AssertionError):
+        assert_proven(proof)
