@@ -353,3 +353,136 @@ def test_wrong_calls() -> None:
             world.step(n)
     with pytest.raises(UnsupportedError, match="episodes"):
         world._core.play((0, 0), *[np.empty(0)] * 3)
+
+
+def steps_of_many(world: sw.World) -> None:
+    """Calls of several lengths, with other masses and softening, and bodies that are moved."""
+    for n in (1, 2, 0, 1):
+        world.step(n)
+    world.set(masses=1.5 * world.system.masses)
+    world.step(2)
+    world.parameters["softening"][...] = 0.25
+    world.step(1)
+    world.step(1)
+    world.y[3] += 0.125
+    world.step(2)
+    world.v[...] *= 0.5
+    world.step(2)
+
+
+def members_of_many(world: sw.World) -> None:
+    """Members that start again, with parameters of their own."""
+    world.step(2)
+    world.reset([1], y=1.5 * many_bodies(world.y.shape[0], world.y.shape[1])[1][..., None], v=0.125)
+    world.step(2)
+    world.reset([0, 2], softening=0.3)
+    world.step(2)
+    if world.force is not None:
+        world.force[...] *= -2.0
+    world.step(2)
+
+
+def many_bodies(n: int, dim: int, *batch: int) -> Any:
+    """Their velocities and coordinates."""
+    v, y = np.random.default_rng(n).normal(size=(2, n, dim, *batch))
+    return v, y
+
+
+#: Methods that carry v, that carry something else, that keep blocks, and one whose step begins where the last ended.
+OF_MANY = ("leapfrog", "rk4", "verlet", "pefrl", adams_bashforth_2)
+
+
+@sw.method
+def velocity_verlet(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
+    half = v + 0.5 * s.dv(t, v, y)
+    moved = y + s.dy(t, half, y)
+    return half + 0.5 * s.dv(t + h, half, moved), moved
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("n", [64, 65, 100, 500])
+@pytest.mark.parametrize("force", ["newton", "logarithmic"])
+def test_many_bodies(name: str, n: int, force: Any) -> None:
+    def make(device: str) -> sw.World:
+        some = np.random.default_rng(n).uniform(0.5, 2.0, n) / n
+        some[5:20] = 0.0
+        v, y = many_bodies(n, 2 + n % 2)
+        return sw.World(sw.NBody(some, force=force, softening=0.125), "leapfrog", v=v, y=y, dt=0.01, device=device)
+
+    both(make, steps_of_many, name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("method", [*OF_MANY, velocity_verlet])
+def test_many_bodies_by_methods(name: str, method: Any) -> None:
+    def make(device: str) -> sw.World:
+        v, y = many_bodies(70, 2)
+        return sw.World(sw.NBody(np.ones(70) / 70, softening=0.125), method, v=v, y=y, dt=0.01, device=device)
+
+    both(make, steps_of_many, name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("method", [*OF_MANY, velocity_verlet])
+@pytest.mark.parametrize("is_pushed", [False, True])
+def test_members_of_many_bodies_that_start_again(name: str, method: Any, is_pushed: bool) -> None:
+    def make(device: str) -> sw.World:
+        v, y = many_bodies(66, 3, 3)
+        force = np.random.default_rng(1).normal(size=(66, 3, 3)) if is_pushed else None
+        system = sw.NBody(np.ones(66) / 66, force="newton", softening=np.array([0.1, 0.2, 0.4]))
+        return sw.World(system, method, v=v, y=y, dt=0.01, force=force, device=device)
+
+    both(make, members_of_many, name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("method", ["rk4", "pefrl", velocity_verlet])
+@pytest.mark.parametrize("control", [sw.EnergyControl(0.5), sw.Projection("scaling"), sw.Projection("nacozy")], ids=repr)
+def test_many_bodies_under_a_control(name: str, method: Any, control: Any) -> None:
+    def make(device: str) -> sw.World:
+        v, y = many_bodies(64, 2)
+        return sw.World(sw.NBody(np.ones(64) / 64, softening=0.125), method, v=v, y=y, dt=0.01, control=control, device=device)
+
+    both(make, steps_of_many, name)
+
+
+def test_many_bodies_keep_their_arrays_on_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A call of step makes no arrays of bodies there, and asks for no force that is known."""
+    from stepwell.device import bodies, opencl
+
+    v, y = many_bodies(70, 2)
+    world = sw.World(sw.NBody(np.ones(70) / 70), velocity_verlet, v=v, y=y, dt=0.01, device="opencl")
+    world.step(2)
+    sizes: list[int] = []
+    room, put, call = opencl.Machine.room, opencl.Machine.put, bodies._Run.call
+    kernels: list[str] = []
+    monkeypatch.setattr(opencl.Machine, "room", lambda self, size: sizes.append(size) or room(self, size))
+    monkeypatch.setattr(opencl.Machine, "put", lambda self, array: sizes.append(array.nbytes) or put(self, array))
+    monkeypatch.setattr(bodies._Run, "call", lambda self, name, *rest: kernels.append(name) or call(self, name, *rest))
+    world.step(1)
+    assert kernels.count("pairs") == 1
+    assert all(size <= 8 for size in sizes)
+    world.y[0] += 0.5
+    world.step(1)
+    assert kernels.count("pairs") == 3
+
+
+def test_many_bodies_in_pieces_and_copies() -> None:
+    v, y = many_bodies(64, 3)
+    world = sw.World(sw.NBody(np.ones(64) / 64), "verlet", v=v, y=y, dt=0.01, device="opencl")
+    world.step(3)
+    twin, other = copy.deepcopy(world), pickle.loads(pickle.dumps(world))
+    for each in (world, twin, other):
+        each.step(4)
+    start = dict(zip("vy", many_bodies(64, 3), strict=True))
+    run = sw.integrate(sw.NBody(np.ones(64) / 64), "verlet", dt=0.01, steps=7, **start)
+    for each in (world, twin, other):
+        np.testing.assert_array_equal(each.y, run.y[-1])
+        np.testing.assert_array_equal(each.v, run.v[-1])
+
+
+def test_what_many_bodies_do_not_have_is_refused_before_any_step() -> None:
+    v, y = many_bodies(100, 2)
+    floor = sw.Floor(normal=[0.0, 1.0], offset=-9.0)
+    with pytest.raises(UnsupportedError, match="device: runs of many bodies have surfaces on device='cpu' only"):
+        sw.World(sw.NBody(np.ones(100), floor=floor), "leapfrog", v=v, y=y, dt=0.01, device="opencl")

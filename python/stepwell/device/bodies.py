@@ -93,8 +93,11 @@ class Bodies:
         stages: the stages of the method, by name.
         program: their kernels.
         control: what keeps the energy, or None.
+        sizes: how many numbers of a member v and y have, the method keeps, a controller remembers.
+        carries: whether the method has a carry instead of v.
         blocks: blocks by name, each from its first use on.
         pace: how many pairs a launch has.
+        known: the places for which a run has left the forces with which the next step begins, or None.
     """
 
     def __init__(self, machine: Machine, plan: Any) -> None:
@@ -116,6 +119,8 @@ class Bodies:
         self.state = results["step"]
         self.all, self.dim = system.y_shape
         self.of_member = self.all * self.dim
+        self.sizes = {"v": self.of_member, "y": self.of_member, "kept": plan.slot_numbers - self.of_member, "memory": 0}
+        self.carries = method.carry is not None
         self.count = self.members * self.of_member
         with_energies = self.control is not None or "energy" in plan.record
         text = forces.text_of(self.dim, system.force, energies=with_energies)
@@ -146,6 +151,7 @@ class Bodies:
         self.energies, self.tallies = room(each * forces.SUMS), room(each)
         self.blocks: dict[str, Any] = {}
         self.pace = FIRST_LAUNCH
+        self.known: Array | None = None
         named = {name: value for name, value in system.parameters(plan.batch) if isinstance(value, np.ndarray)}
         if plan.force is not None:
             named[FORCE] = rows(np.asarray(plan.force, np.float64), plan.batch, 2)
@@ -153,7 +159,7 @@ class Bodies:
 
     def take(self, numbers: dict[str, Array]) -> None:
         """Take the rows of the parameters, and of a force, if there is one."""
-        put, h = self.machine.put, self.plan.dt
+        put, h, self.known = self.machine.put, self.plan.dt, None
         every = {name: self._wide(value) for name, value in numbers.items()}
         strengths = h * every["strength"][:, self.massive]
         self.strengths = put(np.ascontiguousarray(np.concatenate([strengths, strengths], axis=1)))
@@ -189,11 +195,15 @@ class _Run:
         parts = [arrays.v[at : at + of_member] for at in range(0, len(arrays.v), of_member)]
         for name, part in zip(["v", *bodies.state[2:]], parts, strict=False):
             self.machine.set(bodies.room(name), bodies.block(part))
-        self.machine.set(bodies.room("y"), bodies.block(arrays.y))
+        places = bodies.block(arrays.y)
+        self.machine.set(bodies.room("y"), places)
         self.machine.set(bodies.tallies, np.zeros(bodies.members))
         self.bad = self.machine.put(np.ascontiguousarray(arrays.first_bad, np.int64))
         self.doubt = self.machine.put(np.zeros(1, np.int32))
-        self.fresh = False  # whether h·v̇ at the places of the state is known
+        #: Whether h·v̇ at the places of the state is known, and whether its velocities are.
+        self.fresh = bodies.known is not None and bodies.known.tobytes() == places.tobytes()
+        self.finished = False
+        self.looks = bool((arrays.first_bad < 0).any())
         self.pending, self.began, self.rested = 0, time.perf_counter(), False
 
     def call(self, name: str, size: int, *arguments: Any) -> None:
@@ -211,7 +221,7 @@ class _Run:
         done = 0
         while done < plan.steps:
             until = plan.steps if plan.every is None else min(plan.steps, (done // plan.every + 1) * plan.every)
-            before = {name: self.copy(self.blocks[name]) for name in self.bodies.state}
+            before = {name: self.copy(self.blocks[name]) for name in self.bodies.state if self.looks}
             tallies = self.copy(self.bodies.tallies)
             first, self.rested = done, False
             while done < until and not self.rested:
@@ -236,6 +246,8 @@ class _Run:
 
     def check(self, first: int, done: int, before: dict[str, Any], tallies: Any, *, saves: bool) -> None:
         """Find where members diverged in these steps, which are made again if some did."""
+        if not self.looks:
+            return
         carries = "finish" in self.stages
         most = HUGE * min(abs(self.plan.dt), 1.0) if carries else np.inf
         for name in ("v", "y"):
@@ -249,7 +261,7 @@ class _Run:
             return
         self.blocks.update(before)
         self.machine.copy(self.bodies.tallies, tallies)
-        self.fresh = False
+        self.fresh = self.finished = False
         if first and carries:  # those at the end of the steps before were not computed
             self.stage("finish")
             self.mark("w", first)
@@ -302,6 +314,9 @@ class _Run:
     def stage(self, name: str, wells: str = "") -> None:
         """Make a stage; with the evaluation of this name potentials are found."""
         bodies, stage = self.bodies, self.stages[name]
+        if name == "finish" and self.finished:
+            return
+        self.finished = name == "finish"
         of_all = np.int64(bodies.count), np.float64(self.plan.dt)
         for each in stage.passes:
             if each.asks and name == "step" and self.fresh and each.asks == stage.first:
@@ -423,6 +438,8 @@ class _Run:
             tallies = np.empty(self.bodies.members)
             self.machine.get(tallies, self.bodies.tallies)
             arrays.tally[...] = tallies
+        last = arrays.saved_y[-1].reshape(self.bodies.of_member, self.bodies.members)
+        self.bodies.known = self.bodies.block(last) if self.fresh else None
         if arrays.carry is None:
             return
         names = ["v", *self.bodies.state[2:]]

@@ -1,7 +1,7 @@
 """The loop of a world on a device: as ``_core.World``, with arrays that stay in the memory of the host.
 
 Each call of ``step`` takes the state to the device, makes its steps there, and brings the state back. What the system is made of
-goes there again only after it has changed.
+goes there again only after it has changed; many bodies keep the arrays of their steps there, too.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from ..base import checks
 from ..base.arrays import Array
 from ..errors import ArgumentError, BusyError, UnsupportedError
 from ..model.around import FORCE
-from . import fixed
+from . import bodies, fixed
 from .opencl import Machine
-from .stages import Numbers
+from .stages import Numbers, Stages
 
 
 class Live(NamedTuple):
@@ -62,10 +62,13 @@ class World:
         self._names: list[str] | None = None
         self._live: list[Live] = []
         self._waits = False
-        self._numbers: Numbers | None = None
-        self._stages = stages = fixed.text_of(model, self._v.dtype == np.float32, plan.choice)[0]
-        sizes = stages.sizes
-        self._carries = stages.carries or sizes["kept"] > 0
+        self._numbers: Numbers | bodies.Bodies | None = None
+        if bodies.takes(model, plan):
+            self._on_device: Stages | bodies.Bodies = bodies.Bodies(self._machine, plan)
+        else:
+            self._on_device = fixed.text_of(model, self._v.dtype == np.float32, plan.choice)[0]
+        self._sizes = sizes = self._on_device.sizes
+        self._carries = self._on_device.carries or sizes["kept"] > 0
         self._memory = sizes["memory"]
         #: The v slot and what is kept, by rows; and the arrays as last written, if they belong to it.
         self._held = np.zeros((sizes["v"] + sizes["kept"], self._members), self._v.dtype)
@@ -76,14 +79,29 @@ class World:
         """The rows of a model, which may be those of the caller's arrays."""
         return [np.array(each) for each in model.rows]
 
-    def _place(self, name: str) -> int:
-        """The number of the array of this name among those of the model."""
+    def _of_rows(self) -> list[str]:
+        """The names of the arrays of the model, in order."""
         if self._names is None:
             plan = self._plan
             parameters = plan.system.parameters(plan.batch, series=plan.method.has_derivatives, single=plan.single)
             self._names = [each for each, value in parameters if isinstance(value, np.ndarray)]
             self._names += [FORCE] * (self._force is not None)
-        return self._names.index(name)
+        return self._names
+
+    def _place(self, name: str) -> int:
+        """The number of the array of this name among those of the model."""
+        return self._of_rows().index(name)
+
+    def _of_now(self) -> Numbers | bodies.Bodies:
+        """What the system is made of, on the device."""
+        if self._numbers is None:
+            if isinstance(self._on_device, bodies.Bodies):
+                self._on_device.take(dict(zip(self._of_rows(), self._rows, strict=True)))
+                self._numbers = self._on_device
+            else:
+                model = SimpleNamespace(rows=self._rows, tables=self._model.tables)
+                self._numbers = Numbers(self._machine, self._on_device, model, self._members, self._dt)
+        return self._numbers
 
     def step(self, n: int = 1) -> None:
         """``n`` steps, in place."""
@@ -103,11 +121,8 @@ class World:
 
     def _made(self, n: int, *, carried: bool) -> tuple[Array, Array, Array]:
         """The state after n steps, and what is held then."""
-        members, stages, kind = self._members, self._stages, self._v.dtype
-        model = SimpleNamespace(rows=self._rows, tables=self._model.tables)
-        if self._numbers is None:
-            self._numbers = Numbers(self._machine, stages, model, members, self._dt)
-        n_v, n_y = stages.sizes["v"], stages.sizes["y"]
+        members, kind, numbers = self._members, self._v.dtype, self._of_now()
+        n_v, n_y = self._sizes["v"], self._sizes["y"]
         kept = self._held[n_v:] if carried else self._held[len(self._held) - self._memory :]
         v = self._held[:n_v] if carried else self._v.reshape(n_v, members)
         saved_v, saved_y = np.empty((1, n_v, members), kind), np.empty((1, n_y, members), kind)
@@ -119,7 +134,10 @@ class World:
         )  # fmt: skip
         # Without steps the state is saved as it is at the start.
         plan = self._plan._replace(first=self._step, steps=n, every=None if n else 1, progress=None)
-        fixed.run(self._machine, self._model, plan, arrays, self._numbers)
+        if isinstance(numbers, bodies.Bodies):
+            bodies.run(self._machine, plan, arrays, numbers)
+        else:
+            fixed.run(self._machine, self._model, plan, arrays, numbers)
         return saved_v.reshape(-1), saved_y.reshape(-1), held
 
     def _is_moved(self) -> bool:
