@@ -10,7 +10,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.studies.sweeps import ensemble
-from support.devices import NAMES, needs_device
+from support.devices import NAMES, assert_alike, needs_device
 
 pytest.importorskip("xarray")
 
@@ -55,13 +55,6 @@ CASES: dict[str, dict[str, Any]] = {
 }
 
 
-def alike(one: Any, other: Any) -> bool:
-    """Whether two sweeps have the same results."""
-    assert list(one.data_vars) == list(other.data_vars)
-    same = all(np.array_equal(one[name], other[name], equal_nan=one[name].dtype.kind == "f") for name in one.data_vars)
-    return same and bool(one.attrs["bits"] == other.attrs["bits"])
-
-
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("method", ["rk4", "leapfrog"])
@@ -70,7 +63,7 @@ def test_a_device_has_the_bits_of_the_cpu(name: str, case: str, method: str) -> 
     if method == "leapfrog" and options["outcomes"] == ["lyapunov", "last"]:
         options["outcomes"] = "last"  # a method with a carry has no exponents
     system = swinging if method == "leapfrog" else driven
-    assert alike(sw.sweep(system, AXES, method, **options), sw.sweep(system, AXES, method, device=name, **options))
+    assert_alike(sw.sweep(system, AXES, method, **options), sw.sweep(system, AXES, method, device=name, **options))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -78,14 +71,14 @@ def test_in_chunks_and_pieces_and_threads(name: str) -> None:
     options: dict[str, Any] = {"v": 0.3, "dt": 0.02, "steps": 70, "outcomes": ["mean", "extremes", "period"]}
     whole = sw.sweep(driven, AXES, "rk4", **options)
     for more in ({"chunk": 7}, {"memory": 1e5}, {"chunk": 9, "threads": 3}):
-        assert alike(whole, sw.sweep(driven, AXES, "rk4", device=name, **more, **options))
+        assert_alike(whole, sw.sweep(driven, AXES, "rk4", device=name, **more, **options))
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_steps_of_each_member(name: str) -> None:
     axes = {"omega": ("run", [1.0, 2.0, 4.0]), "dt": ("run", [0.01, 0.02, 0.04])}
     options: dict[str, Any] = {"v": 0.0, "y": 1.0, "steps": 50, "outcomes": ["last", "extremes"]}
-    assert alike(sw.sweep(sw.Oscillator, axes, "rk4", **options), sw.sweep(sw.Oscillator, axes, "rk4", device=name, **options))
+    assert_alike(sw.sweep(sw.Oscillator, axes, "rk4", **options), sw.sweep(sw.Oscillator, axes, "rk4", device=name, **options))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -102,7 +95,7 @@ def test_members_that_diverge(name: str) -> None:
             warnings.simplefilter("always")
             results.append(sw.sweep(explodes, axes, "rk4", device=device, **options))
         said.append([str(each.message) for each in caught])
-    assert alike(*results)
+    assert_alike(*results)
     assert said[0] == said[1]
     assert "diverged" in said[0][0]
 

@@ -46,6 +46,18 @@ def test_means(observe: int) -> None:
         np.testing.assert_allclose(dataset[f"{name}_mean"], sums, atol=2 * 400 * 2**-53 * abs(values).max())
 
 
+@pytest.mark.parametrize("memory", [None, 2e4])
+def test_a_first_passage_without_a_time_stays_the_first(memory: float | None) -> None:
+    """From −∞ to ∞ there is no time of a passage, and a later one is not the first, wherever pieces end."""
+
+    def jumps(t: Any, v: Any, y: Any) -> Any:
+        return np.select([t < 1.0, t < 2.0, t < 3.0], [-np.inf, np.inf, -1.0], 1.0) + 0.0 * y
+
+    options: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.01, "steps": 400, "memory": memory}
+    found = sw.sweep(Oscillator, {"omega": [1.0, 2.0]}, "rk4", outcomes=sw.sweeps.Crossing(jumps), **options)
+    assert np.isnan(found.jumps_crossing).all()
+
+
 def mean_of(t: Any, values: Any) -> Any:
     """The trapezoidal rule, state after state."""
     total = np.zeros(values.shape[1:], values.dtype)

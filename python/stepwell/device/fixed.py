@@ -13,6 +13,8 @@ from .. import _core
 from ..base.arrays import Array
 from . import bodies, promise
 from .opencl import Machine
+from .reductions import ARGUMENTS as OF_AN_OBSERVER
+from .reductions import Observer
 from .stages import ARGUMENTS, Numbers, Stages, wide
 
 #: A launch takes about so long, in seconds: a desktop's watchdog ends longer ones, and Ctrl-C waits for one.
@@ -32,19 +34,19 @@ _TEXTS: OrderedDict[Any, tuple[Stages, str]] = OrderedDict()
 
 
 class Launch(NamedTuple):
-    """Some intervals of steps, after each of which the state is saved, or not."""
+    """Some intervals of steps, after each of which the state is saved, or observed, or not."""
 
     intervals: int
     length: int
     saves: bool
 
 
-def text_of(model: Any, single: bool, choice: int) -> tuple[Stages, str]:
+def text_of(model: Any, single: bool, choice: int, observer: Observer | None = None) -> tuple[Stages, str]:
     """The stages of a model, and the kernels of a run of fixed steps."""
-    key = _core.tape_number(model, choice=choice), single
+    key = _core.tape_number(model, choice=choice), single, None if observer is None else observer.key
     if key not in _TEXTS:
         stages = Stages(model, single=single, choice=choice)
-        _TEXTS[key] = stages, _kernels(stages)
+        _TEXTS[key] = stages, _kernels(stages, observer)
         while len(_TEXTS) > MOST_TEXTS:
             _TEXTS.popitem(last=False)
     return _TEXTS[key]
@@ -62,7 +64,7 @@ def run(machine: Machine, model: Any, plan: Any, arrays: Any, numbers: Numbers |
     members = arrays.first_bad.size
     if members == 0:
         return False
-    stages, text = text_of(model, single, plan.choice)
+    stages, text = text_of(model, single, plan.choice, plan.observer)
     program = machine.program(text)
     with program.lock:
         return _Run(machine, program, stages, plan, arrays, numbers or Numbers(machine, stages, model, members, plan.dt)).make()
@@ -88,6 +90,11 @@ class _Run:
         self.now, self.next = machine.put(before), machine.room(before.nbytes)
         self.bad = machine.put(np.ascontiguousarray(arrays.first_bad, np.int64))
         self.saved = [machine.room(0)] * 3
+        #: What reduces the states after every so many steps; without one they are saved.
+        self.observer: Observer | None = plan.observer
+        self.every, self.reduced, self.last_t = plan.every, machine.room(0), np.nan
+        if self.observer is not None:
+            self.every, self.reduced = self.observer.every, machine.room(8 * self.observer.size * members)
         self.group = 64 if members >= 64 else 1
         self.size = -(-members // self.group) * self.group
         self.table = machine.room(0)
@@ -108,7 +115,7 @@ class _Run:
         if not arrays.carried and "start" in self.stages.texts:
             self.call("start", self.size, *self.numbers.arguments, np.int64(plan.first), *of_time, self.now)
         at = 0
-        if plan.every is not None:
+        if self.every is not None:
             self.steps(Launch(1, 0, True), 0)
             at = self.read(0, 1)
         done, began = 0, time.perf_counter()
@@ -132,10 +139,10 @@ class _Run:
         """The launches of the run, each about as long as it may be."""
         plan, sizes = self.plan, self.stages.sizes
         each = (sizes["v"] + sizes["y"] + sizes["recorded"]) * self.members * self.bytes
-        at_once = max(1, min(MOST_SAVED, self.machine.largest) // max(1, each))
+        at_once = max(1, min(MOST_SAVED, self.machine.largest) // max(1, each)) if self.observer is None else plan.steps
         left = plan.steps
         while left:
-            every = min(left, plan.every or plan.steps)
+            every = min(left, self.every or plan.steps)
             if every <= self.pace:
                 intervals = max(1, min(self.pace // every, at_once, left // every))
                 yield Launch(intervals, every, True)
@@ -159,7 +166,7 @@ class _Run:
         if launch.saves:
             rows = (sizes["v"], sizes["y"], sizes["recorded"])
             self.saved = [
-                self.room(buffer, launch.intervals * n * self.members * self.bytes)
+                self.room(buffer, (launch.intervals if self.observer is None else 1) * n * self.members * self.bytes)
                 for buffer, n in zip(self.saved, rows, strict=True)
             ]
         most = (HUGE_SINGLE if self.stages.single else HUGE) * min(abs(plan.dt), 1.0)
@@ -167,16 +174,34 @@ class _Run:
         since = np.int32(done > 0)
         self.call(
             "steps", self.size, *self.numbers.arguments, *counts, *of_time, since, self.kind(most), self.table,
-            self.now, self.next, *self.saved, self.bad,
+            self.now, self.next, *self.saved, self.bad, *self.of_observer(),
         )  # fmt: skip
+        if launch.saves:
+            self.last_t = plan.t0 + (first + count) * plan.dt
         self.now, self.next = self.next, self.now
+
+    def of_observer(self) -> tuple[Any, ...]:
+        """What the steps take last if they observe."""
+        if self.observer is None:
+            return ()
+        return np.int32(not np.isnan(self.last_t)), np.float64(self.last_t), self.reduced
 
     def room(self, buffer: Any, size: int) -> Any:
         """A buffer that has so many bytes, this one if it has."""
         return buffer if buffer.size >= size else self.machine.room(size)
 
     def read(self, at: int, count: int) -> int:
-        """Take saved states from the device, from the ``at``-th on; returns the number of the next."""
+        """Take saved states from the device, from the ``at``-th on; returns the number of the next.
+
+        Of observed states only the last one is taken, at the end.
+        """
+        if self.observer is not None:
+            return 0
+        self.take(at, count)
+        return at + count
+
+    def take(self, at: int, count: int) -> None:
+        """Take so many saved states from the device."""
         arrays = self.arrays
         n_v = self.stages.sizes["v"]
         for to, buffer, n in zip(
@@ -192,7 +217,6 @@ class _Run:
                 taken: Array = np.empty(rows.shape, self.kind)
                 self.machine.get(taken, buffer)
                 rows[...] = taken
-        return at + count
 
     def finish(self) -> None:
         """Take from the device what is left there at the end."""
@@ -200,6 +224,11 @@ class _Run:
         bad = np.empty(self.members, np.int64)
         self.machine.get(bad, self.bad)
         arrays.first_bad[...] = bad
+        if self.observer is not None:
+            self.take(0, 1)
+            reduced = np.empty((self.observer.results, self.members))
+            self.machine.get(reduced, self.reduced)
+            self.observer.take(reduced)
         if arrays.carry is None and arrays.tally is None:
             return
         last = np.empty((self.state, self.members), self.kind)
@@ -212,7 +241,7 @@ class _Run:
             arrays.tally[...] = last[behind + sizes["kept"] :].reshape(arrays.tally.shape)
 
 
-def _kernels(stages: Stages) -> str:
+def _kernels(stages: Stages, observer: Observer | None) -> str:
     """The text of all kernels of a run."""
     sizes, texts = stages.sizes, stages.texts
     n_v, n_y = sizes["v"], sizes["y"]
@@ -268,16 +297,22 @@ def _kernels(stages: Stages) -> str:
         save += [*(f"w{i} = {finish.results[i]};" for i in range(n_v)), "}"]
         words = " && ".join(f"fabs(w{i}) < INFINITY" for i in range(n_v)) or "1"
         save += [f"if (k > first - since && !({words})) doubt = 1;"]
-    save += [f"saved_v[(at * {n_v} + {i}) * members + g] = {shown[i]};" for i in range(n_v)]
-    save += [f"saved_y[(at * {n_y} + {i}) * members + g] = {shown[n_v + i]};" for i in range(n_y)]
+    keep = [f"saved_v[(at * {n_v} + {i}) * members + g] = {shown[i]};" for i in range(n_v)]
+    keep += [f"saved_y[(at * {n_y} + {i}) * members + g] = {shown[n_v + i]};" for i in range(n_y)]
+    if "record" in texts or observer is not None:
+        save += [f"const real q{i} = {text};" for i, text in enumerate(shown)]
     if "record" in texts:
         # The quantities of what is saved.
-        names = [f"const real q{i} = {text};" for i, text in enumerate(shown)]
+        results = texts["record"].results[slots:]
         inner = [f"const real s{i} = q{i};" for i in range(slots)]
-        recorded = texts["record"].results[slots:]
-        save += ["{", *names, "{", *inner, *beside("record", "0")]
-        save += [f"recorded[(at * {sizes['recorded']} + {i}) * members + g] = {text};" for i, text in enumerate(recorded)]
-        save += ["}", "}"]
+        save += [*(f"real r{i};" for i in range(len(results))), "{", *inner, *beside("record", "0")]
+        save += [*(f"r{i} = {text};" for i, text in enumerate(results)), "}"]
+        keep += [f"recorded[(at * {len(results)} + {i}) * members + g] = r{i};" for i in range(len(results))]
+    if observer is None:
+        save += ["const long at = i;", *keep]
+    else:
+        save += ["const double seen_t = t0 + (double)k * h;", *observer.see()]
+        save += ["if (i + 1 == intervals) {", "const long at = 0;", *keep, "}"]  # the last one is taken from the device
     look_up = []
     for i, (kind, _) in enumerate(step.entries):
         value = f"table[(k - first) * {entries} + {i}]"
@@ -288,12 +323,14 @@ def _kernels(stages: Stages) -> str:
         f"__kernel void steps({ARGUMENTS}, const long first, const long intervals, const long length, const int saves, "
         "const double t0, const double h, const int since, const real most, __global const bits *restrict table, "
         "__global const real *restrict state, __global real *restrict next, __global real *restrict saved_v, "
-        "__global real *restrict saved_y, __global real *restrict recorded, __global long *restrict bad) {",
+        "__global real *restrict saved_y, __global real *restrict recorded, __global long *restrict bad"
+        f"{'' if observer is None else f', {OF_AN_OBSERVER}'}) {{",
         "const long g = get_global_id(0);",
         "if (g >= members) return;",
         *(f"real s{i};" for i in range(n)),
         *step.member,
         "int doubt = 0;",
+        *([] if observer is None else observer.begin()),
         # A second time only where a member diverged, to find at which step.
         "for (int again = 0; again < 2; again++) {",
         *load,
@@ -312,12 +349,12 @@ def _kernels(stages: Stages) -> str:
         "}",
         "}",
         "if (saves && !again) {",
-        "const long at = i;",
         *save,
         "}",
         "}",
         "if (!again) {",
         *(f"next[{i} * members + g] = s{i};" for i in range(n)),
+        *([] if observer is None else observer.end()),
         f"if (bad[g] >= 0 || (!doubt && {small})) return;",
         "}",
         "}",

@@ -39,7 +39,8 @@ class Plan(NamedTuple):
     step must satisfy, and ``backward`` whether the time of the system is the negated time of the run. ``memory`` is what a
     sampled controller remembers at the start, rows of one number for each member. ``lengths`` are the steps of members
     that have their own, shape (*batch), or None; ``dt`` is then 1: the clock of the core counts steps. ``device`` is the machine
-    that makes the steps, of ``devices``, or None for the CPU.
+    that makes the steps, of ``devices``, or None for the CPU. ``observer`` is what becomes of states on a device after so many
+    steps, of ``device.reductions``, or None; ``every`` is then None.
     """
 
     system: System
@@ -66,6 +67,7 @@ class Plan(NamedTuple):
     memory: Array | None = None
     lengths: Array | None = None
     device: Any = None
+    observer: Any = None
 
     def t0_of(self, members: Any) -> Any:
         """The time of step 0 of these members of one batch axis, or of all."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from math import prod
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from ...base.arrays import Array, Whole
 from ...errors import ShapeError
 from ...model.systems import System
 from ...runs.result import Run
-from .observed import Of, Piece, checked, name_of, possible, rates
+from .observed import Observed, Of, Piece, Rows, checked, has_rates, name_of, possible, rates
 from .outcomes import ReducedOutcome, Reduction, Results, Variable, called
 
 if TYPE_CHECKING:
@@ -46,6 +47,16 @@ class _Passages(ReducedOutcome):
                     f"but {self.of} has the shape {shape}"
                 )
 
+    def passages(self, rows: Rows, *, has_last: bool) -> Any:
+        """The passages on a device, of ``device.reductions``, or None if it does not have the quantity."""
+        from ...device import reductions
+
+        of = rows.of(self.of)
+        if of is None or len(of) != 1:  # a quantity of several numbers is refused where the states are seen
+            return None
+        states = rows.states if has_rates(self.of) else 0
+        return reductions.Passages(of[0], self.level, self.direction, has_last, states)
+
 
 class Crossing(_Passages):
     """The first time at which a quantity passes a level, ``y_crossing``; NaN if it did not.
@@ -74,6 +85,10 @@ class Crossing(_Passages):
         """A new reduction."""
         return _Crossing(self)
 
+    def on_device(self, rows: Rows) -> Any:
+        """The first passage on a device."""
+        return self.passages(rows, has_last=False)
+
 
 class Period(_Passages):
     """The mean time between passages of a level in one direction, ``y_period``, and their number, ``y_passages``.
@@ -98,11 +113,15 @@ class Period(_Passages):
         """A new reduction."""
         return _Period(self)
 
+    def on_device(self, rows: Rows) -> Any:
+        """The first and the last passage on a device, and their number."""
+        return self.passages(rows, has_last=True)
+
 
 class _State(NamedTuple):
-    """The last observed state: its time, value, and blocks."""
+    """A state, of all members: its time, the value there, and blocks."""
 
-    t: float
+    t: Any
     value: Array
     v: Array
     y: Array
@@ -150,20 +169,44 @@ class _States:
     def times(self, k: Whole, members: Mask) -> Array:
         """The times at which these members pass the level after state k, shape (members,); NaN for the others."""
         each = np.arange(len(k))
-        a, b = self.value[k, each], self.value[k + 1, each]
-        start, length = self.t[k], self.t[k + 1] - self.t[k]
-        slopes = [
-            rates(
-                self.run, self.of, self.t[i], np.moveaxis(self.v[i, ..., each], 0, -1), np.moveaxis(self.y[i, ..., each], 0, -1)
-            )
+        before, after = (
+            _State(self.t[i], self.value[i, each], *(np.moveaxis(block[i, ..., each], 0, -1) for block in (self.v, self.y)))
             for i in (k, k + 1)
-        ]
-        if slopes[0] is None or slopes[1] is None:
-            with np.errstate(all="ignore"):
-                share = a / (a - b)
-        else:
-            share = _root(a, b, slopes[0] * length, slopes[1] * length)
-        return np.where(members, start + share * length, np.nan)
+        )
+        return _times(self.run, self.of, before, after, members)
+
+
+def _times(run: Run, of: Of, before: _State, after: _State, members: Mask) -> Array:
+    """The times at which these members pass the level between two states of each, shape (members,); NaN for the others.
+
+    Values are differences from the level, and times have one number for each member.
+    """
+    start, length = before.t, after.t - before.t
+    slopes = [rates(run, of, state.t, state.v, state.y) for state in (before, after)]
+    if slopes[0] is None or slopes[1] is None:
+        with np.errstate(all="ignore"):
+            share = before.value / (before.value - after.value)
+    else:
+        share = _root(before.value, after.value, slopes[0] * length, slopes[1] * length)
+    return np.where(members, start + share * length, np.nan)
+
+
+def _times_of(observed: Observed, outcome: _Passages, passed: Mask, *, last: bool) -> Array:
+    """The times of the first passages, or of the last ones, that a device has seen."""
+    run, has_states = observed.run, has_rates(outcome.of)
+    n_v, n = prod(run.system.v_shape), prod(run.system.v_shape) + prod(run.system.y_shape)
+    numbers = observed.numbers[1:]
+    numbers = numbers[len(numbers) // 2 :] if last else numbers
+    numbers = np.where(passed, numbers, 0.0)  # there is nothing of the others
+    ends = []
+    for i in range(2):
+        state = numbers[4 + i * n :][: n if has_states else 0]
+        v, y = (
+            block.reshape(*shape, len(passed)) if has_states else block
+            for block, shape in ((state[:n_v], run.system.v_shape), (state[n_v:], run.system.y_shape))
+        )
+        ends.append(_State(numbers[i], numbers[2 + i], v, y))
+    return _times(run, outcome.of, ends[0], ends[1], passed)
 
 
 def _root(a: Array, b: Array, da: Array, db: Array) -> Array:
@@ -190,11 +233,17 @@ class _Crossing(_Seeing):
     def passed(self, states: _States) -> None:
         if self.time is None:
             self.time = np.full(states.value.shape[1:], np.nan)
+            self.is_past = np.zeros(states.value.shape[1:], np.bool_)
         if len(states.mask) == 0:
             return
-        new: Mask = states.mask.any(axis=0) & np.isnan(self.time)
+        passing: Mask = np.asarray(states.mask.any(axis=0))
+        new = passing & ~self.is_past  # its time may be NaN where the rates are not finite
         if new.any():
             self.time = np.where(new, states.times(states.mask.argmax(axis=0), new), self.time)
+        self.is_past |= passing
+
+    def take(self, observed: Observed) -> None:
+        self.time = _times_of(observed, self.outcome, observed.numbers[0] > 0.0, last=False)
 
     def results(self) -> Results:
         name = self.outcome.name
@@ -219,6 +268,10 @@ class _Period(_Seeing):
         self.first = np.where(new, states.times(states.mask.argmax(axis=0), new), self.first) if new.any() else self.first
         self.last = np.where(passing, states.times(len(states.mask) - 1 - states.mask[::-1].argmax(axis=0), passing), self.last)
         self.count = self.count + states.mask.sum(axis=0)
+
+    def take(self, observed: Observed) -> None:
+        self.count = observed.numbers[0].astype(np.int64)
+        self.first, self.last = (_times_of(observed, self.outcome, self.count > 0, last=last) for last in (False, True))
 
     def results(self) -> Results:
         name = self.outcome.name

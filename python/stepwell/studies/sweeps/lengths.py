@@ -52,9 +52,9 @@ class Lengths:
         self._v, self._y, self._carried = request.v, request.y, request.carried
         self._before: Any = None
 
-    def make(self, steps: int, every: int | None, **_: Any) -> Run:
+    def make(self, steps: int, every: int | None, observer: Any = None, **_: Any) -> Run:
         """The next piece."""
-        plan = self._plan._replace(steps=steps, every=every)
+        plan = self._plan._replace(steps=steps, every=every, observer=observer)
         assert plan.lengths is not None
         out = engine.advance(plan, self._v, self._y, self._before, carried=self._carried)
         lengths: Any = plan.lengths

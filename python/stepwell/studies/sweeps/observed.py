@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,6 +60,70 @@ class Piece(NamedTuple):
                     f"members, got {values.shape}"
                 ) from None
         return np.moveaxis(values, -2, 0)
+
+
+class Rows:
+    """The rows of the numbers that a device observes: v, y, then quantities, in the order in which they are asked for.
+
+    Args:
+        system: the system.
+        records: whether the device computes quantities of a state.
+
+    Attributes:
+        names: the quantities that were asked for.
+    """
+
+    def __init__(self, system: System, *, records: bool) -> None:
+        self.system, self._records = system, records
+        self.states = prod(system.v_shape) + prod(system.y_shape)
+        self.names: list[str] = []
+
+    def of(self, what: Of) -> tuple[int, ...] | None:
+        """The rows of a quantity, or None if the device does not have it."""
+        n_v = prod(self.system.v_shape)
+        if callable(what):
+            return None
+        if isinstance(what, tuple):
+            shape = self.system.v_shape if what[0] == "v" else self.system.y_shape
+            return (int(np.ravel_multi_index(what[1:], shape)) + (0 if what[0] == "v" else n_v),)
+        if what in ("v", "y"):
+            first = 0 if what == "v" else n_v
+        elif self._records:
+            self.names += [] if what in self.names else [what]
+            before = self.names[: self.names.index(what)]
+            first = self.states + sum(prod(self.system.quantities[name]) for name in before)
+        else:
+            return None
+        return tuple(range(first, first + prod(shape_of(what, self.system))))
+
+
+class Observed(NamedTuple):
+    """What a device has made of all observed states of a run of a chunk of members.
+
+    Attributes:
+        run: the run, with the last state alone.
+        numbers: the results of a reduction on the device, shape (results, members).
+        begin: the time of the first observed state, or that of each member.
+        end: that of the last one, likewise.
+    """
+
+    run: Run
+    numbers: Array
+    begin: Any
+    end: Any
+
+
+def shape_of(what: Of, system: System) -> Shape:
+    """The own axes of a quantity; of a function's result they are not known before, and ()."""
+    if not isinstance(what, str):
+        return ()
+    shapes: dict[str, Shape] = {"v": system.v_shape, "y": system.y_shape}
+    return shapes[what] if what in shapes else system.quantities[what]
+
+
+def dtype_of(what: Of, run: Run) -> Any:
+    """The type of the numbers of ``Piece.of``."""
+    return run.y.dtype if isinstance(what, tuple) or what in ("v", "y") else np.float64
 
 
 def name_of(what: Of | Callable[..., Any]) -> str:
@@ -123,14 +188,19 @@ def block_dims(system: System, block: str) -> tuple[str, ...]:
     return (stem,) if len(shape) == 1 else tuple(f"{stem}_{i}" for i in range(len(shape)))
 
 
+def has_rates(what: Of) -> bool:
+    """Whether the rate of change of a quantity is one of the system: of v, y, or a component."""
+    return isinstance(what, tuple) or what in ("v", "y")
+
+
 def rates(run: Run, what: Of, t: Array, v: Array, y: Array) -> Array | None:
     """The rate of change of v, y, or a component, at states of all members of a run; None for other quantities.
 
     ``t`` has one time for each member, ``v`` and ``y`` have the shape (*block, members).
     """
-    block = what if isinstance(what, str) else what[0] if isinstance(what, tuple) else ""
-    if block not in ("v", "y"):
+    if not has_rates(what):
         return None
+    block = what[0] if isinstance(what, tuple) else what
     with np.errstate(all="ignore"):
         s = run.system.scaled(run.dt, run.status.shape, run.force)
         change = np.asarray((s.dv if block == "v" else s.dy)(t, v, y)) / run.dt

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from math import prod
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from ...base.immutable import ValueEquality
 from ...errors import ArgumentError, ShapeError
 from ...model.systems import System
 from ...runs.result import Run
-from .observed import Of, Piece, block_dims, checked, name_of, possible
+from .observed import Observed, Of, Piece, Rows, block_dims, checked, dtype_of, name_of, possible, shape_of
 
 
 class Variable(NamedTuple):
@@ -62,6 +63,10 @@ class Reduction(ABC):
     def see(self, piece: Piece) -> None:
         """Take the new states of a piece into account."""
 
+    def take(self, observed: Observed) -> None:
+        """Take what a device has made of all states, in place of pieces; it did if the outcome has an ``on_device``."""
+        self.see(Piece(observed.run, 0))
+
     @abstractmethod
     def results(self) -> Results:
         """The results, by name."""
@@ -88,6 +93,10 @@ class ReducedOutcome(Outcome, ABC):
     @abstractmethod
     def begin(self) -> Reduction:
         """A new reduction."""
+
+    def on_device(self, rows: Rows) -> Any:
+        """The same reduction on a device, of ``device.reductions``; None if it needs the states here."""
+        return None
 
 
 def _blocks(system: System) -> tuple[str, ...]:
@@ -150,9 +159,23 @@ class _Several(ReducedOutcome):
         if self.of is not None:
             possible(self.of, system)
 
-    def whats(self, run: Run) -> list[Of]:
+    def whats(self, system: System) -> list[Of]:
         """The quantities that are reduced."""
-        return [*_blocks(run.system)] if self.of is None else [self.of]
+        return [*_blocks(system)] if self.of is None else [self.of]
+
+    def rows(self, rows: Rows) -> tuple[int, ...] | None:
+        """Their rows on a device, or None if it does not have all of them."""
+        of_each = [rows.of(what) for what in self.whats(rows.system)]
+        return None if None in of_each else tuple(row for each in of_each if each is not None for row in each)
+
+    def split(self, observed: Observed, first: int) -> list[Array]:
+        """Results of a device, from the ``first`` on, as one array for each quantity."""
+        arrays, system = [], observed.run.system
+        for what in self.whats(system):
+            shape = shape_of(what, system)
+            arrays.append(observed.numbers[first : first + prod(shape)].reshape(*shape, observed.numbers.shape[1]))
+            first += prod(shape)
+        return arrays
 
 
 class Extremes(_Several):
@@ -175,6 +198,13 @@ class Extremes(_Several):
         """A new reduction."""
         return _Extremes(self)
 
+    def on_device(self, rows: Rows) -> Any:
+        """The same reduction on a device."""
+        from ...device.reductions import Extremes as OnDevice
+
+        of = self.rows(rows)
+        return None if of is None else OnDevice(of)
+
 
 class _Extremes(Reduction):
     def __init__(self, outcome: Extremes) -> None:
@@ -186,16 +216,23 @@ class _Extremes(Reduction):
         self.run = piece.run
         if len(piece.t) == 0:
             return
-        all_of = [piece.of(what) for what in self.outcome.whats(piece.run)]
+        all_of = [piece.of(what) for what in self.outcome.whats(piece.run.system)]
         least, largest = [each.min(axis=0) for each in all_of], [each.max(axis=0) for each in all_of]
         if self.least:
             least = list(map(np.minimum, least, self.least))
             largest = list(map(np.maximum, largest, self.largest))
         self.least, self.largest = least, largest
 
+    def take(self, observed: Observed) -> None:
+        self.run = observed.run
+        each, whats = len(observed.numbers) // 2, self.outcome.whats(observed.run.system)
+        for all_of, first in ((self.least, 0), (self.largest, each)):
+            of_each = zip(whats, self.outcome.split(observed, first), strict=True)
+            all_of += [numbers.astype(dtype_of(what, observed.run)) for what, numbers in of_each]
+
     def results(self) -> Results:
         results = {}
-        for what, least, largest in zip(self.outcome.whats(self.run), self.least, self.largest, strict=True):
+        for what, least, largest in zip(self.outcome.whats(self.run.system), self.least, self.largest, strict=True):
             name, dims = self.outcome.name or name_of(what), _dims(self.run, what, least)
             # Which of −0 and +0 is the least depends on the order of comparisons; adding +0 makes both +0.
             results[f"{name}_min"] = Variable(dims, least + 0.0, f"least {name} of the observed states", _unit(what))
@@ -224,6 +261,13 @@ class Mean(_Several):
         """A new reduction."""
         return _Mean(self)
 
+    def on_device(self, rows: Rows) -> Any:
+        """The same reduction on a device."""
+        from ...device.reductions import Sums
+
+        of = self.rows(rows)
+        return None if of is None else Sums(of)
+
 
 #: The most numbers of states that are summed in one call.
 NUMBERS_AT_ONCE = 1 << 16
@@ -238,7 +282,7 @@ class _Mean(Reduction):
 
     def see(self, piece: Piece) -> None:
         self.run = piece.run
-        all_of = [piece.of(what) for what in self.outcome.whats(piece.run)]
+        all_of = [piece.of(what) for what in self.outcome.whats(piece.run.system)]
         first = 0 if self.before else 1
         if first:
             now = [np.asarray(each[0], np.float64) for each in all_of]
@@ -259,9 +303,13 @@ class _Mean(Reduction):
             self.before[i] = now[-1].copy()
         self.t = float(t[-1])
 
+    def take(self, observed: Observed) -> None:
+        self.run, self.begin, self.t = observed.run, float(observed.begin), float(observed.end)
+        self.sums = self.outcome.split(observed, 0)
+
     def results(self) -> Results:
         time, results = self.t - self.begin, {}
-        for what, total in zip(self.outcome.whats(self.run), self.sums, strict=True):
+        for what, total in zip(self.outcome.whats(self.run.system), self.sums, strict=True):
             name = self.outcome.name or name_of(what)
             results[f"{name}_mean"] = Variable(
                 _dims(self.run, what, total), total / time, f"mean {name} over the time", _unit(what)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from math import gcd, prod
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -32,8 +32,11 @@ from .adaptive import NUMBERS_OF_A_CONTROLLER, Pieces, lost, numbers_of_waypoint
 from .axes import OF_THE_RUN
 from .exponents import Exponents
 from .lengths import Lengths
-from .observed import Piece
+from .observed import Piece, Rows
 from .outcomes import Function, History, Outcome, ReducedOutcome, Results, Variable, together
+
+if TYPE_CHECKING:
+    from .on_device import Observing
 
 #: The most steps times members of a piece of a run, after which a sweep can be stopped.
 MAX_STEPS_OF_MEMBERS = 50_000_000
@@ -186,6 +189,10 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
         system, options = prepared(task, values)
         start = options
         make: Make = partial(quietly, system, task.method)
+        if task.on_device:
+            from . import on_device  # only such sweeps need it
+
+            make = partial(on_device.run, system, task.method)
         if isinstance(dt := options.get("dt"), np.ndarray):
             make = Lengths(system, task.method, options, dt, task.transient + task.steps).make
         for each in _pieces(task, system, make, options, members, task.transient, None, stopped):
@@ -230,6 +237,11 @@ def _reduced(
     """The last piece of the run, and the results of the reductions."""
     between, reductions = task.between, [(each, each.begin()) for each in task.reductions]
     at, last = 0, None
+    if (observing := _observing(task, pieces.system, start)) is not None:
+        last = make(steps=task.steps, every=None, observer=observing.observer, record=observing.names, **start)
+        _as_many(last, members)
+        observing.taken_by(reductions, last)
+        return last, [reduction.results() for _, reduction in reductions]
     if task.at is not None:
         for last in _pieces_between_times(task, pieces, start, members, stopped):
             for _, reduction in reductions:
@@ -244,6 +256,18 @@ def _reduced(
         at, last = steps + (0 if between else 1), each
     assert last is not None
     return last, [reduction.results() for _, reduction in reductions]
+
+
+def _observing(task: Task, system: System, start: dict[str, Any]) -> Observing | None:
+    """What a device does with the states that it observes, or None if they are to be seen here."""
+    if not task.on_device or task.at is not None or "events" in task.options or task.kinds(History):
+        return None
+    from . import on_device
+
+    # In float32, and by a transition matrix, quantities of states are computed later.
+    rows = Rows(system, records=not task.single and not task.method.is_exact)
+    observing = on_device.observing(task.reductions, rows, task.observe)
+    return None if observing is None or on_device.is_of_many_bodies(system, task.method, start) else observing
 
 
 def _thinned(task: Task, outcome: Outcome, piece: Run, first: int, since: int) -> Piece:

@@ -1,0 +1,215 @@
+"""Outcomes of sweeps that a device computes while it makes the steps: the bits of the CPU, and no history crosses the bus."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.device import fixed, opencl
+from stepwell.device.reductions import Extremes, Observer
+from support.devices import NAMES, assert_alike, needs_device
+
+pytest.importorskip("xarray")
+
+pytestmark = needs_device
+
+E, M = sw.sweeps.Extremes, sw.sweeps.Mean
+Crossing, Period = sw.sweeps.Crossing, sw.sweeps.Period
+
+
+@sw.system
+def driven(t: Any, v: Any, y: Any, *, mu: float = 1.0, push: float = 0.3) -> Any:
+    """The oscillator of van der Pol, driven."""
+    return mu * (1.0 - y**2) * v - y + push * np.sin(t)
+
+
+@sw.system
+def swinging(t: Any, v: Any, y: Any, *, mu: float = 1.0, push: float = 0.3) -> Any:
+    """A pendulum, driven, for methods that carry something."""
+    return -mu * np.sin(y) + push * np.sin(t)
+
+
+@sw.system(order=1)
+def lorenz(t: Any, y: Any, *, rho: Any = 28.0) -> Any:
+    return np.array([10.0 * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]])
+
+
+@sw.system(order=1)
+def explodes(t: Any, y: Any, *, rate: float = 1.0) -> Any:
+    return rate * y * y
+
+
+def bodies(mass: Any) -> sw.NBody:
+    """Three bodies in a plane."""
+    return sw.NBody(np.stack([np.ones_like(mass), mass, 0.5 * np.ones_like(mass)]), softening=0.1)
+
+
+MU = {"mu": ("mu", np.linspace(0.5, 4.0, 5)), "y": ("y0", np.linspace(-2.0, 2.0, 13))}
+PLANE: dict[str, Any] = {
+    "v": np.array([[0.0, 0.1], [0.3, 0.0], [0.1, -0.8]]),
+    "y": np.array([[0.0, 0.0], [1.0, 0.2], [-0.6, 1.0]]),
+}
+BODIES = {"mass": ("mass", np.linspace(0.3, 2.0, 9))}
+OMEGA = {"omega": ("omega", np.linspace(0.5, 3.0, 11)), "y": ("y0", np.linspace(-2.0, 2.0, 7))}
+
+#: System, axes, method, further arguments.
+CASES: dict[str, tuple[Any, dict[str, Any], str, dict[str, Any]]] = {
+    "both blocks": (driven, MU, "rk4", {"outcomes": ["extremes", "mean", "last"]}),
+    "one block": (driven, MU, "rk4", {"outcomes": [E("y"), M("v", name="drift")]}),
+    "passages": (driven, MU, "rk4", {"dt": 0.05, "outcomes": [Period(), Crossing("v", 0.1, -1), "extremes"]}),
+    "both ways": (driven, MU, "rk4", {"dt": 0.05, "outcomes": [Period(direction=0), Crossing("y", -1.5, 0), "last"]}),
+    "after a transient": (driven, MU, "rk4", {"transient": 40, "observe": 7, "outcomes": ["extremes", "mean", "period"]}),
+    "a longer interval than the run": (driven, MU, "rk4", {"observe": 5000, "outcomes": ["extremes", "mean", "period"]}),
+    "a method with a carry": (swinging, MU, "leapfrog", {"transient": 3, "observe": 3, "outcomes": ["mean", "period"]}),
+    "another carry": (swinging, MU, "verlet", {"outcomes": ["extremes", "mean", Crossing("v")]}),
+    "components": (lorenz, {"rho": ("rho", np.linspace(10.0, 40.0, 70))}, "rk4", {
+        "y": np.array([1.0, 2.0, 3.0]), "dt": 0.01, "v": None,
+        "outcomes": [E(("y", 2)), M(("y", 0)), M(("y", 1)), Period(("y", 0)), Crossing(("y", 2), 25.0), "last"],
+    }),
+    "a quantity": (sw.Oscillator, OMEGA, "false_euler", {"outcomes": [E("energy"), M("energy"), Crossing("energy", 0.5, 0)]}),
+    "bodies": (bodies, BODIES, "pefrl", {
+        **PLANE, "outcomes": [E("energy"), M("energy"), E(), M(("y", 1, 0)), E("closest"), Period(("y", 2, 1))],
+    }),
+    "under control": (bodies, BODIES, "rk4", {**PLANE, "control": sw.Projection(), "outcomes": [E("energy"), M("energy")]}),
+    "a force": (driven, MU, "rk4", {"force": 0.1, "fused": True, "outcomes": ["mean", "extremes"]}),
+    "float32": (driven, MU, "rk4", {"dtype": "float32", "transient": 10, "outcomes": ["last", "extremes", "mean", "period"]}),
+    "float32, fused": (driven, MU, "rk4", {"dtype": "float32", "fused": True, "observe": 3, "outcomes": ["mean", "crossing"]}),
+    "exact steps": (sw.Oscillator, OMEGA, "exact", {"outcomes": ["mean", "extremes", "period"]}),
+    "with a function": (driven, MU, "rk4", {"steps": 30, "every": 10, "outcomes": ["mean", lambda run: {"first": run.y[0]}]}),
+    "with exponents": (driven, MU, "rk4", {"steps": 40, "outcomes": ["mean", "lyapunov"]}),
+}  # fmt: skip
+
+
+@pytest.fixture
+def bus(monkeypatch: Any) -> list[int]:
+    """The sizes of all arrays that are taken from devices from now on."""
+    sizes: list[int] = []
+    before = opencl.Machine.get
+
+    def get(self: Any, array: Any, buffer: Any, offset: int = 0) -> None:
+        sizes.append(array.nbytes)
+        before(self, array, buffer, offset)
+
+    monkeypatch.setattr(opencl.Machine, "get", get)
+    return sizes
+
+
+def both(name: str, system: Any, axes: Any, method: str, **options: Any) -> tuple[Any, Any]:
+    """The sweep by the CPU and by a device, which warn of the same."""
+    results, said = [], []
+    for device in ("cpu", name):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            results.append(sw.sweep(system, axes, method, device=device, **options))
+        said.append([str(each.message) for each in caught])
+    assert said[0] == said[1]
+    return results[0], results[1]
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("case", CASES)
+def test_the_bits_are_those_of_the_cpu(name: str, case: str, bus: list[int]) -> None:
+    system, axes, method, options = CASES[case]
+    options = {"dt": 0.02, "v": 0.3, "steps": 800} | options
+    cpu, device = both(name, system, axes, method, **{key: value for key, value in options.items() if value is not None})
+    assert_alike(cpu, device)
+    members = cpu["status"].size
+    states = 1 + ("transient" in options) + ("every" in options) * 4
+    assert sum(bus) / 8 < members * (100 + 24 * states), "histories would be 1600 numbers of each member, or more"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_comes_back_does_not_grow_with_the_run(name: str, bus: list[int]) -> None:
+    """Of n numbers of a state come back the state, a last step that was bad, and 2n, n, 5 + 2n and 9 + 4n of the outcomes."""
+    sizes, outcomes = [], ["extremes", "mean", Crossing(("y", 0)), Period(("y", 1))]
+    axes = {"rho": ("rho", np.linspace(10.0, 40.0, 70))}
+    for steps in (10, 1000):
+        bus.clear()
+        sw.sweep(lorenz, axes, "rk4", y=1.0, dt=0.01, steps=steps, outcomes=outcomes, device=name)
+        sizes.append(sum(bus))
+    assert sizes[0] == sizes[1] == 8 * 70 * (3 + 1 + 6 + 3 + 11 + 21)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_must_see_the_states_sees_them(name: str, bus: list[int]) -> None:
+    """A history, a function of Python, events, quantities in float32: saved states cross the bus, with the same results."""
+    plain: dict[str, Any] = {"v": 0.3, "dt": 0.02, "steps": 300}
+    outcomes: list[dict[str, Any]] = [
+        {"outcomes": ["mean", "history"], "every": 10},
+        {"outcomes": ["extremes", M(lambda t, v, y: v * y, name="power")]},
+        {"outcomes": "extremes", "events": sw.Event(lambda t, v, y: y, name="ground")},
+        {"outcomes": ["extremes", E("energy")], "dtype": "float32"},
+    ]
+    for each in outcomes:
+        bus.clear()
+        system = sw.Oscillator if "dtype" in each else driven
+        cpu, device = both(name, system, OMEGA if "dtype" in each else MU, "rk4", **plain, **each)
+        assert_alike(cpu, device)
+        assert sum(bus) > 8 * 300
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_launches_and_chunks(name: str, monkeypatch: Any) -> None:
+    """Where launches end makes no difference: within an interval, at its end, behind several."""
+    options: dict[str, Any] = {"v": 0.3, "dt": 0.02, "steps": 205, "transient": 2, "observe": 6}
+    outcomes: Any = ["mean", "extremes", "period", Crossing("v", 0.1, -1)]
+    for method, system in (("rk4", driven), ("leapfrog", swinging)):
+        cpu = sw.sweep(system, MU, method, outcomes=outcomes, **options)
+        for most in (1, 4, 6, 7, 40):
+            monkeypatch.setattr(fixed, "MOST_STEPS", most)
+            assert_alike(cpu, sw.sweep(system, MU, method, outcomes=outcomes, device=name, **options))
+        monkeypatch.undo()
+        for more in ({"chunk": 7}, {"memory": 1e5}, {"chunk": 9, "threads": 3}):
+            assert_alike(cpu, sw.sweep(system, MU, method, outcomes=outcomes, device=name, **more, **options))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize("method", ["rk4", "leapfrog", "verlet"])
+def test_members_that_diverge(name: str, dtype: str, method: str, bus: list[int]) -> None:
+    """States that are not finite are in the extremes and means, also where only velocities are not; and zeros have one sign."""
+    axes = {"omega": ("omega", np.geomspace(0.5, 3000.0, 40)), "y": ("y0", [0.0, -0.0, 1.0])}
+    outcomes = ["extremes", "mean", "period", "last"]
+    options: dict[str, Any] = {"v": 0.0, "dt": 0.01, "steps": 700, "transient": 20, "observe": 50, "outcomes": outcomes}
+    cpu, device = both(name, sw.Oscillator, axes, method, dtype=dtype, **options)
+    assert_alike(cpu, device)
+    assert 0 < int((cpu.status > 0).sum()) < cpu.status.size
+    assert bool(np.isnan(cpu.y_mean).any())
+    both_now, both_device = both(
+        name, explodes, {"rate": [0.1, 3.0, 0.2, 9.0]}, "rk4", y=1.0, dt=0.1, steps=200, outcomes=outcomes
+    )
+    assert_alike(both_now, both_device)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_steps_of_each_member(name: str, bus: list[int]) -> None:
+    axes = {"omega": ("run", [1.0, 2.0, 4.0]), "dt": ("run", [0.01, 0.02, 0.04])}
+    for method in ("rk4", "verlet"):
+        bus.clear()
+        cpu, device = both(name, sw.Oscillator, axes, method, v=0.0, y=1.0, steps=500, transient=7, outcomes=["last", "extremes"])
+        assert_alike(cpu, device)
+        assert sum(bus) < 8 * 3 * 40
+        cpu, device = both(name, sw.Oscillator, axes, method, v=0.0, y=1.0, steps=500, transient=7, outcomes=["mean", "period"])
+        assert_alike(cpu, device)
+
+
+def test_a_number_that_was_not_a_number_stays_one() -> None:
+    """As of ``np.minimum``; the text is that of C."""
+    lines = "\n".join(Observer(1, (Extremes((0,)),), 1).see())
+    assert "if (q0 < o0 || q0 != q0) o0 = q0;" in lines
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_many_bodies_are_seen_as_before(name: str) -> None:
+    rng = np.random.default_rng(4)
+    options: dict[str, Any] = {"v": rng.normal(size=(64, 2)), "y": rng.normal(size=(64, 2)), "dt": 0.001, "steps": 3}
+
+    def many(strength: float) -> sw.NBody:
+        return sw.NBody(np.ones(64), G=strength, softening=0.1)
+
+    axes = {"strength": ("strength", [0.5, 1.0])}
+    cpu, device = both(name, many, axes, "leapfrog", outcomes=["extremes", "mean"], **options)
+    assert_alike(cpu, device)
