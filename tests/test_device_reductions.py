@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.device import fixed, opencl
+from stepwell.device import adaptive, fixed, opencl
 from stepwell.device.reductions import Extremes, Observer
 from support.devices import NAMES, assert_alike, needs_device
 
@@ -194,6 +194,54 @@ def test_steps_of_each_member(name: str, bus: list[int]) -> None:
         assert sum(bus) < 8 * 3 * 40
         cpu, device = both(name, sw.Oscillator, axes, method, v=0.0, y=1.0, steps=500, transient=7, outcomes=["mean", "period"])
         assert_alike(cpu, device)
+
+
+#: Methods and further arguments of sweeps with a tolerance.
+WITH_A_TOLERANCE: dict[str, tuple[str, dict[str, Any]]] = {
+    "merson": ("merson", {}),
+    "dop853, an absolute part": ("dop853", {"tolerance": (1e-8, 1e-6)}),
+    "a series": ("taylor", {"tolerance": 1e-10}),
+    "stiff": ("rodas4", {"tolerance": 1e-5}),
+    "float32": ("merson", {"dtype": "float32", "tolerance": 1e-5}),
+    "backward": ("merson", {"at": -np.linspace(0.0, 0.4, 200)}),
+    "jumps": ("fehlberg", {"jumps": [1.0, 2.5], "max_step": 0.3}),
+    "stopped": ("merson", {"max_steps": 405}),
+    "irregular times": ("merson", {"at": np.array([0.0, 1e-9, 1.0, 1.0000001, 5.0, 11.0])}),
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("case", WITH_A_TOLERANCE)
+def test_with_a_tolerance(name: str, case: str, bus: list[int]) -> None:
+    method, options = WITH_A_TOLERANCE[case]
+    outcomes = ["extremes", "mean", Crossing("v", 0.1, -1), Period(direction=0), "last", "evaluations"]
+    options = {"v": 0.3, "tolerance": 1e-7, "at": np.linspace(0.0, 12.0, 800)} | options
+    cpu, device = both(name, driven, MU, method, outcomes=outcomes, **options)
+    assert_alike(cpu, device)
+    assert case != "stopped" or 0 < int((cpu.status > 0).sum()) < cpu.status.size
+    assert sum(bus) < 8 * 65 * 400 or case in ("backward", "irregular times")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_tolerance_in_shares_and_launches(name: str, monkeypatch: Any) -> None:
+    options: dict[str, Any] = {
+        "v": 0.3,
+        "tolerance": 1e-7,
+        "at": np.linspace(0.5, 12.0, 40),
+        "outcomes": ["mean", "period", "extremes"],
+    }
+    cpu = sw.sweep(driven, MU, "merson", **options)
+    for attempts, saved in ((1, 1 << 14), (3, 1 << 28), (1000, 1 << 13)):
+        monkeypatch.setattr(adaptive, "MOST_ATTEMPTS", attempts)
+        monkeypatch.setattr(adaptive, "MOST_SAVED", saved)
+        assert_alike(cpu, sw.sweep(driven, MU, "merson", device=name, **options))
+    assert_alike(cpu, sw.sweep(driven, MU, "merson", device=name, chunk=9, threads=3, **options))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_with_a_tolerance_quantities_are_seen_here(name: str) -> None:
+    options: dict[str, Any] = {"v": 0.3, "tolerance": 1e-7, "at": np.linspace(0.0, 5.0, 40), "outcomes": ["mean", E("energy")]}
+    assert_alike(*both(name, sw.Oscillator, OMEGA, "merson", **options))
 
 
 def test_a_number_that_was_not_a_number_stays_one() -> None:

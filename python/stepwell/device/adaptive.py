@@ -20,6 +20,8 @@ from ..reference.signal import HOLD_SLACK
 from . import promise
 from .fixed import LAUNCH, MOST_AT_FIRST, MOST_SAVED, MOST_TEXTS
 from .opencl import Machine
+from .reductions import ARGUMENTS as OF_AN_OBSERVER
+from .reductions import Observer
 from .stages import ARGUMENTS, Numbers, Stages
 
 #: Attempts of the first launch, which shows how long one takes, and the most of any.
@@ -83,10 +85,11 @@ def adapt(machine: Machine, model: Any, plan: Any, pacing: Any, arrays: Any) -> 
 
 def text_of(model: Any, plan: Any, numbers: int) -> tuple[Stages, str]:
     """The stages of a model, and the kernels of a run of adaptive steps; a pace has so many numbers, with those of groups."""
-    key = _core.tape_number(model, attempts=True), plan.single, plan.backward, numbers
+    observer = plan.observer
+    key = _core.tape_number(model, attempts=True), plan.single, plan.backward, numbers, None if observer is None else observer.key
     if key not in _TEXTS:
         stages = Stages(model, single=plan.single, attempts=True)
-        _TEXTS[key] = stages, _Kernels(stages, numbers, len(model.tables), plan.backward).text()
+        _TEXTS[key] = stages, _Kernels(stages, numbers, len(model.tables), plan.backward, observer).text()
         while len(_TEXTS) > MOST_TEXTS:
             _TEXTS.popitem(last=False)
     return _TEXTS[key]
@@ -119,17 +122,25 @@ class _Run:
         self.inputs = machine.put(np.array(of_inputs or [[0.0, 1.0, 0.0]]))
         self.attempts = max(1, min(FIRST_LAUNCH, MOST_AT_FIRST // members))
         self.nothing = machine.room(1)
+        #: What reduces the states at the times; without one they are saved, with one only the last.
+        self.observer: Observer | None = plan.observer
+        self.times = len(pacing.at) if self.observer is None else 1
+        self.reduced = self.nothing if self.observer is None else machine.room(8 * self.observer.size * members)
 
     def make(self) -> None:
         """Make it."""
         self.call("prepare", 1, 1, self.numbers.sources, self.numbers.uniforms)
-        arrays, times = self.arrays, len(self.pacing.at)
+        arrays, times = self.arrays, self.times
         room = 0 if arrays.steps is None else len(arrays.steps.t)
         waypoints = 0 if arrays.waypoints is None else WAYPOINTS * arrays.waypoints.shape[1]
         each = 8 * (times * self.state + room * (1 + self.state) + waypoints + self.rows + self.state)
         at_once = max(1, min(MOST_SAVED, self.machine.largest) // each)
         for first in range(0, self.members, at_once):
             self.share(Share(first, min(self.members, first + at_once)))
+        if self.observer is not None:
+            reduced = np.empty((self.observer.results, self.members))
+            self.machine.get(reduced, self.reduced)
+            self.observer.take(reduced)
 
     def call(self, name: str, items: int, group: int, *arguments: Any) -> None:
         """Start a kernel."""
@@ -152,7 +163,7 @@ class _Run:
         self.call("begin", width, group, *self.numbers.arguments, *of_call, np.int32(pacing.begins))
         times = len(pacing.at)
         origin, count = machine.room(8 * self.state * width), machine.put(np.zeros(1, np.int32))
-        saved = [machine.room(8 * times * n * width) for n in (self.n_v, self.n_y)]
+        saved = [machine.room(8 * self.times * n * width) for n in (self.n_v, self.n_y)]
         steps, room = [self.nothing] * 3, 0
         if arrays.steps is not None:
             room = len(arrays.steps.t)
@@ -167,7 +178,7 @@ class _Run:
         list_of_live, done, began = machine.put(live), np.zeros(1, np.int32), time.perf_counter()
         while True:
             attempts = self.attempts
-            now = (list_of_live, np.int64(len(live)), np.int64(attempts))
+            now = (list_of_live, np.int64(len(live)), np.int64(attempts), *([] if self.observer is None else [self.reduced]))
             self.call("attempts", len(live), group, *self.numbers.arguments, *of_call, *asked, *now)
             machine.get(done, count)
             took, began = time.perf_counter() - began, time.perf_counter()
@@ -222,7 +233,8 @@ def rows_of(stages: Stages) -> int:
 class _Kernels:
     """Writes the kernels of a run; a pace has so many numbers, and there are so many sampled inputs."""
 
-    def __init__(self, stages: Stages, numbers: int, tables: int, backward: bool) -> None:
+    def __init__(self, stages: Stages, numbers: int, tables: int, backward: bool, observer: Observer | None) -> None:
+        self.observer = observer
         self.stages, self.texts, self.numbers, self.tables = stages, stages.texts, numbers, tables
         self.sign = "-1.0" if backward else "1.0"
         if any(text.entries for text in self.texts.values()):
@@ -287,6 +299,27 @@ class _Kernels:
         """Statements that put the state into rows of saved ones."""
         lines = [f"{v}[({at} * {self.n_v} + {i}) * width + c] = {self.row}{i};" for i in range(self.n_v)]
         return lines + [f"{y}[({at} * {self.n_y} + {i}) * width + c] = {self.row}{self.n_v + i};" for i in range(self.n_y)]
+
+    def save_next(self) -> list[str]:
+        """Statements that save the state at the next time, or observe it."""
+        if self.observer is None:
+            return [*self.save("saved_v", "saved_y", "next"), "next++;"]
+        keep = ["if (next + 1 == times) {", *self.save("saved_v", "saved_y", "0"), "}"]  # the last one is taken from the device
+        return [*self.observe([f"(real){self.row}{i}" for i in range(self.state)], "next"), *keep, "next++;"]
+
+    def observe(self, state: list[str], at: str) -> list[str]:
+        """Statements by which the observer takes a state into account, that at a time."""
+        assert self.observer is not None
+        names = [f"const real q{i} = {text};" for i, text in enumerate(state)]
+        return ["{", *names, f"const double seen_t = {self.sign} * time_of(at, at_width, {at}, g);", *self.observer.see(), "}"]
+
+    def save_the_rest(self) -> list[str]:
+        """Statements for the times to which a member does not come: its states are NaN."""
+        to = "k" if self.observer is None else "0"
+        nothing = [f"saved_v[({to} * {self.n_v} + {i}) * width + c] = NAN;" for i in range(self.n_v)]
+        nothing += [f"saved_y[({to} * {self.n_y} + {i}) * width + c] = NAN;" for i in range(self.n_y)]
+        seen = [] if self.observer is None else self.observe(["NAN"] * self.state, "k")
+        return ["for (long k = next; k < times; k++) {", *seen, *nothing, "}"]
 
     def waypoint(self) -> list[str]:
         """Statements that keep where a member stands if it has come to a waypoint, or to a step before one."""
@@ -359,8 +392,7 @@ class _Kernels:
             *(f"s{i} = n{i};" for i in range(count)),
             "}",
             "if (within) {",
-            *self.save("saved_v", "saved_y", "next"),
-            "next++;",
+            *self.save_next(),
             *(f"s{i} = origin[{i} * width + c];" for i in range(n)),
             "} else {",
             *self.waypoint(),
@@ -412,6 +444,7 @@ class _Kernels:
             f"const int runs = waits && moves && {accepted} + {rejected} < budget && {held} <= 0.0;",
             f"ends = !({extra} > 0.0 || runs);",
         ]
+        last_t = f"next > 0 ? {self.sign} * time_of(at, at_width, next - 1, g) : NAN"
         terms = []
         if "by terms" in texts:
             terms = [
@@ -429,12 +462,14 @@ class _Kernels:
             "const long room, const int waits_for, __global double *restrict origin, __global double *restrict saved_v, "
             "__global double *restrict saved_y, __global double *restrict steps_t, __global double *restrict steps_v, "
             "__global double *restrict steps_y, __global double *restrict waypoints, __global int *count, "
-            "__global const long *restrict live, const long live_count, const long limit) {",
+            "__global const long *restrict live, const long live_count, const long limit"
+            f"{'' if self.observer is None else f', {OF_AN_OBSERVER}'}) {{",
             "if (get_global_id(0) >= live_count) return;",
             "const long c = live[get_global_id(0)];",
             f"if (marks[{MARKS.index('status')} * width + c] != {RUNNING}) return;",
             "const long g = first_member + c; (void)g;",
             *self.load(),
+            *([] if self.observer is None else self.observer.begin("next > 0", last_t)),
             *(line for name in ("step", "judged", "by terms") if name in texts for line in texts[name].member),
             f"for (long i = 0; i < limit && status == {RUNNING}; i++) {{",
             "int is_full = 0, ends = 1;",
@@ -451,8 +486,7 @@ class _Kernels:
             "if (has_origin) {",
             "has_origin = 0;",
             f"if ({rejected} <= origin_rejected) {{",
-            *self.save("saved_v", "saved_y", "next"),
-            "next++;",
+            *self.save_next(),
             *(f"{self.row}{i} = origin[{i} * width + c];" for i in range(n)),
             "}",
             "}",
@@ -460,8 +494,7 @@ class _Kernels:
             "while (next < times) {",
             f"{target} = time_of(at, at_width, next, g);",
             f"if ({t} < {target}) break;",
-            *self.save("saved_v", "saved_y", "next"),
-            "next++;",
+            *self.save_next(),
             "}",
             "const int goes_on = !is_full && next < times;",
             *terms,
@@ -477,12 +510,10 @@ class _Kernels:
             *self.waypoint(),
             "}",
             f"if (status != {RUNNING}) {{",
-            "for (long k = next; k < times; k++) {",
-            *(f"saved_v[(k * {self.n_v} + {i}) * width + c] = NAN;" for i in range(self.n_v)),
-            *(f"saved_y[(k * {self.n_y} + {i}) * width + c] = NAN;" for i in range(self.n_y)),
-            "}",
+            *self.save_the_rest(),
             "atomic_inc(count);",
             "}",
+            *([] if self.observer is None else self.observer.end()),
             *self.store(),
             "}",
         ]

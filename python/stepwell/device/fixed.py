@@ -324,13 +324,13 @@ def _kernels(stages: Stages, observer: Observer | None) -> str:
         "const double t0, const double h, const int since, const real most, __global const bits *restrict table, "
         "__global const real *restrict state, __global real *restrict next, __global real *restrict saved_v, "
         "__global real *restrict saved_y, __global real *restrict recorded, __global long *restrict bad"
-        f"{'' if observer is None else f', {OF_AN_OBSERVER}'}) {{",
+        f"{'' if observer is None else f', const int begun, const double last_t, {OF_AN_OBSERVER}'}) {{",
         "const long g = get_global_id(0);",
         "if (g >= members) return;",
         *(f"real s{i};" for i in range(n)),
         *step.member,
         "int doubt = 0;",
-        *([] if observer is None else observer.begin()),
+        *([] if observer is None else observer.begin("begun", "last_t")),
         # A second time only where a member diverged, to find at which step.
         "for (int again = 0; again < 2; again++) {",
         *load,

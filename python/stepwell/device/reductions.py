@@ -16,8 +16,8 @@ import numpy as np
 
 from ..base.arrays import Array
 
-#: What a kernel that observes takes last: whether a state was observed before, and the time of the last one.
-ARGUMENTS = "const int begun, const double last_t, __global double *restrict reduced"
+#: What a kernel that observes takes last.
+ARGUMENTS = "__global double *restrict reduced"
 
 
 class Extremes(NamedTuple):
@@ -176,13 +176,13 @@ class Observer:
             place += each.results
         return variables + [("double", f"p{row}", self.results + i, "0.0") for i, row in enumerate(self._compared)]
 
-    def begin(self) -> list[str]:
-        """Statements before the steps of a launch."""
+    def begin(self, is_next: str, before_t: str) -> list[str]:
+        """Statements before the steps of a launch: whether a state was observed before, and the time of the last one."""
         return [
-            "int is_next = begun;",
-            "double before_t = last_t;",
+            f"int is_next = {is_next};",
+            f"double before_t = {before_t};",
             *(
-                f"{kind} {name} = begun ? ({kind})reduced[{place} * members + g] : ({kind}){number};"
+                f"{kind} {name} = is_next ? ({kind})reduced[{place} * members + g] : ({kind}){number};"
                 for kind, name, place, number in self._kept()
             ),
         ]

@@ -45,7 +45,7 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
     evaluations = out.evaluations * (accepted + rejected + again)
     stopped, sign = np.count_nonzero(out.status) > 0, -1.0 if plan.backward else 1.0
     control = request.system.control
-    t, v, y = times, out.v, out.y
+    t, v, y = times[-len(out.v) :], out.v, out.y
     if keeper is not None:
         t, v, y = keeper.saved(plan, start, (np.broadcast_to(pacing.at[-1], plan.batch), v[-1], y[-1]))
         t = sign * t

@@ -329,7 +329,8 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     if plan.backend == "numpy":
         return _adapt_by_numpy(plan, pacing, paces, v, y)
     times, n_v, members, numbers = len(pacing.at), prod(plan.system.v_shape), plan.members, pace_numbers(plan)
-    saved_v, saved_y = np.empty((times, *v.shape)), np.empty((times, *y.shape))
+    saved = times if plan.observer is None else 1  # with an observer only the last one
+    saved_v, saved_y = np.empty((saved, *v.shape)), np.empty((saved, *y.shape))
     last = np.empty((n_v + prod(plan.system.y_shape), members))
     last_paces, status = np.empty((numbers, members)), np.empty(plan.batch, dtype=np.int64)
     before = paces.reshape(numbers, paces.size // numbers)

@@ -40,7 +40,7 @@ class Plan(NamedTuple):
     sampled controller remembers at the start, rows of one number for each member. ``lengths`` are the steps of members
     that have their own, shape (*batch), or None; ``dt`` is then 1: the clock of the core counts steps. ``device`` is the machine
     that makes the steps, of ``devices``, or None for the CPU. ``observer`` is what becomes of states on a device after so many
-    steps, of ``device.reductions``, or None; ``every`` is then None.
+    steps, or at the times of ``at``, of ``device.reductions``, or None; only the last one is then saved.
     """
 
     system: System

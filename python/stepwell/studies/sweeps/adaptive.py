@@ -187,10 +187,11 @@ class Pieces:
         self._last: tuple[Run, Request] | None = None
         self._waypoints: Array | None = None
 
-    def make(self, **options: Any) -> Run:
-        """A piece of the run, without findings and warnings."""
+    def make(self, *, observer: Any = None, **options: Any) -> Run:
+        """A piece of the run, without findings and warnings; ``observer`` is that of the plan."""
         waypoints: list[Array] = []
         request = Request.of(self.system, self._method, Options(**options))
+        request = request._replace(plan=request.plan._replace(observer=observer))
         run = step(request, waypoints if self._looks else None)
         self._last = run, request
         if waypoints:

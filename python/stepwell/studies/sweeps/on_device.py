@@ -35,9 +35,9 @@ class Observing(NamedTuple):
     observer: Observer
     names: tuple[str, ...]
 
-    def taken_by(self, reductions: Iterable[tuple[ReducedOutcome, Reduction]], run: Run) -> None:
-        """Give each reduction what the device has made in this run."""
-        numbers, begin = iter(self.observer.numbers), run.t0 + run.start_step * run.dt
+    def taken_by(self, reductions: Iterable[tuple[ReducedOutcome, Reduction]], run: Run, begin: Any) -> None:
+        """Give each reduction what the device has made in this run; its first state was observed at the time ``begin``."""
+        numbers = iter(self.observer.numbers)
         for outcome, reduction in reductions:
             mine = next(numbers) if outcome.observes else np.empty((0, run.status.size))
             reduction.take(Observed(run, mine, begin, run.t[-1]))

@@ -238,9 +238,13 @@ def _reduced(
     between, reductions = task.between, [(each, each.begin()) for each in task.reductions]
     at, last = 0, None
     if (observing := _observing(task, pieces.system, start)) is not None:
-        last = make(steps=task.steps, every=None, observer=observing.observer, record=observing.names, **start)
+        if task.at is not None:
+            last, begin = pieces.make(at=task.at, observer=observing.observer, **start), task.at[0]
+        else:
+            last = make(steps=task.steps, every=None, observer=observing.observer, record=observing.names, **start)
+            begin = last.t0 + last.start_step * last.dt
         _as_many(last, members)
-        observing.taken_by(reductions, last)
+        observing.taken_by(reductions, last, begin)
         return last, [reduction.results() for _, reduction in reductions]
     if task.at is not None:
         for last in _pieces_between_times(task, pieces, start, members, stopped):
@@ -260,14 +264,16 @@ def _reduced(
 
 def _observing(task: Task, system: System, start: dict[str, Any]) -> Observing | None:
     """What a device does with the states that it observes, or None if they are to be seen here."""
-    if not task.on_device or task.at is not None or "events" in task.options or task.kinds(History):
+    if not task.on_device or "events" in task.options or task.kinds(History):
         return None
     from . import on_device
 
-    # In float32, and by a transition matrix, quantities of states are computed later.
-    rows = Rows(system, records=not task.single and not task.method.is_exact)
+    # In float32, with adaptive steps and by a transition matrix quantities of states are computed later.
+    rows = Rows(system, records=not task.single and task.at is None and not task.method.is_exact)
     observing = on_device.observing(task.reductions, rows, task.observe)
-    return None if observing is None or on_device.is_of_many_bodies(system, task.method, start) else observing
+    if observing is None or (task.at is None and on_device.is_of_many_bodies(system, task.method, start)):
+        return None
+    return observing
 
 
 def _thinned(task: Task, outcome: Outcome, piece: Run, first: int, since: int) -> Piece:
