@@ -244,6 +244,16 @@ def test_with_a_tolerance_quantities_are_seen_here(name: str) -> None:
     assert_alike(*both(name, sw.Oscillator, OMEGA, "merson", **options))
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_outcomes_in_another_order(name: str) -> None:
+    """The same rows, reduced otherwise, by the same steps in one process."""
+    options: dict[str, Any] = {"v": 0.3, "dt": 0.02, "steps": 50}
+    with_tolerance: dict[str, Any] = {"v": 0.3, "tolerance": 1e-6, "at": np.linspace(0.0, 2.0, 20)}
+    for outcomes in (["extremes", "mean"], ["mean", "extremes"], ["mean", M("y", name="other")], [M("y", name="other"), E("y")]):
+        for method, more in (("rk4", options), ("merson", with_tolerance)):
+            assert_alike(*both(name, driven, MU, method, outcomes=outcomes, **more))
+
+
 def test_a_number_that_was_not_a_number_stays_one() -> None:
     """As of ``np.minimum``; the text is that of C."""
     lines = "\n".join(Observer(1, (Extremes((0,)),), 1).see())

@@ -159,8 +159,8 @@ class Observer:
 
     @property
     def key(self) -> Any:
-        """What its text depends on."""
-        return self._reductions
+        """What its text depends on: named tuples of different kinds are equal if their numbers are."""
+        return tuple((type(each), each) for each in self._reductions)
 
     @property
     def size(self) -> int:
