@@ -300,3 +300,67 @@ def test_controlled_launches_are_cut_anywhere(pairs: int, monkeypatch: pytest.Mo
     n = 520 if pairs > 1 else 66
     for control in (sw.EnergyControl(0.5), sw.Projection("nacozy")):
         same(sw.NBody(masses(n), softening=0.1), "rk4", dt=0.01, steps=2, control=control, **state(n, 2))
+
+
+@pytest.mark.parametrize("massive", [0, 1, 40, 300])
+def test_quantities_of_bodies_without_mass(massive: int) -> None:
+    rng = np.random.default_rng(massive)
+    some = np.zeros(300)
+    some[rng.permutation(300)[:massive]] = rng.uniform(0.5, 2.0, massive)
+    record = ["closest", "energy", "angular_momentum", "momentum"]
+    for method in ("leapfrog", "verlet"):
+        same(sw.NBody(some, softening=0.1), method, dt=0.01, steps=3, every=2, record=record, **state(300, 3, 2))
+
+
+@pytest.mark.parametrize("record", [["energy"], ["closest"], ["energy", "closest"], ["momentum", "energy"]])
+def test_quantities_of_pairs_are_found_on_the_device(record: list[str], calls: list[str], monkeypatch: Any) -> None:
+    """The core has no pass over pairs to make, and the next step begins with the forces that were found with the energy."""
+    monkeypatch.setattr(bodies, "LAUNCH", 1e6)
+    run, asked = _core.run, []
+    monkeypatch.setattr(_core, "run", lambda model, plan, arrays: asked.append(plan.device) or run(model, plan, arrays))
+    start = state(70, 2)
+    sw.integrate(sw.NBody(masses(70)), "leapfrog", dt=0.01, steps=4, every=1, record=record, device="opencl", **start)
+    assert len(asked) == 5 * ("momentum" in record)
+    evaluations = calls.count("pairs") + calls.count("pairs_and_wells")
+    assert evaluations == 5
+    assert calls.count("nearest") == 5 * ("closest" in record)
+    monkeypatch.setattr(_core, "run", run)
+    push = np.random.default_rng(1).normal(size=(70, 2))
+    for control in (None, sw.EnergyControl(0.5), sw.Projection("nacozy")):
+        method = "leapfrog" if control is None else "rk4"
+        same(sw.NBody(masses(70)), method, dt=0.01, steps=4, every=1, record=record, force=push, control=control, **start)
+
+
+def test_the_nearest_bodies_where_numbers_are_not_finite() -> None:
+    """A NaN is never the nearest, nor is a body to itself."""
+    start = state(70, 2, 2)
+    start["y"][3, 0, 1] = 1e200
+    start["y"][5] = start["y"][9]
+    for method in ("leapfrog", "rk4"):
+        record = ["closest", "energy"]
+        same(sw.NBody(masses(70), force="newton"), method, dt=0.01, steps=3, every=1, record=record, **start)
+
+
+@pytest.mark.parametrize("members", [1, 3, 100])
+@pytest.mark.parametrize("then", [None, lambda t, v, y: (0.5 * v, y)])
+def test_events_of_many_bodies(members: int, then: Any) -> None:
+    start = state(64, 2, members)
+    event = sw.Event(lambda t, v, y: y[0, 0] - 0.25, name="passes", then=then)
+    system = sw.NBody(masses(64), softening=0.1)
+    got, core = (
+        sw.integrate(system, "leapfrog", dt=0.05, steps=20, every=20, events=event, device=device, **start)
+        for device in ("opencl", "cpu")
+    )
+    assert_same(got, core, "v", "y", "first_bad_step")
+    assert_same(got.events["passes"], core.events["passes"], "t", "v", "y", "member")
+    assert members == 1 or len(got.events["passes"].t)
+
+
+@pytest.mark.parametrize("every", [None, 2])
+def test_velocities_of_a_carry_are_computed_once(every: Any, calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """For the check of what diverged and for the state that is saved, from forces with which the next step begins."""
+    monkeypatch.setattr(bodies, "LAUNCH", 1e6)
+    monkeypatch.setattr(bodies, "FIRST_LAUNCH", 1 << 30)
+    same(sw.NBody(masses(70)), "verlet", dt=0.01, steps=6, every=every, **state(70, 2))
+    assert calls.count("finish_last") == (1 if every is None else 4)
+    assert calls.count("pairs") == 7

@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 from .. import _core
 from ..errors import UnsupportedError
 
+#: The block of h·v̇ at the places of the state, which all stages share.
+HERE = "here"
 #: The operations of a method that are written here.
 WRITTEN = frozenset({"v", "y", "kept v", "kept y", "dv", "dy", "velocity", "add", "subtract", "scale", "mass"})
 
@@ -38,13 +40,12 @@ class Stage(NamedTuple):
     Attributes:
         passes: its kernels, in order.
         text: their text.
-        first: the block of h·v̇ at the places at the start; "" if it is not asked for, or depends on more than places.
-        last: likewise that at the places at the end, with which the next step may begin.
+        last: the block of h·v̇ at the places at the end, as the next step may begin with it; "" if it is not asked for, or depends
+            on more than places.
     """
 
     passes: list[Pass]
     text: str
-    first: str
     last: str
 
 
@@ -78,7 +79,7 @@ def stage_of(method: str, stage: str, choice: int, results: list[str], *, pushed
             case "dv":
                 key = (i,) if pushed else of[1]  # a push counts what it takes away, evaluation by evaluation
                 if key not in evaluations:
-                    evaluations[key] = f"{stage}{len(order)}"
+                    evaluations[key] = HERE if block.get(of[1]) == "y" and not pushed else f"{stage}{len(order)}"
                     order.append([of[1], of[0]] if pushed else [of[1]])
                 block[i] = evaluations[key]
             case "dy":
@@ -113,10 +114,10 @@ def stage_of(method: str, stage: str, choice: int, results: list[str], *, pushed
     def value(i: int) -> str:
         return block.get(i, f"x{i}")
 
-    passes, texts = [], []
+    passes, texts, names = [], [], list(evaluations.values())
     for turn, where in enumerate(order):
         reads, lines = computed(where)
-        made = Pass(f"{stage}_pass{turn}", reads, [], f"{stage}{turn}")
+        made = Pass(f"{stage}_pass{turn}", reads, [], names[turn])
         passes.append(made)
         lines.append(f"put_place({value(where[0])}, g, all, n, ranks, places, round);")
         lines += [f"speeds[g] = {value(velocity)};" for velocity in where[1:]]
@@ -125,10 +126,8 @@ def stage_of(method: str, stage: str, choice: int, results: list[str], *, pushed
     reads, lines = computed(targets)
     last = Pass(f"{stage}_last", reads, results, "")
     to = [f"to_{name}[g] = {value(i)};" for name, i in zip(results, targets, strict=True)]
-    y = next((i for i, name in block.items() if name == "y"), -1)
-    end = targets[results.index("y")] if "y" in results else -1
-    at_end = evaluations.get(end, "") if end != y else ""
-    return Stage([*passes, last], "\n".join([*texts, _kernel(last, [*lines, *to])]), evaluations.get(y, ""), at_end)
+    at_end = evaluations.get(targets[results.index("y")], "") if "y" in results else ""
+    return Stage([*passes, last], "\n".join([*texts, _kernel(last, [*lines, *to])]), "" if at_end == HERE else at_end)
 
 
 def _kernel(made: Pass, body: list[str], pushed: bool = False) -> str:

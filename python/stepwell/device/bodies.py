@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from ..model.around import FORCE
 from ..model.parameters import rows
 from ..reference.systems.nbody import LANES, partners
 from . import blocks, forces, keeping, promise
+from .blocks import HERE
 from .opencl import Machine
 from .stages import MOST_OPERATIONS
 
@@ -31,6 +33,8 @@ HUGE = 2.0**960
 #: The parameters of the equations, and of what keeps their energy.
 KNOWN = frozenset({"masses", "strength", "softening", "dim", "force", "massless"})
 KEEPING = frozenset({"control", "control.form", "control.when", "control.way", "control.gain", "control.target"})
+#: Quantities that are sums over pairs, or are found among them.
+OF_PAIRS = ("energy", "closest")
 #: A method whose steps need nothing but the state; none are made by it.
 PLAIN = "false_euler"
 
@@ -52,7 +56,6 @@ def missing(plan: Any) -> str:
         "fused=True": plan.fused,
         "this control=": system.control is not None and not keeping.is_known(system.control),
         "a controller": system.controller is not None,
-        "events=": plan.watched is not None,
         "steps of each member": plan.lengths is not None,
         "surfaces": bool(system.contacts),
         f"the parameter {others[0]}" if others else "": bool(others),
@@ -69,6 +72,9 @@ def run(machine: Machine, plan: Any, arrays: Any, bodies: Bodies | None = None) 
     if arrays.first_bad.size == 0:
         check(machine, plan)
         return False
+    if plan.watched is not None:  # as of the core, whose steps of so many bodies notice nothing: the states are looked at
+        check(machine, plan)
+        return bool((arrays.first_bad >= 0).any())
     bodies = bodies or Bodies(machine, plan)
     with bodies.program.lock:
         return _Run(bodies, plan, arrays).make()
@@ -123,7 +129,7 @@ class Bodies:
         self.carries = method.carry is not None
         self.count = self.members * self.of_member
         with_energies = self.control is not None or "energy" in plan.record
-        text = forces.text_of(self.dim, system.force, energies=with_energies)
+        text = forces.text_of(self.dim, system.force, energies=with_energies, nearest="closest" in plan.record)
         of_control = [] if self.control is None else [keeping.text_of(self.control, self.dim)]
         self.program = machine.program("\n".join([text, *of_control, *(stage.text for stage in self.stages.values())]))
         self.massive = np.asarray(system.massive, np.int32)
@@ -200,9 +206,9 @@ class _Run:
         self.machine.set(bodies.tallies, np.zeros(bodies.members))
         self.bad = self.machine.put(np.ascontiguousarray(arrays.first_bad, np.int64))
         self.doubt = self.machine.put(np.zeros(1, np.int32))
-        #: Whether h·v̇ at the places of the state is known, and whether its velocities are.
+        #: Whether h·v̇ at the places of the state is known, and whether its velocities and its potentials are.
         self.fresh = bodies.known is not None and bodies.known.tobytes() == places.tobytes()
-        self.finished = False
+        self.finished = self.has_wells = False
         self.looks = bool((arrays.first_bad < 0).any())
         self.pending, self.began, self.rested = 0, time.perf_counter(), False
 
@@ -214,6 +220,8 @@ class _Run:
         """Make it."""
         plan = self.plan
         if not self.arrays.carried and "start" in self.stages:
+            if plan.every is not None:
+                self.find_wells()
             self.stage("start")
         at = 0
         if plan.every is not None:
@@ -253,6 +261,7 @@ class _Run:
         for name in ("v", "y"):
             self.doubted(name, most)
         if carries and saves:
+            self.find_wells()
             self.stage("finish")
             self.doubted("w", np.inf)
         doubt = np.zeros(1, np.int32)
@@ -261,7 +270,7 @@ class _Run:
             return
         self.blocks.update(before)
         self.machine.copy(self.bodies.tallies, tallies)
-        self.fresh = self.finished = False
+        self.fresh = self.finished = self.has_wells = False
         if first and carries:  # those at the end of the steps before were not computed
             self.stage("finish")
             self.mark("w", first)
@@ -294,16 +303,16 @@ class _Run:
         # The gradient is that of the energy alone, without a force from outside.
         ends_there = bool(stage.last) and not (moves and bodies.push is not None)
         self.stage("step", wells=stage.last if keeps and ends_there else "")
-        at = stage.last if ends_there else "kept"
+        at = stage.last if ends_there else HERE
         if keeps:
             if not ends_there:
                 self.call("placed", bodies.count, np.int64(bodies.count), self.blocks["y"], *self.where())
                 self.forces(bodies.room(at), wells=True)
             self.keep(bodies.room(at), self.blocks["v"], self.blocks["y"])
-            if not ends_there and not moves:
+            if not ends_there:
                 self.push(bodies.room(at))
-        if stage.first and (ends_there or keeps) and not moves:
-            self.blocks[stage.first], self.blocks[at] = bodies.room(at), bodies.room(stage.first)
+        if (ends_there or keeps) and not moves:
+            self.blocks[HERE], self.blocks[at] = bodies.room(at), bodies.room(HERE)
             self.fresh = True
 
     def where(self) -> list[Any]:
@@ -319,7 +328,7 @@ class _Run:
         self.finished = name == "finish"
         of_all = np.int64(bodies.count), np.float64(self.plan.dt)
         for each in stage.passes:
-            if each.asks and name == "step" and self.fresh and each.asks == stage.first:
+            if each.asks == HERE and self.fresh:
                 continue
             reads = [bodies.room(block) for block in each.reads]
             writes = [bodies.room(block) for block in each.writes]
@@ -331,8 +340,9 @@ class _Run:
                 if bodies.pushes:
                     self.keep(bodies.room(each.asks), bodies.speeds[0], bodies.places)
                 self.push(bodies.room(each.asks))
+            self.fresh |= each.asks == HERE
         if name == "step":
-            self.fresh = False
+            self.fresh = self.has_wells = False
 
     def forces(self, out: Any, *, wells: bool = False) -> None:
         """h·v̇ at the places, with potentials or without."""
@@ -400,12 +410,13 @@ class _Run:
         arrays = self.arrays
         velocities = "v"
         if "finish" in self.stages:
+            self.find_wells()
             self.stage("finish")
             velocities = "w"
         self.read(velocities, arrays.saved_v[at])
         self.read("y", arrays.saved_y[at])
         if arrays.recorded is not None:
-            self.record(at)
+            self.record(at, self.blocks[velocities])
         return at + 1
 
     def read(self, name: str, to: Array) -> None:
@@ -415,18 +426,67 @@ class _Run:
         self.machine.get(values, self.blocks[name])
         to[...] = values.transpose(2, 1, 0).reshape(to.shape)
 
-    def record(self, at: int) -> None:
-        """The quantities of the state that was saved, by the core."""
-        plan, arrays = self.plan, self.arrays
-        system = plan.system
-        model = _core.ModelSpec(system.kernel, PLAIN, system.parameters(plan.batch), record=list(plan.record))
-        one, of_member = slice(at, at + 1), self.bodies.of_member
+    def record(self, at: int, velocities: Any) -> None:
+        """The quantities of the state that was saved: those of pairs on the device, sums over bodies by the core."""
+        bodies, plan = self.bodies, self.plan
+        sizes = {name: prod(plan.system.quantities[name]) for name in plan.record}
+        rows = self.arrays.recorded[at].reshape(-1, bodies.members)
+        found = self.of_bodies([name for name in plan.record if name not in OF_PAIRS], at)
+        if "energy" in plan.record:
+            found["energy"] = self.energy(velocities)
+        if "closest" in plan.record:
+            found["closest"] = self.closest()
+        first = 0
+        for name, size in sizes.items():
+            rows[first : first + size] = found[name]
+            first += size
+
+    def find_wells(self) -> None:
+        """If energies are recorded, the potentials at the places of the state, with the forces there, which stages then have."""
+        if self.has_wells or "energy" not in self.plan.record:
+            return
+        bodies = self.bodies
+        self.call("placed", bodies.count, np.int64(bodies.count), self.blocks["y"], *self.where())
+        self.forces(bodies.room(HERE), wells=True)
+        self.push(bodies.room(HERE))
+        self.fresh = self.has_wells = True
+
+    def energy(self, velocities: Any) -> Array:
+        """The energy of the state, with these velocities."""
+        self.find_wells()
+        self.sum_up(velocities, self.blocks[HERE])
+        energies = np.empty((self.bodies.members, forces.SUMS))
+        self.machine.get(energies, self.bodies.energies)
+        return np.asarray(energies[:, 1] / self.plan.dt)
+
+    def closest(self) -> Array:
+        """The least distance of two bodies, of which one has mass, at the places of the state."""
+        bodies = self.bodies
+        items = bodies.members * bodies.all
+        least = self.machine.room(8 * items)
+        self.call("placed", bodies.count, np.int64(bodies.count), self.blocks["y"], *self.where())
+        of_places = bodies.ranks, bodies.places, bodies.round, least
+        self.in_launches("nearest", items, max(1, bodies.n), *bodies.counts, *of_places)
+        found = np.empty((bodies.members, bodies.all))
+        self.machine.get(found, least)
+        return np.asarray(np.sqrt(found.min(axis=1)))
+
+    def of_bodies(self, names: list[str], at: int) -> dict[str, Array]:
+        """Quantities of the state that was saved, by the core."""
+        if not names:
+            return {}
+        bodies, plan, arrays = self.bodies, self.plan, self.arrays
+        system, of_member = plan.system, bodies.of_member
+        sizes = [prod(system.quantities[name]) for name in names]
+        model = _core.ModelSpec(system.kernel, PLAIN, system.parameters(plan.batch), record=names)
         v, y = (np.ascontiguousarray(each[at], np.float64).reshape(of_member, -1) for each in (arrays.saved_v, arrays.saved_y))
+        one, recorded = slice(at, at + 1), np.empty((1, sum(sizes), bodies.members))
         beside = arrays._replace(
             v=v, y=y, carried=False, saved_v=np.empty_like(arrays.saved_v[one]), saved_y=np.empty_like(arrays.saved_y[one]),
-            recorded=arrays.recorded[one], tally=None, carry=None, first_bad=np.full(self.bodies.members, -1, np.int64),
+            recorded=recorded, tally=None, carry=None, first_bad=np.full(bodies.members, -1, np.int64),
         )  # fmt: skip
         _core.run(model, plan._replace(steps=0, every=None, choice=0, progress=None, force=None), beside)
+        return dict(zip(names, np.split(recorded[0], np.cumsum(sizes)[:-1]), strict=True))
 
     def finish(self) -> None:
         """Take from the device what is left there at the end."""

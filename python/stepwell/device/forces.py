@@ -20,12 +20,14 @@ from .printer import HEAD, TYPES, Printer
 SUMS = 3
 
 
-def text_of(dim: int, force: str, *, energies: bool) -> str:
-    """The text of the kernels, with those of energies or without."""
+def text_of(dim: int, force: str, *, energies: bool, nearest: bool) -> str:
+    """The text of the kernels, with those of energies and of the nearest bodies or without."""
     law = NBody(1.0, force, dim, np.ones(1), np.ones(1), np.zeros(1))
     texts = [HEAD + TYPES[False], PLACES, _pairs(dim, law, wells=False), _gather(dim), _pulled(dim, law), AROUND]
     if energies:
         texts += [_pairs(dim, law, wells=True), _shares(dim), PARTS]
+    if nearest:
+        texts.append(_nearest(dim))
     return "\n".join(texts)
 
 
@@ -152,6 +154,30 @@ def _pulled(dim: int, law: Any) -> str:
         *_meets(dim, law, "j", "sum", forward=True),
         "}",
         *(f"out[(m * {dim} + {c}) * all + i] = sum{c};" for c in range(dim)),
+        "}",
+    ]
+    return "\n".join(lines)
+
+
+def _nearest(dim: int) -> str:
+    """The kernel that finds how near the nearest body with mass is to each body, squared."""
+    lines = [
+        "__kernel void nearest(const long from, const long count, const int all, const int n, __global const int *ranks, "
+        "__global const real *restrict places, __global const real *restrict round, __global real *restrict least) {",
+        "if ((long)get_global_id(0) >= count) return;",
+        "const long g = from + get_global_id(0);",
+        "const long m = g / all;",
+        "const int i = g % all, rank = ranks[i];",
+        f"__global const real *x = round + m * {dim} * 2 * n;",
+        *(f"const real own{c} = places[(m * {dim} + {c}) * all + i];" for c in range(dim)),
+        "real smallest = INFINITY;",
+        "for (int p = 0; p < n; p++) {",
+        "if (p == rank) continue;",
+        *(f"const real d{c} = x[{c} * 2L * n + p] - own{c};" for c in range(dim)),
+        f"const real r2 = {' + '.join(f'd{c} * d{c}' for c in range(dim))};",
+        "smallest = r2 < smallest ? r2 : smallest;",
+        "}",
+        "least[g] = smallest;",
         "}",
     ]
     return "\n".join(lines)
