@@ -127,7 +127,7 @@ def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = Non
 
 
 def _own(name: str, option: Any) -> Any:
-    """An option into which nobody writes any more."""
+    """An option that does not change any more."""
     if isinstance(option, np.ndarray):
         return frozen(name, option)
     return option.copy() if isinstance(option, list) else option
