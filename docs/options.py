@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
+from unittest import mock
 
 import numpy as np
 import stepwell as sw
+from stepwell import _core
+from stepwell.device import adaptive, fixed, opencl
 
 #: Members of each run, and its steps.
 MEMBERS, STEPS, DT = 2, 4, 0.01
 
 #: Options that are given again with each piece of a run; the others go on with it.
-OF_A_PIECE = ("every", "record", "events", "form", "backend")
+OF_A_PIECE = ("every", "record", "events", "form", "backend", "device")
 
 Request = dict[str, Any]
 
@@ -151,6 +155,7 @@ OPTIONS: dict[str, Callable[[Kind, Request], None]] = {
     "fused": _with(fused=True),
     "float32": _with(dtype="float32"),
     "numpy": _with(backend="numpy"),
+    "device": _with(device="opencl"),
 }
 
 
@@ -278,19 +283,55 @@ def _of_pairs(
         yield _row(f"`{option}`", *cells)
 
 
+class Anywhere:
+    """In place of a device: kernels are printed, which refuses what cannot be, and the core makes the steps.
+
+    So the tables are the same on a machine without any device.
+    """
+
+    described = sw.Device("opencl:0", "any device", "OpenCL", 1 << 34, 1)
+
+    @staticmethod
+    def run(_: Any, model: Any, plan: Any, arrays: Any) -> bool:
+        """As ``device.fixed.run``."""
+        fixed.text_of(model, plan.single, plan.choice)
+        return bool(_core.run(model, plan, arrays))
+
+    @staticmethod
+    def adapt(_: Any, model: Any, plan: Any, pacing: Any, arrays: Any) -> bool:
+        """As ``device.adaptive.adapt``."""
+        adaptive.text_of(model, plan, len(arrays.paces))
+        return bool(_core.adapt(model, plan, pacing, arrays))
+
+
+@contextmanager
+def anywhere() -> Iterator[None]:
+    """Within this context there is a device, with or without one."""
+    with (
+        mock.patch.object(opencl, "machines", return_value=[Anywhere()]),
+        mock.patch.object(fixed, "run", Anywhere.run),
+        mock.patch.object(adaptive, "adapt", Anywhere.adapt),
+    ):
+        yield
+
+
 def tables() -> str:
     """Both tables, and the reasons below them."""
     reasons = Reasons()
+    with anywhere():
+        return "".join(_all(reasons))
+
+
+def _all(reasons: Reasons) -> list[str]:
     alone = {
         (option, kind.name): refusal(kind, (option,))
         for option in OPTIONS
         for kind in KINDS
     }
-    each = [
+    return [
         *_of_kinds(alone, reasons),
         "\n",
         *_of_pairs(alone, reasons),
         "\n",
         *reasons.listed(),
     ]
-    return "".join(each)

@@ -13,7 +13,7 @@ import pytest
 import stepwell as sw
 from stepwell.base import progress
 from stepwell.device import adaptive as on_device
-from stepwell.errors import StepwellError
+from stepwell.errors import StepwellError, UnsupportedError
 from stepwell.runs import engine
 from stepwell.runs.result import Status
 from support.cases import ADAPTIVE, SYSTEMS
@@ -65,7 +65,11 @@ def same_if_possible(system: Any, method: str, **options: Any) -> None:
             with pytest.raises(type(error), match=re.escape(str(error))):
                 sw.integrate(system, method, device="opencl", **options)
             return
-    same(system, method, **options)
+    try:
+        same(system, method, **options)
+    except UnsupportedError as error:
+        if "too long for a kernel" not in str(error):  # which the core makes
+            raise
 
 
 def start(*shape: int, members: int = MEMBERS) -> Any:

@@ -8,6 +8,9 @@ show every method, every family of systems, every control and record, each with 
 
 from __future__ import annotations
 
+import importlib
+from pathlib import Path
+
 import numpy as np
 import pytest
 from stepwell.device import printer
@@ -62,3 +65,18 @@ def test_a_wrong_statement_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     proof = next(each for each in sorted(CHOSEN, key=str) if each.method == "rk4" and not each.single)
     with pytest.raises(AssertionError):
         assert_proven(proof)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "option", ["device", "tolerance", "resume", "events", "force", "float32", "energy", "own t0", "projection"]
+)
+def test_the_page_of_options_is_that_of_a_device(option: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is written without one: what a device refuses, and what it makes, is what the page says."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "docs"))
+    options = importlib.import_module("options")
+    names = ("device",) if option == "device" else (option, "device")
+    for kind in options.KINDS:
+        with options.anywhere():
+            expected = options.refusal(kind, names)
+        assert options.refusal(kind, names) == expected, kind.name

@@ -322,3 +322,12 @@ def test_bad_angles_are_refused(value: Any) -> None:
 def test_angles_that_overflow_are_answered() -> None:
     at = sw.criteria(["rk4"], phi=1e300)[0].at[0]
     assert at.kind == "not finite"
+
+
+def test_of_a_matrix_whose_units_are_as_far_apart_as_numbers_can_be() -> None:
+    """Nothing is said of it, and of the member beside it all."""
+    matrix = np.repeat(np.diag([1.0, 2.0, 3.0])[..., np.newaxis], 2, axis=-1)
+    matrix[0, 1, 1] = 1e300
+    values = eigen.eigen(matrix, np.array([[1.0, 1e-10], [1.0, 1e10], [1.0, 1.0]])).values
+    np.testing.assert_array_equal(np.sort(values[:, 0].real), [1.0, 2.0, 3.0])
+    assert np.isnan(values[:, 1]).all()

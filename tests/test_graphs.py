@@ -13,6 +13,7 @@ import stepwell as sw
 from stepwell import _core
 from stepwell.reference.adaptive import pace
 from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
 from support import families, own_systems
 from support.cases import ADAPTIVE, SYSTEMS, drawn, fits
 from support.graphs import MANY, assert_one_graph, methods, model
@@ -60,6 +61,22 @@ def test_an_attempt_and_a_step_of_pefrl_under_control(name: str, control: str) -
     pefrl = sw.method("pefrl")
     tape, system = _core.Tape(), system.stepped_by(pefrl)
     assert_one_graph(tape, tape.trace(model(system, pefrl), "step"), Tracer(system, tape).step(pefrl))
+
+
+@pytest.mark.parametrize("projection", ["scaling", "nacozy", "energy"])
+def test_an_attempt_backward_under_a_projection(projection: str) -> None:
+    """It sees energies and gradients of a step of −1, and what it adds is told of a step of 1.
+
+    Methods for stiff systems and the series negate elsewhere what they read of bodies, which changes no bit.
+    """
+    system, v, y = made("own: pendulum" if projection == "energy" else "three bodies")
+    system = system.controlled(sw.Projection(projection), v, y, 1e-3)
+    for method in ABLE:
+        if not fits(system, method) or ((method.is_implicit or method.has_series) and projection != "energy"):
+            continue
+        tape = _core.Tape()
+        plan = engine.Plan(system, method, system.batch, 0.1, backward=True)
+        assert_one_graph(tape, tape.trace(engine.model(plan), "attempt"), Tracer(system, tape).attempt(method, backward=True))
 
 
 @pytest.mark.parametrize("control", [sw.Control("energy", 0.3), sw.Control("energy", 0.3, "printed"), sw.Projection("energy")])

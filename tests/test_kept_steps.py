@@ -79,6 +79,15 @@ def test_neither_threads_nor_room_change_a_bit(monkeypatch: pytest.MonkeyPatch) 
     same(ensemble(at=[-5.0]), ensemble(at=[-5.0], backend="numpy"))
 
 
+def test_room_for_states_without_velocities(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a member has more steps than there is room for at once."""
+    ask: dict[str, Any] = {"y": np.array([[0.5, 2.0]]), "tolerance": 1e-6, "at": [3.0], "every": 1}
+    growth = sw.LinearSystem([[0.7]], velocities=0)
+    whole = sw.integrate(growth, "merson", **ask)
+    monkeypatch.setattr(kept_steps, "NUMBERS_AT_ONCE", 12)
+    np.testing.assert_array_equal(sw.integrate(growth, "merson", **ask).y, whole.y)
+
+
 def test_pieces_make_the_whole() -> None:
     """The steps count from the start of the first piece, and a piece begins with the state at its start."""
     whole, first = ensemble(), ensemble(at=[2.0])

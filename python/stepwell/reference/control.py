@@ -92,7 +92,7 @@ class Projected(EnergyKeeping):
         off = energy - self.target
         if self.way == "scaling":
             factor = np.sqrt(bits.clamp(1.0 - off / kinetic, MIN_SQUARE, MAX_SQUARE))
-            factor = bits.where(bits.at_most(kinetic, 0.0), 1.0, factor)
+            factor = bits.where(bits.equal(kinetic, 0.0), 1.0, factor)  # h·E is below zero where h is
             self.work = self.work + (factor * factor - 1.0) * kinetic
             return v * factor, y
         along_v, along_y, square = self.s.gradient(v, y, dv)  # Nacozy

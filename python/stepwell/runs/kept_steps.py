@@ -43,7 +43,8 @@ class StepKeeper:
         if not len(left):
             return out
         shapes, numbers, members = (plan.system.v_shape, plan.system.y_shape), len(out.paces), Members(plan)
-        states = [(block.reshape(-1, *shape, plan.members), shape) for block, shape in zip((out.v, out.y), shapes, strict=True)]
+        times, blocks = len(pacing.at), zip((out.v, out.y), shapes, strict=True)
+        states = [(block.reshape(times, *shape, plan.members), shape) for block, shape in blocks]
         ends = [block.reshape(*shape, plan.members) for block, shape in zip((out.last_v, out.last_y), shapes, strict=True)]
         rows, status = out.paces.reshape(numbers, -1), out.status.reshape(-1)
         while len(left):

@@ -85,6 +85,8 @@ pub trait Number:
     fn below(self, y: Self) -> Self::Truth;
     /// x ≤ y
     fn at_most(self, y: Self) -> Self::Truth;
+    /// x = y
+    fn equals(self, y: Self) -> Self::Truth;
     /// One of two numbers.
     fn choose(truth: Self::Truth, yes: Self, no: Self) -> Self;
     /// Bits of the number and of the constant.
@@ -167,6 +169,10 @@ impl Number for f64 {
     #[inline(always)]
     fn at_most(self, y: f64) -> bool {
         self <= y
+    }
+    #[inline(always)]
+    fn equals(self, y: f64) -> bool {
+        self == y
     }
     #[inline(always)]
     fn choose(truth: bool, yes: f64, no: f64) -> f64 {

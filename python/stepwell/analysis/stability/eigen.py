@@ -109,7 +109,10 @@ def eigen(matrix: Array, units: Array | None = None) -> Eigen:
     matrix = np.where(finite, matrix, 0.0)
     if units is None:
         units = units_of(matrix)
-    scaled = matrix * units / units[:, np.newaxis]
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = matrix * units / units[:, np.newaxis]
+    finite = finite & np.isfinite(scaled).all(axis=(0, 1))  # those whose units are as far apart as numbers can be
+    scaled = np.where(finite, scaled, 0.0)
     stacked = np.moveaxis(scaled, (0, 1), (-2, -1))
     n, members = len(matrix), stacked.shape[:-2]
     each = stacked.reshape(-1, n, n)

@@ -56,7 +56,9 @@ class Attempted:
         self.s = s
         parts = [part for part in parts if not part[0].is_scaled]
         self.acting = [part for part in parts if part[0].acts_on_rates]
-        self.projected = wrapped(s, 1.0, [part for part in parts if not part[0].acts_on_rates])
+        # A projection asks for energies and gradients, which do not know that time runs backward: both have the step −1.
+        state, step = (s.s, -1.0) if isinstance(s, Backward) else (s, 1.0)
+        self.projected = wrapped(state, step, [part for part in parts if not part[0].acts_on_rates])
         self.unit = self._acting(s, 1.0, without="control")
 
     def rates(self, step: Any) -> Any:
@@ -79,7 +81,8 @@ class Attempted:
             return *self.projected.project(v, y), None
         self.projected.work = 0.0
         v, y = self.projected.project(v, y)
-        return v, y, self.projected.work
+        work = self.projected.work
+        return v, y, -work if isinstance(self.s, Backward) else work
 
 
 class Backward:

@@ -52,11 +52,13 @@ pub(super) struct AttemptsOf<'a> {
 impl AttemptsOf<'_> {
     /// The system, scaled to a step.
     fn scaled(&self, h: Symbol) -> Box<dyn System<Symbol>> {
-        let made = |h: Symbol| {
-            let p = parameters(self.signature, h);
-            around::wrap_scaled(&p, (self.kind.make)(&p))
-        };
-        if self.backward { Box::new(Backward(made(-h))) } else { made(h) }
+        if self.backward { Box::new(Backward(self.made(-h))) } else { self.made(h) }
+    }
+
+    /// The system as it is, scaled to a step that may be below zero.
+    fn made(&self, h: Symbol) -> Box<dyn System<Symbol>> {
+        let p = parameters(self.signature, h);
+        around::wrap_scaled(&p, (self.kind.make)(&p))
     }
 
     /// Rates for a step with the forces around the system: h·v̇ + h·f. Where time runs backward, these see the step and the time
@@ -74,10 +76,12 @@ impl AttemptsOf<'_> {
         self.forced(Symbol::of(1.0), self.scaled(Symbol::of(1.0)))
     }
 
-    /// The system scaled to a step of 1, under its projection if there is one.
+    /// The system scaled to a step of 1, under its projection if there is one. Where time runs backward, a projection sees energies
+    /// and gradients of the system itself, scaled to a step of −1.
     fn projected(&self) -> Box<dyn System<Symbol>> {
-        let p = parameters(self.signature, Symbol::of(1.0));
-        around::wrap_without_forces(&p, self.scaled(Symbol::of(1.0)), Symbol::of(0.0))
+        let h = Symbol::of(if self.backward { -1.0 } else { 1.0 });
+        let under = around::wrap_without_forces(&parameters(self.signature, h), self.made(h), Symbol::of(0.0));
+        if self.backward { Box::new(Backward(under)) } else { under }
     }
 
     fn state(&self) -> (Block<Symbol>, Block<Symbol>) {

@@ -386,6 +386,6 @@ impl<N: Number> System<N> for Backward<N> {
     }
 
     fn tally(&self) -> Option<N> {
-        self.0.tally()
+        self.0.tally().map(|work| -work)
     }
 }

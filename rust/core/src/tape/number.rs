@@ -34,6 +34,9 @@ impl Number for Symbol {
     fn at_most(self, y: Symbol) -> SymbolTruth {
         SymbolTruth(write(Op::LessEqual(self.0, y.0)))
     }
+    fn equals(self, y: Symbol) -> SymbolTruth {
+        SymbolTruth(write(Op::Equal(self.0, y.0)))
+    }
     fn choose(truth: SymbolTruth, yes: Symbol, no: Symbol) -> Symbol {
         Symbol::new(Op::Select(truth.0, yes.0, no.0))
     }

@@ -23,10 +23,10 @@ pub(crate) struct Projected<N: Number> {
 }
 
 /// The factor of all velocities, and h times the energy that it adds, from h times the error of the energy and h times the
-/// kinetic energy. At rest the factor is 1.
+/// kinetic energy, both below zero where h is. At rest the factor is 1.
 pub(crate) fn scaling<N: Number>(off: N, kinetic: N) -> (N, N) {
     let one = N::of(1.0);
-    let factor = N::choose(kinetic.at_most(N::of(0.0)), one, factor(one - off / kinetic));
+    let factor = N::choose(kinetic.equals(N::of(0.0)), one, factor(one - off / kinetic));
     (factor, (factor * factor - one) * kinetic)
 }
 
