@@ -21,7 +21,7 @@ import numpy as np
 import stepwell as sw
 from stepwell.device import adaptive, device_of
 
-STEPS, REPEATS = 1000, 3
+STEPS, REVOLUTIONS, REPEATS = 1000, 10, 3
 #: Lorenz in float32 from t = 0 to 1, 8 388 608 members on one Tesla V100, in seconds: 1000 steps of order 4 to 5, and adaptive
 #: ones. Measured by Utkarsh et al. (2023, Automated translation and accelerated solving of differential equations on multiple GPU
 #: platforms), whose raw data are in github.com/utkarsh530/GPUODEBenchmarks, folder paper_artifacts/data/Tesla_V100.
@@ -105,7 +105,7 @@ def of_hodgkin_huxley(members: int) -> Any:
 
 
 def of_kepler(members: int) -> Any:
-    """Orbits from circles to an eccentricity of 0.9, a revolution of each by steps of its own."""
+    """Orbits from circles to an eccentricity of 0.9, each by steps of its own."""
     e = np.linspace(0.0, 0.9, members)
     v, y = np.array([0.0 * e, np.sqrt((1.0 + e) / (1.0 - e))]), np.array([1.0 - e, 0.0 * e])
     return kepler(), "dop853", {"v": v, "y": y, "tolerance": 1e-6}
@@ -172,8 +172,9 @@ class Work:
         return self.members * run.steps if paces is None else int((paces.accepted + paces.rejected).sum())
 
     def operations(self) -> int:
-        """Operations of a step."""
-        return sum(sw.explain(self.system, self.method, dtype=self.dtype, attempt=self.adaptive).computed.values())
+        """Operations of a step; of an attempt as many in both precisions, but for casts."""
+        dtype = "float64" if self.adaptive else self.dtype
+        return sum(sw.explain(self.system, self.method, dtype=dtype, attempt=self.adaptive).computed.values())
 
     def traffic(self, length: float, machine: Any) -> int:
         """The bytes that the launches of a run load and store: state, parameters and pace of each member."""
@@ -203,18 +204,19 @@ class Work:
         return 2 * 8 * own
 
 
-def measured(name: str, members: int, dtype: str, machine: Any, limits: tuple[float, float]) -> str:
-    """A line of the table; ``limits`` are sums and products, and bytes, a second."""
+def measured(name: str, members: int, dtype: str, machine: Any) -> str:
+    """A line of the table; its limits are measured beside it, since other work of the machine changes both."""
     work, device = Work(name, members, dtype), machine.described.name
     begin = time.perf_counter()
     work.run(0, device)
     compiled = time.perf_counter() - begin
     length = max(10, min(STEPS, 200_000_000 // members)) if machine.is_cpu else STEPS
-    length = 1 if work.adaptive else length
+    length = REVOLUTIONS if work.adaptive else length
     got, core = work.run(length, device), work.run(length, "cpu")
     assert np.array_equal(got.y, core.y, equal_nan=True)
     one = [least(partial(work.run, 0, where)) for where in (device, "cpu")]
     whole = [least(partial(work.run, length, where)) for where in (device, "cpu")]
+    limits = peak(machine, dtype == "float32"), bandwidth(machine)
     steps = work.steps(got) - work.steps(work.run(0, "cpu"))
     on_device, on_cpu = (steps / max(w - o, 1e-9) for w, o in zip(whole, one, strict=True))
     of_sums, of_bytes = on_device * work.operations() / limits[0], work.traffic(length, machine) / whole[0] / limits[1]
@@ -242,7 +244,7 @@ def main() -> None:
         for name in SYSTEMS:
             members = 1000
             while members <= arguments.most:
-                print(measured(name, members, dtype, machine, limits), flush=True)
+                print(measured(name, members, dtype, machine), flush=True)
                 members *= 10
         print()
     print(f"Published, Lorenz in float32, {MEMBERS_OF_PUBLISHED} members to t = 1 on one Tesla V100 (not measured here):")
