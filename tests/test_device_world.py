@@ -487,3 +487,31 @@ def test_what_many_bodies_do_not_have_is_refused_before_any_step() -> None:
     floor = sw.Floor(normal=[0.0, 1.0], offset=-9.0)
     with pytest.raises(UnsupportedError, match="device: runs of many bodies have surfaces on device='cpu' only"):
         sw.World(sw.NBody(np.ones(100), floor=floor), "leapfrog", v=v, y=y, dt=0.01, device="opencl")
+
+
+def test_arrays_stay_on_the_device_between_calls(monkeypatch: Any) -> None:
+    """From the second call on nothing is made there; what depends on parameters is, once they have changed."""
+    from stepwell.device import fixed, opencl
+
+    v, y = start(0.2)
+    omega = np.linspace(1.0, 2.0, N)
+    world = sw.World(sw.Oscillator(omega=omega), "leapfrog", v=v, y=y, dt=0.05, device="opencl")
+    world.step(5)
+    sizes: list[int] = []
+    kernels: list[str] = []
+    room, put, call = opencl.Machine.room, opencl.Machine.put, fixed._Run.call
+    monkeypatch.setattr(opencl.Machine, "room", lambda self, size: sizes.append(size) or room(self, size))
+    monkeypatch.setattr(opencl.Machine, "put", lambda self, array: sizes.append(array.nbytes) or put(self, array))
+    monkeypatch.setattr(fixed._Run, "call", lambda self, name, *rest: kernels.append(name) or call(self, name, *rest))
+    for _ in range(2):
+        world.step(5)
+    assert sizes == []
+    assert set(kernels) == {"steps"}
+    world.set(omega=2.0)
+    world.step(3)
+    assert "prepare" in kernels
+    assert "start" in kernels
+    run = sw.integrate(sw.Oscillator(omega=omega), "leapfrog", v=0.2, y=start()[1], dt=0.05, steps=15)
+    rest = sw.integrate(sw.Oscillator(omega=2.0), "leapfrog", v=run.v[-1], y=run.y[-1], dt=0.05, steps=3, start_step=15)
+    np.testing.assert_array_equal(world.y, rest.y[-1])
+    np.testing.assert_array_equal(world.v, rest.v[-1])

@@ -30,6 +30,9 @@ HUGE, HUGE_SINGLE = 2.0**960, 2.0**64
 #: How many texts a process keeps.
 MOST_TEXTS = 256
 
+#: The names of the arrays of saved states.
+SAVED = ("saved v", "saved y", "recorded")
+
 _TEXTS: OrderedDict[Any, tuple[Stages, str]] = OrderedDict()
 
 
@@ -52,10 +55,32 @@ def text_of(model: Any, single: bool, choice: int, observer: Observer | None = N
     return _TEXTS[key]
 
 
-def run(machine: Machine, model: Any, plan: Any, arrays: Any, numbers: Numbers | None = None) -> bool:
+class Rooms:
+    """The arrays of runs on a device, by name; those of a world stay there from one call of it to the next."""
+
+    def __init__(self, machine: Machine) -> None:
+        self._machine = machine
+        self._buffers: dict[str, Any] = {}
+
+    def room(self, name: str, size: int) -> Any:
+        """Room for so many bytes."""
+        if name not in self._buffers or self._buffers[name].size < size:
+            self._buffers[name] = self._machine.room(size)
+        return self._buffers[name]
+
+    def put(self, name: str, array: Array) -> Any:
+        """A copy of an array."""
+        if name in self._buffers and self._buffers[name].size >= array.nbytes > 0:
+            self._machine.write(self._buffers[name], array)
+        else:
+            self._buffers[name] = self._machine.put(array)
+        return self._buffers[name]
+
+
+def run(machine: Machine, model: Any, plan: Any, arrays: Any, numbers: Numbers | None = None, rooms: Rooms | None = None) -> bool:
     """Make the run, and return whether some member has diverged, now or before: as ``_core.run``.
 
-    ``numbers`` are those of the model if they are on the device already, for a world.
+    ``numbers`` are those of the model if they are on the device already, and ``rooms`` the arrays, for a world.
     """
     if numbers is None and bodies.takes(model, plan):
         return bodies.run(machine, plan, arrays)
@@ -67,18 +92,21 @@ def run(machine: Machine, model: Any, plan: Any, arrays: Any, numbers: Numbers |
     stages, text = text_of(model, single, plan.choice, plan.observer)
     program = machine.program(text)
     with program.lock:
-        return _Run(machine, program, stages, plan, arrays, numbers or Numbers(machine, stages, model, members, plan.dt)).make()
+        numbers = numbers or Numbers(machine, stages, model, members, plan.dt)
+        return _Run(machine, program, stages, plan, arrays, numbers, rooms or Rooms(machine)).make()
 
 
 class _Run:
     """A run as it is made."""
 
-    def __init__(self, machine: Machine, program: Any, stages: Stages, plan: Any, arrays: Any, numbers: Numbers) -> None:
+    def __init__(
+        self, machine: Machine, program: Any, stages: Stages, plan: Any, arrays: Any, numbers: Numbers, rooms: Rooms
+    ) -> None:
         self.machine, self.program, self.stages, self.plan, self.arrays = machine, program, stages, plan, arrays
         self.members = members = arrays.first_bad.size
         self.kind = np.float32 if stages.single else np.float64
         self.bytes = np.dtype(self.kind).itemsize
-        self.numbers = numbers
+        self.numbers, self.rooms = numbers, rooms
         sizes = stages.sizes
         self.state = sizes["v"] + sizes["y"] + sizes["kept"] + sizes["tally"]
         before = np.zeros((self.state, members), self.kind)
@@ -87,17 +115,17 @@ class _Run:
         rest = arrays.v[n_v:]  # what is kept, or what a controller remembers at the start, which stands last
         end = n_v + n_y + sizes["kept"]
         before[end - len(rest) : end] = rest
-        self.now, self.next = machine.put(before), machine.room(before.nbytes)
-        self.bad = machine.put(np.ascontiguousarray(arrays.first_bad, np.int64))
-        self.saved = [machine.room(0)] * 3
+        self.now, self.next = rooms.put("now", before), rooms.room("next", before.nbytes)
+        self.bad = rooms.put("bad", np.ascontiguousarray(arrays.first_bad, np.int64))
+        self.saved = [rooms.room(name, 0) for name in SAVED]
         #: What reduces the states after every so many steps; without one they are saved.
         self.observer: Observer | None = plan.observer
-        self.every, self.reduced, self.last_t = plan.every, machine.room(0), np.nan
+        self.every, self.reduced, self.last_t = plan.every, None, np.nan
         if self.observer is not None:
             self.every, self.reduced = self.observer.every, machine.room(8 * self.observer.size * members)
         self.group = 64 if members >= 64 else 1
         self.size = -(-members // self.group) * self.group
-        self.table = machine.room(0)
+        self.table = rooms.room("table", 0)
         entries = len(stages.texts["step"].entries)
         #: The steps of the next launch, and the most of any: their table must fit.
         self.pace = max(1, min(FIRST_LAUNCH, MOST_AT_FIRST // members))
@@ -111,7 +139,9 @@ class _Run:
     def make(self) -> bool:
         """Make it."""
         plan, arrays, of_time = self.plan, self.arrays, (np.float64(self.plan.t0), np.float64(self.plan.dt))
-        self.call("prepare", 1, self.numbers.sources, self.numbers.uniforms)
+        if not self.numbers.is_prepared:  # those of a world are, from its first call on
+            self.call("prepare", 1, self.numbers.sources, self.numbers.uniforms)
+            self.numbers.is_prepared = True
         if not arrays.carried and "start" in self.stages.texts:
             self.call("start", self.size, *self.numbers.arguments, np.int64(plan.first), *of_time, self.now)
         at = 0
@@ -161,13 +191,13 @@ class _Run:
         first, entries = plan.first + done, len(self.stages.texts["step"].entries)
         of_time = np.float64(plan.t0), np.float64(plan.dt)
         if entries and count:
-            self.table = self.room(self.table, count * entries * max(self.bytes, 8))
+            self.table = self.rooms.room("table", count * entries * max(self.bytes, 8))
             self.call("table", count, *self.numbers.arguments, np.int64(first), *of_time, self.table)
         if launch.saves:
             rows = (sizes["v"], sizes["y"], sizes["recorded"])
             self.saved = [
-                self.room(buffer, (launch.intervals if self.observer is None else 1) * n * self.members * self.bytes)
-                for buffer, n in zip(self.saved, rows, strict=True)
+                self.rooms.room(name, (launch.intervals if self.observer is None else 1) * n * self.members * self.bytes)
+                for name, n in zip(SAVED, rows, strict=True)
             ]
         most = (HUGE_SINGLE if self.stages.single else HUGE) * min(abs(plan.dt), 1.0)
         counts = (np.int64(first), np.int64(launch.intervals), np.int64(launch.length), np.int32(launch.saves))
@@ -185,10 +215,6 @@ class _Run:
         if self.observer is None:
             return ()
         return np.int32(not np.isnan(self.last_t)), np.float64(self.last_t), self.reduced
-
-    def room(self, buffer: Any, size: int) -> Any:
-        """A buffer that has so many bytes, this one if it has."""
-        return buffer if buffer.size >= size else self.machine.room(size)
 
     def read(self, at: int, count: int) -> int:
         """Take saved states from the device, from the ``at``-th on; returns the number of the next.

@@ -204,6 +204,10 @@ class Machine:
         with self._in_words():
             kernel(self.queue, (size,), None if group is None else (group,), *arguments)
 
+    def write(self, buffer: Any, array: Any) -> None:
+        """Copy an array to the device, into a buffer that has room for it, once all before it is done."""
+        self.cl.enqueue_copy(self.queue, buffer, array)
+
     def finish(self) -> None:
         """Wait until all is done."""
         with self._in_words():

@@ -179,6 +179,7 @@ class Numbers:
 
     Attributes:
         uniforms: what is the same for all members, computed on the device.
+        is_prepared: whether they are computed.
         arguments: the arrays that every kernel takes, in the order of ``ARGUMENTS``.
     """
 
@@ -211,6 +212,7 @@ class Numbers:
                 at += len(row)
         every = np.concatenate(flat) if flat else np.zeros(1, kind)
         put = machine.put
+        self.is_prepared = False
         self.uniforms = machine.room(max(1, stages.uniforms) * np.dtype(kind).itemsize)
         self.sources = put(sources)
         self.sample_rows = np.int64(len(offsets))

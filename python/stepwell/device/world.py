@@ -49,6 +49,7 @@ class World:
         self, machine: Machine, model: Any, plan: Any, v: Array, y: Array, carry: Array | None = None, force: Array | None = None
     ) -> None:
         self._machine, self._v, self._y, self._force = machine, v, y, force
+        self._rooms = fixed.Rooms(machine)
         self._t0, self._dt, self._step, self._changes = plan.t0, plan.dt, plan.first, 0
         self._alone = threading.Lock()
         self._model_is(model, plan)
@@ -130,14 +131,14 @@ class World:
         first_bad = np.zeros(members, np.int64)  # whether a member diverged is not looked for
         arrays = SimpleNamespace(
             v=np.concatenate([v, kept]), y=self._y.reshape(n_y, members), carried=carried, saved_v=saved_v, saved_y=saved_y,
-            recorded=None, tally=None, carry=held, first_bad=first_bad,
+            recorded=None, tally=None, carry=held if self._carries else None, first_bad=first_bad,
         )  # fmt: skip
         # Without steps the state is saved as it is at the start.
         plan = self._plan._replace(first=self._step, steps=n, every=None if n else 1, progress=None)
         if isinstance(numbers, bodies.Bodies):
             bodies.run(self._machine, plan, arrays, numbers)
         else:
-            fixed.run(self._machine, self._model, plan, arrays, numbers)
+            fixed.run(self._machine, self._model, plan, arrays, numbers, self._rooms)
         return saved_v.reshape(-1), saved_y.reshape(-1), held
 
     def _is_moved(self) -> bool:
