@@ -201,6 +201,9 @@ ARRAYS = {
     "clip": lambda y: np.clip(y, -0.1, 0.25),
     "comparisons as numbers": lambda y: (y > 0.2) * y + (y == 0.5),
     "and, or, not": lambda y: np.where((y > 0.1) & ~(y > 0.4) | (y < -1.0), 1.0, y),
+    "and, or of numbers": lambda y: np.where(
+        (np.sqrt(0.2) < np.exp(1.1)) & (y > 0.1) | np.logical_or(np.False_, y < -1.0), 1.0, y
+    ),
     "diff": lambda y: np.append(np.diff(y), 0.0) if not hasattr(y, "items") else np.concatenate([np.diff(y), [0.0]]),
     "cumsum": lambda y: np.cumsum(y),
     "prod, max, min": lambda y: y * np.prod(y) + np.max(y) - np.min(y),

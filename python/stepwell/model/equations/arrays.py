@@ -83,9 +83,9 @@ def elementwise_named(name: str, *arguments: Any) -> Any:
     if name == "reciprocal":
         return 1.0 / _as_operand(arguments[0])
     if name in ("logical_and", "bitwise_and"):
-        return folded(operator.and_, arguments)
+        return folded(operator.and_, _values_first(arguments))
     if name in ("logical_or", "bitwise_or"):
-        return folded(operator.or_, arguments)
+        return folded(operator.or_, _values_first(arguments))
     if name in ("logical_not", "invert"):
         return ~arguments[0]
     if name == "matmul":
@@ -109,6 +109,11 @@ def unknown(name: str) -> TraceError:
 
 def _as_operand(x: Any) -> Any:
     return x if isinstance(x, Operators) else array(x) if np.ndim(x) else Scalar(float(x))
+
+
+def _values_first(arguments: Any) -> list[Any]:
+    """Values before numbers and arrays of NumPy, which would ask the values again."""
+    return sorted(arguments, key=lambda each: not isinstance(each, Operators))
 
 
 def ufunc_of(ufunc: Any, method: str, arguments: Any, options: Any) -> Any:
