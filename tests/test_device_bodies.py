@@ -172,17 +172,6 @@ def test_a_step_that_begins_where_the_last_ended_asks_once(calls: list[str], mon
     assert calls.count("pairs") == 11
 
 
-@pytest.mark.parametrize(
-    ("options", "what"),
-    [
-        ({"fused": True}, "fused=True"),
-    ],
-)
-def test_what_is_not_there_is_refused(options: Any, what: str) -> None:
-    with pytest.raises(UnsupportedError, match=f"device: runs of many bodies have {what} on device='cpu' only"):
-        sw.integrate(sw.NBody(masses(64)), "standard_euler", dt=0.01, steps=2, device="opencl", **options, **state(64, 2))
-
-
 def test_surfaces_are_refused() -> None:
     system = sw.NBody(masses(100), floor=sw.Floor(normal=[0.0, 1.0], offset=-9.0))
     with pytest.raises(UnsupportedError, match="surfaces on device='cpu' only"):
@@ -364,3 +353,10 @@ def test_velocities_of_a_carry_are_computed_once(every: Any, calls: list[str], m
     same(sw.NBody(masses(70)), "verlet", dt=0.01, steps=6, every=every, **state(70, 2))
     assert calls.count("finish_last") == (1 if every is None else 4)
     assert calls.count("pairs") == 7
+
+
+@pytest.mark.parametrize("way", ["scaling", "nacozy"])
+def test_projections_back_in_time(way: Any) -> None:
+    """Energies times h are below zero there."""
+    got = same(sw.NBody(masses(70)), "standard_euler", dt=-0.05, steps=6, control=sw.Projection(way), **state(70, 2))
+    assert np.all(got.work != 0.0)

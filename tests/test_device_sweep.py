@@ -137,8 +137,8 @@ def test_what_is_too_long_is_refused_before_any_work(more: dict[str, Any], monke
     monkeypatch.setattr(ensemble, "_compute", lambda *_: pytest.fail("work"))
 
     def chains(k: Any) -> sw.System:
-        return sw.Springs([(i, i + 1) for i in range(300)], stiffness=k, rest=1.0, dim=3)
+        return sw.Springs([(i, i + 1) for i in range(6000)], stiffness=k, rest=1.0, dim=3)
 
-    start = {"v": 0.0, "y": np.arange(903.0).reshape(301, 3, 1)}
-    with pytest.raises(UnsupportedError, match="too long for a kernel, which has at most 20000"):
+    start = {"v": 0.0, "y": np.arange(18003.0).reshape(6001, 3, 1)}
+    with pytest.raises(UnsupportedError, match="too long for a kernel, which has at most 100000"):
         sw.sweep(chains, {"k": ("k", [1.0, 2.0])}, "dop853", device=NAMES[0], **start, **more)

@@ -17,7 +17,7 @@ from ..reference.systems.nbody import LANES, partners
 from . import blocks, forces, keeping, promise
 from .blocks import HERE
 from .opencl import Machine
-from .stages import MOST_OPERATIONS
+from .stages import MOST_READ
 
 #: From so many operations of a step on, or so many bodies, it is made so, if all that the run asks for is there: one kernel of
 #: more takes a compiler longer than many runs take.
@@ -44,7 +44,7 @@ def takes(model: Any, plan: Any) -> bool:
     if plan.system.kernel != "nbody":
         return False
     operations, bodies = _core.operations(model), len(plan.system.masses)
-    return operations > MOST_OPERATIONS or ((operations > LEAST_OPERATIONS or bodies >= LEAST_BODIES) and not missing(plan))
+    return operations > MOST_READ if missing(plan) else operations > LEAST_OPERATIONS or bodies >= LEAST_BODIES
 
 
 def missing(plan: Any) -> str:
@@ -84,8 +84,8 @@ def check(machine: Machine, plan: Any) -> None:
     """Raise if a run asks for what is not there."""
     if reason := missing(plan):
         raise UnsupportedError(
-            f"device: runs of many bodies have {reason} on device='cpu' only: their step has more than {MOST_OPERATIONS} "
-            f"operations, which is too long for one kernel"
+            f"device: runs of many bodies have {reason} on device='cpu' only: their step has more than {MOST_READ} operations, "
+            f"which is too long for one kernel"
         )
     promise.check(machine, single=False)
 

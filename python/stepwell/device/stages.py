@@ -17,17 +17,20 @@ from ..errors import UnsupportedError
 from ..reference.signal import HOLD_SLACK
 from .opencl import Machine
 from .printer import HEAD, TYPES, Printer
+from .reader import TEXT as READING
+from .reader import Reader
 
-#: The most operations of a step that is written as one kernel: a compiler takes minutes for more.
-MOST_OPERATIONS = 20_000
+#: The most operations of a stage that is written into a kernel, since a compiler takes minutes for more, and of a step of which
+#: they are read by it; and the most statements that then stand around.
+MOST_OPERATIONS, MOST_READ, MOST_STATEMENTS = 20_000, 100_000, 12_000
 
 
 def check_length(model: Any) -> None:
     """Raise if a step of the model is too long for a kernel."""
     operations = _core.operations(model)
-    if operations > MOST_OPERATIONS:
+    if operations > MOST_READ:
         raise UnsupportedError(
-            f"device: a step of about {operations} operations is too long for a kernel, which has at most {MOST_OPERATIONS}; use "
+            f"device: a step of about {operations} operations is too long for a kernel, which has at most {MOST_READ}; use "
             f"device='cpu'"
         )
 
@@ -70,7 +73,16 @@ class Stages:
         self.sources: list[tuple[str, int]] = []
         self.params: list[int] = []
         self.uniforms = 0
+        self.reader = Reader(self.single)
+        self._reads = any(len(split["body"][0]) > MOST_OPERATIONS for split in made["splits"].values())
         self.texts = {name: self._text(name, split) for name, split in made["splits"].items()}
+        if self.reader.lines:
+            statements = sum(len(part) for text in self.texts.values() for part in text)
+            if statements > MOST_STATEMENTS:
+                raise UnsupportedError(
+                    f"device: a kernel of {statements} statements is too long for a compiler, which gets at most "
+                    f"{MOST_STATEMENTS}; use device='cpu'"
+                )
 
     def _text(self, stage: str, split: Any) -> Text:
         own = stage == "judged"
@@ -130,7 +142,10 @@ class Stages:
             # A place that is not among the samples comes from a NaN; its result is not used.
             return f"sample_of(samples, offsets, widths, sample_place({operand}, sample_rows), g)"
 
-        body, results = printer.body(split["body"], of_lane, f"{at}x")
+        if self._reads:
+            body, results = self.reader.body(split["body"], of_lane)
+        else:
+            body, results = printer.body(split["body"], of_lane, f"{at}x")
         return Text(uniforms, member, moment, body, entries, results)
 
     @staticmethod
@@ -152,7 +167,7 @@ class Stages:
     @property
     def head(self) -> str:
         """What stands before the kernels."""
-        return HEAD + TYPES[self.single] + SAMPLES
+        return HEAD + TYPES[self.single] + SAMPLES + (READING if self.reader.lines else "")
 
 
 def in_double(line: str) -> str:
@@ -226,14 +241,22 @@ class Numbers:
             put(np.array(widths or [0], np.int32)),
             put(firsts.astype(np.int64)),
             self.sample_rows,
+            *self._of_reader(machine, stages.reader, members * np.dtype(kind).itemsize),
         )
+
+    def _of_reader(self, machine: Machine, reader: Reader, size: int) -> list[Any]:
+        """What is read, and room for the values of so many bytes each; any arrays where all is printed."""
+        if not reader.lines:
+            return [self.sources] * 3
+        return [*map(machine.put, reader.arrays()), machine.room(reader.places * size)]
 
 
 #: What every kernel takes first.
 ARGUMENTS = (
     "const long members, __global const double *restrict sources, __global const real *restrict uniforms, "
     "__global const real *restrict params, __global const real *restrict samples, __global const long *restrict offsets, "
-    "__global const int *restrict widths, __global const long *restrict firsts, const long sample_rows"
+    "__global const int *restrict widths, __global const long *restrict firsts, const long sample_rows, "
+    "__global const int *restrict lines, __global const bits *restrict constants, __global bits *values"
 )
 
 

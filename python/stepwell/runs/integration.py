@@ -124,7 +124,7 @@ def integrate(
         backend: ``"rust"``, or ``"numpy"`` for the reference.
         device: "cpu", or "opencl" for the first device of OpenCL and "opencl:1" for the second, as ``stepwell.devices()`` lists
             them. None is the CPU, or what the environment variable ``STEPWELL_DEVICE`` names. The bits are those of the CPU.
-            Fixed and adaptive steps of up to some 20 000 operations; events of adaptive steps are looked for by the CPU, and the
+            Fixed and adaptive steps of up to some 100 000 operations; events of adaptive steps are looked for by the CPU, and the
             run is then made by the device. Needs ``pip install "stepwell[gpu]"`` (docs/howto/gpu.md).
         start_step: number of the first step, 0 if None: it begins at t0 + start_step·dt.
         resume: a run or a ``World`` that this one continues, as if it had never stopped, to the bit. Its state, time and step are
