@@ -301,6 +301,19 @@ def test_integrate_knows_a_run_by_all_of_its_options() -> None:
         assert run.y.tobytes() == whole(system, "rk4", v=0.0, y=1.0, force=size, dt=0.1, steps=3).y.tobytes()
 
 
+def test_integrate_notices_another_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of another level of kernels is another run, and an unknown level is an error."""
+    system = sw.Oscillator()
+    for level in sw.isa_levels():
+        monkeypatch.setenv("STEPWELL_KERNELS", level)
+        for _ in range(3):
+            sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
+    assert len(module._recent) == len(sw.isa_levels())
+    monkeypatch.setenv("STEPWELL_KERNELS", "mmx")
+    with pytest.raises(sw.errors.ArgumentError, match="mmx"):
+        sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
+
+
 def test_integrate_keeps_little_memory() -> None:
     """Some runs, of systems with few parameters, and of others nothing."""
     systems = [sw.Oscillator(1.0 + i) for i in range(100)]

@@ -210,7 +210,8 @@ def recent(system: System, method: str | Method, options: Options) -> PreparedRu
     kinds = tuple(map(type, others))
     if not _PLAIN.issuperset(kinds) or os.environ.get("STEPWELL_DEVICE"):
         return None
-    key = (id(system), method if isinstance(method, str) else id(method), *others)
+    # The level may be chosen anew between two calls.
+    key = (_core.isa(), id(system), method if isinstance(method, str) else id(method), *others)
     known = _recent.get(key)
     if known is not None and known.kinds == kinds and known.system() is system:
         if known.run is None and not known.is_large:

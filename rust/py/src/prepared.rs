@@ -168,17 +168,17 @@ fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut [T]) -> boo
 }
 
 fn squares<T: Real>(numbers: &[T]) -> f64 {
-    numbers.iter().map(|x| x.wide() * x.wide()).sum()
+    numbers.iter().fold(0.0, |sum, x| sum + x.wide() * x.wide())
 }
 
 /// The least of the squared lengths of all members; one at rest counts as one unit long.
 fn shortest<T: Real>(v: &[T], y: &[T], members: usize) -> f64 {
     let mut least = f64::INFINITY;
     for member in 0..members {
-        let of_member = |block: &[T]| block.iter().skip(member).step_by(members).map(|x| x.wide() * x.wide()).sum::<f64>();
-        let square = of_member(v) + of_member(y);
-        let rests = || [v, y].into_iter().flat_map(|block| block.iter().skip(member).step_by(members)).all(|x| x.wide() == 0.0);
-        least = least.min(if square == 0.0 && rests() { 1.0 } else { square });
+        let numbers = || [v, y].into_iter().flat_map(|block| block.iter().skip(member).step_by(members));
+        let square = numbers().fold(0.0, |sum, x| sum + x.wide() * x.wide());
+        let rests = square == 0.0 && numbers().all(|x| x.wide() == 0.0);
+        least = least.min(if rests { 1.0 } else { square });
     }
     least
 }
