@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stepwell.device import printer
+from stepwell.errors import ArgumentError
 from support import device_proof, families
 from support.device_proof import Proof
 from support.devices import assert_same, needs_device
@@ -28,7 +29,12 @@ def assert_proven(proof: Proof) -> None:
     if refusal := proof.refusal():
         assert proof.refusal("opencl") == refusal, proof
         return
-    got, core = proof.runs()
+    try:
+        got, core = proof.runs()
+    except ArgumentError as error:
+        if "float32 works with steps of up to" not in str(error):  # which is found when the step is traced, by both
+            raise
+        return
     assert_same(got, core, "t", "v", "y", "first_bad_step", "status", "work", "carry")
     assert got.recorded.keys() == core.recorded.keys()
     pairs = [(got.recorded[name], each) for name, each in core.recorded.items()]
