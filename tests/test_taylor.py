@@ -736,3 +736,20 @@ def test_coefficients_that_vanish_by_chance_are_not_believed(angle: float, toler
     """
     run = sw.integrate(sw.Pendulum(1.0), "taylor", v=0.0, y=angle, tolerance=tolerance, at=[22.0])
     assert run.energy[-1] == pytest.approx(1.0 - np.cos(angle), abs=min(0.01, 1000.0 * tolerance))
+
+
+def test_steps_that_overflow_are_tried_again_alike() -> None:
+    """The sign of a NaN, which is not the same everywhere, decides nothing: both backends make the same tries."""
+    rng, system = np.random.default_rng(0), sw.Pendulum3D()
+    y, v = rng.normal(size=(3, 20)), rng.normal(size=(3, 20)) * 10.0 ** rng.uniform(150, 160, 20)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        arguments: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-6, "at": [1.0], "max_steps": 50}
+        by_core, by_numpy = (sw.integrate(system, "taylor", backend=name, **arguments) for name in ("rust", "numpy"))
+    assert by_core.paces is not None
+    assert by_numpy.paces is not None
+    assert (by_core.paces.rejected > 5).any()
+    for one, other in zip(by_core.paces, by_numpy.paces, strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+    assert np.array_equal(by_core.status, by_numpy.status)
+    assert np.array_equal(by_core.y, by_numpy.y, equal_nan=True)

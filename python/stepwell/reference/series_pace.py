@@ -19,7 +19,7 @@ import numpy as np
 from ..base.arrays import Array
 from .acceptance import Acceptance
 from .adaptive import MAX_FACTOR, ONSET, ROUNDING, Attempted, Pace, largest, longer, numbers_in, over, sizes, stacked, total
-from .bits import DOUBLE, add_bits, and_bits, at_most, clamp, less, shift_up, where
+from .bits import DOUBLE, add_bits, and_bits, at_most, less, shift_up, where
 from .log import split
 from .series import Branch, expanded
 
@@ -160,7 +160,9 @@ def reach(
     bound = where(less(0.0, tolerated), tolerated, np.inf)
 
     def logarithm(size: Any) -> Any:
-        return rough_log2(clamp(size, *BOUNDS))
+        # A size that is not a number counts as the largest: which bits NaN has, its logarithm would show.
+        size = where(less(size, BOUNDS[0]), BOUNDS[0], size)
+        return rough_log2(where(less(size, BOUNDS[1]), size, BOUNDS[1]))
 
     moved, lost = over(first, bound), ROUNDING * counts_as
     one, other = over(last_but_one, bound), over(last, bound)

@@ -178,7 +178,12 @@ fn reach<N: Number>(
         N::choose(zero.below(tolerated), tolerated, number(f64::INFINITY))
     };
     let bound: Vec<N> = groups.map(bound).collect();
-    let logarithm = |size: N| rough_log2(size.clamped(BOUNDS[0], BOUNDS[1]));
+    // A size that is not a number counts as the largest: which bits NaN has, its logarithm would show.
+    let logarithm = |size: N| {
+        let [least, most] = BOUNDS.map(number);
+        let size = N::choose(size.below(least), least, size);
+        rough_log2(N::choose(size.below(most), size, most))
+    };
     let p = order as f64;
     let lost: Vec<N> = counts_as.iter().map(|size| number(ROUNDING) * *size).collect();
     let moved = over(&first, &bound);
