@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, UnknownNameError, UnsupportedError
+from stepwell.runs import engine
+from stepwell.runs.engine.plan import per_step
 from support.cases import assert_same
 from support.families import family
 
@@ -344,3 +346,12 @@ def test_what_is_given_per_member_makes_a_batch_or_must_fit_one(argument: str) -
     assert run.y.shape == (1, 3, 2, 3)
     with pytest.raises(ShapeError, match="control"):
         sw.integrate(sw.NBody(G=[1.0, 2.0]), "rk4", **START, dt=0.01, steps=3, control=control)
+
+
+def test_work_that_overflows_is_infinite_without_a_warning_of_numpy() -> None:
+    """The core's sum has the factor h, so it may be finite where the work is not."""
+    system = sw.NBody([1.0, 1.0]).under(sw.EnergyControl(0.5, target=1.0), ())
+    plan = engine.Plan(system, sw.method("rk4"), (), 1e-3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert per_step(plan, np.array(1e308)) == np.inf

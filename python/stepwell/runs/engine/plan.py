@@ -241,7 +241,8 @@ def per_step(plan: Plan, work: Array | None) -> Array | None:
     """The work of a control in units of energy, from the core's sum over all evaluations, which has the factor h."""
     if work is None:
         return None
-    return np.asarray(np.asarray(work, dtype=np.float64) / (pushes(plan.system.control, plan.method.evaluations) * plan.dt))
+    with np.errstate(over="ignore"):  # infinite is what the energy itself is then
+        return np.asarray(np.asarray(work, dtype=np.float64) / (pushes(plan.system.control, plan.method.evaluations) * plan.dt))
 
 
 def pushes(control: Any, evaluations: int) -> int:
