@@ -11,6 +11,7 @@ import stepwell as sw
 from stepwell.device import adaptive, fixed, opencl
 from stepwell.device.reductions import Extremes, Observer
 from support.devices import NAMES, assert_alike, needs_device
+from support.sweeping import driven, swinging
 
 pytest.importorskip("xarray")
 
@@ -18,18 +19,6 @@ pytestmark = needs_device
 
 E, M = sw.sweeps.Extremes, sw.sweeps.Mean
 Crossing, Period = sw.sweeps.Crossing, sw.sweeps.Period
-
-
-@sw.system
-def driven(t: Any, v: Any, y: Any, *, mu: float = 1.0, push: float = 0.3) -> Any:
-    """The oscillator of van der Pol, driven."""
-    return mu * (1.0 - y**2) * v - y + push * np.sin(t)
-
-
-@sw.system
-def swinging(t: Any, v: Any, y: Any, *, mu: float = 1.0, push: float = 0.3) -> Any:
-    """A pendulum, driven, for methods that carry something."""
-    return -mu * np.sin(y) + push * np.sin(t)
 
 
 @sw.system(order=1)

@@ -11,22 +11,11 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.studies.sweeps import ensemble
 from support.devices import NAMES, assert_alike, needs_device
+from support.sweeping import driven, swinging
 
 pytest.importorskip("xarray")
 
 pytestmark = needs_device
-
-
-@sw.system
-def driven(t: Any, v: Any, y: Any, *, mu: float = 1.0, push: float = 0.0) -> Any:
-    """The oscillator of van der Pol, driven."""
-    return mu * (1.0 - y**2) * v - y + push * np.sin(t)
-
-
-@sw.system
-def swinging(t: Any, v: Any, y: Any, *, mu: float = 1.0, push: float = 0.0) -> Any:
-    """A pendulum, driven, for methods that carry something."""
-    return -mu * np.sin(y) + push * np.sin(t)
 
 
 AXES = {"mu": ("mu", np.linspace(0.5, 4.0, 5)), "y": ("y0", np.linspace(-2.0, 2.0, 13))}

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import copy
+import gc
 import pickle
 import re
 import threading
 import warnings
+import weakref
 from functools import partial
 from typing import Any
 
@@ -14,24 +16,13 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.runs import prepared as module
+from support.own_systems import duffing, lorenz
 
 OPTIONS: list[dict[str, Any]] = [
     {}, {"every": 1}, {"every": 7}, {"dtype": "float32"}, {"fused": True}, {"t0": 3.0, "start_step": 5, "every": 3},
     {"record": "energy", "every": 2}, {"form": "matrix"}, {"backend": "numpy"}, {"threads": 2}, {"dt": -0.05},
 ]  # fmt: skip
 DT = {"dt": 0.05, "steps": 20}
-
-
-@sw.system(order=1)
-def lorenz(t: Any, y: Any, *, rho: Any = 28.0) -> Any:
-    """Lorenz's equations."""
-    return np.array([10.0 * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]])
-
-
-@sw.system
-def duffing(t: Any, v: Any, y: Any, *, beta: Any = 1.0) -> Any:
-    """A driven spring that stiffens."""
-    return 0.3 * np.cos(1.2 * t) - 0.3 * v + y - beta * y * y * y
 
 
 @pytest.fixture(autouse=True)
@@ -325,3 +316,11 @@ def test_integrate_keeps_little_memory() -> None:
     for _ in range(3):
         sw.integrate(large, "rk4", v=0.0, y=1.0, dt=0.01, steps=3)
     assert all(each.run is None or each.run._system is not large for each in module._recent.values())
+    small, start = sw.Oscillator(), np.ones(100_000)
+    for _ in range(3):
+        sw.integrate(small, "rk4", v=0.0, y=start, dt=0.01, steps=3)
+        sw.integrate(small, "rk4", v=0.0, y=1.0, dt=1e-6, steps=10_000, every=1)
+    kept, start = weakref.ref(start), None  # type: ignore[assignment]
+    gc.collect()
+    assert kept() is None
+    assert all(each.run is None or not is_short(each.run) for each in module._recent.values() if each.system() is small)

@@ -10,6 +10,18 @@ import stepwell as sw
 
 
 @sw.system
+def driven(t: Any, v: Any, y: Any, *, mu: float = 1.0, push: float = 0.3) -> Any:
+    """The oscillator of van der Pol, driven."""
+    return mu * (1.0 - y**2) * v - y + push * np.sin(t)
+
+
+@sw.system
+def swinging(t: Any, v: Any, y: Any, *, mu: float = 1.0, push: float = 0.3) -> Any:
+    """A pendulum, driven, for methods that carry something."""
+    return -mu * np.sin(y) + push * np.sin(t)
+
+
+@sw.system
 def duffing(t: Any, v: Any, y: Any, *, alpha=-1.0, beta=1.0, delta=0.3, gamma=0.5, omega=1.2) -> Any:  # type: ignore[no-untyped-def]
     """A spring with two wells, damped and driven."""
     return gamma * np.cos(omega * t) - delta * v - alpha * y - beta * y**3

@@ -24,6 +24,9 @@ from .options import Options, spread
 from .request import Request
 from .result import Run
 
+#: The most bytes of what is kept for later runs: the parameters of a system, and start and saved states of a run.
+MOST_BYTES = 1 << 17
+
 
 class PreparedRun:
     """A run whose arguments were checked once, to be made from many starts: what ``stepwell.prepare`` returns.
@@ -36,8 +39,8 @@ class PreparedRun:
 
     def __init__(self, system: System, method: str | Method, options: Options) -> None:
         self._system, self._method, self._options = system, method, Options(*map(_own, Options._fields, options))
-        #: The last request that was checked as a whole, with the shapes of its blocks in the call; None if others would not be
-        #: the same but for the start.
+        #: The last small request that was checked as a whole, with the shapes of its blocks in the call; None if others would not
+        #: be the same but for the start.
         self._request: tuple[Request, tuple[Shape, Shape]] | None = None
         self._short: _ShortRun | None = None
 
@@ -83,7 +86,7 @@ class PreparedRun:
     def request(self, v: Any, y: Any) -> Request:
         """The request from this start, checked as a whole, after which others of these shapes are checked in less time."""
         request = Request.of(self._system, self._method, self._options._replace(v=v, y=y))
-        if _is_free(request):
+        if _is_free(request) and _is_small(request):
             shapes = (request.v.shape if v is None else np.shape(v)), np.shape(y)
             self._request, self._short = (request, shapes), _short_run(request, shapes)
         return request
@@ -94,7 +97,8 @@ def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = Non
 
     The call takes a few microseconds beside the steps for short runs of fixed steps in the direct form, without control, force,
     events and recorded quantities. Others save the checks of arguments; and nothing is saved where more than the state depends on
-    the start: with a control, algebraic equations, ``force``, ``positive``, or in float32 if it is not short.
+    the start: with a control, algebraic equations, ``force``, ``positive``, or in float32 if it is not short; nor for runs of
+    more than 16 000 numbers, saved states and start together, beside which the checks are little.
 
     Args:
         system: the system to step.
@@ -189,7 +193,7 @@ class _Recent:
 #: Those made last.
 _recent: dict[Any, _Recent] = {}
 #: So many are kept, of systems whose parameters have at most so many bytes.
-MOST_RECENT, MOST_BYTES = 32, 1 << 17
+MOST_RECENT = 32
 #: Options of these types are what they were.
 _PLAIN = frozenset({type(None), bool, int, float, str})
 
@@ -241,6 +245,11 @@ def _is_free(request: Request) -> bool:
     has_target = system.control is not None or system.keeper is not None or system.mass_matrix is not None
     goes_on = request.before is not None or request.carried
     return not (has_target or goes_on or plan.force is not None or plan.acceptance.positive)
+
+
+def _is_small(request: Request) -> bool:
+    """Whether its start and what it saves, which are kept with it, take little memory."""
+    return 8 * (1 + request.plan.save_count) * (request.v.size + request.y.size) <= MOST_BYTES
 
 
 def _from(request: Request, shapes: tuple[Shape, Shape], v: Any, y: Any) -> Request | None:
