@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ from stepwell.runs import engine, prepared
 from stepwell.scenes.builtin.arenstorf import MU
 
 from .compare.chosen.orbits import arenstorf
+
+#: The tolerance of a short orbit.
+ROUGH = 1e-6
 
 #: A short run, and how it can be made.
 SHORT_TITLE, SHORT_STEPS = "A short run: one oscillator, False Euler, 20 steps", 20
@@ -101,6 +105,7 @@ def adaptive_stages(name: str) -> dict[str, float]:
         return made
 
     def call(end: float) -> sw.Run:
+        prepared._recent.clear()
         return sw.integrate(system, method, v=v, y=y, tolerance=TOLERANCE, at=[end], threads=1)
 
     within, around = {0.0: 1e12, one.end: 1e12}, 1e12
@@ -135,6 +140,24 @@ def short_table() -> tuple[str, list[str], list[list[str]]]:
     return SHORT_TITLE, ["way", "µs"], [[name, f"{least(call):.3g}"] for name, call in ways.items()]
 
 
+def short_orbit_table() -> tuple[str, list[str], list[list[str]]]:
+    """One Arenstorf orbit, for the first time and later, and by ``prepare``."""
+    one = arenstorf(1)
+    v, y, system, rows = one.v[:, 0].copy(), one.y[:, 0].copy(), sw.RestrictedThreeBody(MU), []
+    for name in ABLE:
+        options: Any = {"v": v, "y": y, "tolerance": ROUGH, "at": [one.end]}
+        again = sw.prepare(system, name, **options)
+        ways: list[Callable[[], Any]] = [
+            lambda name=name, options=options: sw.integrate(sw.RestrictedThreeBody(MU), name, **options),
+            partial(sw.integrate, system, name, **options),
+            partial(again, v, y),
+        ]
+        rows.append([f"{least(call):.3g}" for call in ways])
+    names = ["`integrate`, of a new system each time", "`integrate`, of the same system", "`prepare(…)(v, y)`"]
+    title = f"A short run: one Arenstorf orbit, tolerance {ROUGH:g}"
+    return title, ["way, µs", *ABLE], [[name, *row] for name, row in zip(names, zip(*rows, strict=True), strict=True)]
+
+
 def adaptive_table() -> tuple[str, list[str], list[list[str]]]:
     """Those of a call with a tolerance, a column for each method."""
     found = [adaptive_stages(name) for name in ABLE]
@@ -154,3 +177,4 @@ if __name__ == "__main__":
     report.show(*table())
     report.show(*short_table())
     report.show(*adaptive_table())
+    report.show(*short_orbit_table())

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.runs import prepared as module
-from support.own_systems import duffing, lorenz
+from support.own_systems import duffing, lorenz, lotka_volterra, pendulum, top
 
 OPTIONS: list[dict[str, Any]] = [
     {}, {"every": 1}, {"every": 7}, {"dtype": "float32"}, {"fused": True}, {"t0": 3.0, "start_step": 5, "every": 3},
@@ -124,6 +124,56 @@ def assert_same_parts(run: sw.Run, other: sw.Run) -> None:
     assert repr(run.paces) == repr(other.paces)
     assert run.status.tobytes() == other.status.tobytes()
     assert run.findings == other.findings
+
+
+ADAPTIVE: list[dict[str, Any]] = [
+    {}, {"at": [2.0]}, {"at": np.linspace(0.0, 3.0, 7)}, {"at": [-1.0, -3.0]}, {"tolerance": (1e-6, 1e-9)},
+    {"t0": 3.0, "at": [5.0]},
+    {"tolerance": (1e-6, 5.0)}, {"tolerance": 0.3}, {"dt": 0.1, "at": [0.5, 3.0]}, {"max_step": 0.05}, {"jumps": [0.3, 0.7]},
+    {"fused": True}, {"max_steps": 5}, {"threads": 2},
+]  # fmt: skip
+FIGURE_EIGHT = sw.scenes.scene("figure_eight")
+STARTS: list[Any] = [
+    (sw.Oscillator(1.3), [(0.1, 1.0), (0.0, 0.0), (3.0, -1e-300)]),
+    (sw.Oscillator(np.linspace(1.0, 2.0, 3)), [(0.0, np.ones(3)), (1.0, np.arange(3.0))]),
+    (sw.Oscillator(2.0, damping=0.1), [(0.0, 1.0), (1.0, 1.0)]),
+    (sw.Pendulum(2.0), [(0.0, 1.0), (0.0, 3.1), (4.1, 0.0)]),
+    (sw.RestrictedThreeBody(0.0123), [(np.array([0.0, -2.0]), np.array([0.994, 0.0])), (np.zeros(2), np.array([0.5, 0.5]))]),
+    (lorenz(), [(None, np.ones(3)), (None, np.array([3.0, 1.0, 20.0])), (None, -np.ones(3))]),
+    (duffing(beta=1.0), [(0.0, 1.0), (0.5, 0.1)]),
+    (pendulum(), [(0.0, 1.0), (0.0, 3.14), (2.1, 0.0)]),
+    (top(), [(np.ones(3), np.array([1.0, 0.0, 0.0, 0.0])), (np.arange(3.0), np.ones(4))]),
+    (FIGURE_EIGHT.system, [(FIGURE_EIGHT.v, FIGURE_EIGHT.y), (0.5 * FIGURE_EIGHT.v, FIGURE_EIGHT.y)]),
+    (lotka_volterra(), [(None, np.array([1.0, 1.0])), (None, np.array([1e-3, 5.0])), (None, np.array([-1.0, 1.0]))]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("options", ADAPTIVE, ids=lambda options: " ".join(f"{k}={v}" for k, v in options.items()) or "plain")
+@pytest.mark.parametrize("method", ["fehlberg", "dop853", "taylor", "rosenbrock23", "rodas5p"])
+def test_adaptive_runs_are_those_of_integrate(method: str, options: dict[str, Any]) -> None:
+    """Systems with and without an energy, a barrier, amounts and many members, with their warnings."""
+    for system, starts in STARTS:
+        arguments = {**ORBIT, **options}
+        expected = []
+        try:
+            for v, y in starts:
+                expected.append(with_warnings(partial(whole, system, method, v=v, y=y, **arguments)))
+        except sw.StepwellError as error:
+            with pytest.raises(type(error), match=re.escape(str(error))):
+                sw.prepare(system, method, v=v, y=y, **arguments)
+            continue
+        run = sw.prepare(system, method, v=starts[0][0], y=starts[0][1], **arguments)
+        assert is_short(run)
+        assert run._short is not None
+        if method != "rosenbrock23":  # whose steps may be very many
+            for start, (other, _) in zip(starts, expected, strict=True):
+                assert (run._short.run(*start) is None) == bool(other.status.any())
+        for _ in range(2):
+            for (v, y), (other, said) in zip(starts, expected, strict=True):
+                for call in (partial(run, v, y), partial(sw.integrate, system, method, v=v, y=y, **arguments)):
+                    got, warned = with_warnings(call)
+                    assert_same(got, other)
+                    assert warned == said
 
 
 def test_arrays_among_the_options_are_copied() -> None:
@@ -266,6 +316,47 @@ def test_only_what_depends_on_the_start_is_checked_again(monkeypatch: pytest.Mon
     monkeypatch.setattr("stepwell.runs.request.Request.of", None)
     assert_same(run(0.5, 1.5), expected)
     assert_same(sw.integrate(system, "rk4", v=0.5, y=1.5, **DT), expected)
+
+
+def test_of_adaptive_steps_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where times and tolerances are lists and pairs, which may be written to."""
+    system, at = sw.RestrictedThreeBody(0.0123), [1.0, 2.0]
+    for times, tolerance in ((at, (1e-6, 1e-9)), (np.array(at), np.float64(1e-6)), ([np.float64(1.0), 2], 1e-6)):
+        arguments: dict[str, Any] = {"v": np.array([0.0, -2.0]), "y": np.array([0.994, 0.0]), "tolerance": tolerance}
+        expected = whole(system, "dop853", at=times, **arguments)
+        for _ in range(3):
+            sw.integrate(system, "dop853", at=times, **arguments)
+        with monkeypatch.context() as patched:
+            patched.setattr("stepwell.runs.request.Request.of", None)
+            assert_same(sw.integrate(system, "dop853", at=times, **arguments), expected)
+        later = whole(system, "dop853", at=[1.0, 3.0], **arguments)
+        times[1] = 3.0
+        assert_same(sw.integrate(system, "dop853", at=times, **arguments), later)
+        times[1] = 2.0
+
+
+def test_a_long_run_is_made_as_any_other() -> None:
+    """It is given up after some tenths of a millisecond, and not tried again."""
+    run, arguments = (
+        sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-9, at=[1e4]),
+        {"tolerance": 1e-9, "at": [1e4]},
+    )
+    assert run._short is not None
+    assert_same(run(0.0, 1.0), whole(sw.Oscillator(), "dop853", v=0.0, y=1.0, **arguments))
+    assert run._short.run(0.0, 1.0) is None
+
+
+def test_stiffness_is_noticed() -> None:
+    """Of some hundred steps, which are looked at."""
+    system = sw.Oscillator(30.0, damping=2e4)
+    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-3, "at": [1.0]}
+    expected, said = with_warnings(partial(whole, system, "dop853", **arguments))
+    assert "StiffnessWarning" in said[0]
+    run = sw.prepare(system, "dop853", **arguments)
+    for _ in range(2):
+        got, warned = with_warnings(partial(run, 0.0, 1.0))
+        assert_same(got, expected)
+        assert warned == said
 
 
 def test_integrate_knows_a_run_by_all_of_its_options() -> None:

@@ -16,6 +16,7 @@ __all__ = [
     "Equations",
     "ModelSpec",
     "Prepared",
+    "PreparedAdaptive",
     "Symbol",
     "Tape",
     "World",
@@ -31,8 +32,10 @@ __all__ = [
     "isa",
     "isa_levels",
     "listen",
+    "names_device",
     "operations",
     "prepared",
+    "prepared_adaptive",
     "program",
     "recorded",
     "run",
@@ -115,6 +118,27 @@ class Prepared:
 
         0: nothing was made, since the start is not of floats of the prepared shapes, or a number was not finite, or another
         thread makes the run now. 2: it is certain that no member has grown much. 1: neither.
+        """
+
+@final
+class PreparedAdaptive:
+    """A run of adaptive steps without its start."""
+
+    def run(
+        self,
+        v: object,
+        y: object,
+        saved_v: NDArray[np.float64],
+        saved_y: NDArray[np.float64],
+        last_v: NDArray[np.float64],
+        last_y: NDArray[np.float64],
+        paces: NDArray[np.float64],
+    ) -> int:
+        """Make the run from a start and fill the saved states, and those at the end with their step-size controllers.
+
+        0: nothing was made, since the start is not of floats of the prepared shapes, or a member did not come to its end, or it
+        takes long, or another thread makes the run now. 2: what the motion keeps has not changed much, and no amount became
+        negative. 1: one of both may be so.
         """
 
 @final
@@ -299,6 +323,9 @@ def sound(value: object, finite: bool, positive: bool) -> bool:
 def systems() -> list[str]: ...
 def isa() -> str: ...
 def isa_levels() -> list[str]: ...
+def names_device() -> bool:
+    """Whether the environment variable ``STEPWELL_DEVICE`` names a device."""
+
 def ask(function: Callable[[], object] | None) -> None:
     """Let this thread ask a function at intervals while it steps, or none; what the function raises ends the run."""
 
@@ -321,6 +348,24 @@ def prepared(model: ModelSpec, plan: Plan, members: int, shapes: list[list[int]]
     """A run of so many members without its start; None if it is not a short one.
 
     Of the plan it reads what ``run`` does; ``shapes`` are those of v and y, with the batch.
+    """
+
+def prepared_adaptive(
+    model: ModelSpec,
+    plan: Plan,
+    pacing: CorePacing,
+    paces: NDArray[np.float64],
+    shapes: list[list[int]],
+    numbers: list[int],
+    members: int,
+    *,
+    quantities: ModelSpec | None,
+    has_amounts: bool,
+) -> PreparedAdaptive | None:
+    """A run with a tolerance of so many members, whose blocks have so many numbers, without its start.
+
+    None if it cannot be prepared. ``shapes`` are those of v and y, with the batch; ``quantities`` is a model that records what
+    the motion keeps; ``has_amounts`` says that it is looked for numbers that became negative.
     """
 
 def recorded(

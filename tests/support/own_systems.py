@@ -23,6 +23,18 @@ def lorenz(t: Any, y: Any, *, sigma: Any = 10.0, rho: Any = 28.0, beta: Any = 8 
     return np.array([sigma * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - beta * y[2]])
 
 
+@sw.system(order=1)
+def lotka_volterra(t: Any, y: Any, *, a: Any = 1.5, b: Any = 3.0) -> Any:
+    """Prey and predators, neither of which becomes negative."""
+    return np.array([a * y[0] - y[0] * y[1], y[0] * y[1] - b * y[1]])
+
+
+@lotka_volterra.invariant
+def cycle(y: Any, *, a: Any, b: Any) -> Any:
+    """What a cycle of them keeps."""
+    return y[0] - b * np.log(y[0]) + y[1] - a * np.log(y[1])
+
+
 @sw.system
 def pendulum(t: Any, v: Any, y: Any, *, omega: Any = 1.0) -> Any:
     """The built-in one, written by oneself."""

@@ -16,7 +16,7 @@ from .result import AdaptiveState, Paces, Run
 def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
     """Make the run, without its diagnostics. Where its members stood on the way is added to ``waypoints``, if it is known."""
     assert request.step_control is not None
-    plan, (pacing, paces, t0, times, going_on, every, start), method = request.plan, request.step_control, request.plan.method
+    plan, (pacing, paces, _, times, _, every, start), method = request.plan, request.step_control, request.plan.method
     with_events, adapt, keeper = None, engine.adapt, None
     if waypoints is not None:
         pacing = pacing._replace(waypoints=True)
@@ -39,22 +39,35 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
         out = adapt(plan if progress is None else plan._replace(progress=progress), pacing, paces, request.v, request.y)
     if waypoints is not None and out.waypoints is not None:
         waypoints.append(out.waypoints)
-    accepted, rejected, extra_steps = out.paces[engine.COUNTS].astype(np.int64)
-    # A series needs no further evaluation for the states within a step, unless operations are fused.
-    again = out.paces[engine.HELD] > 0.0 if method.has_series and not plan.fused else extra_steps
-    evaluations = out.evaluations * (accepted + rejected + again)
-    stopped, sign = np.count_nonzero(out.status) > 0, -1.0 if plan.backward else 1.0
-    control = request.system.control
     t, v, y = times[-len(out.v) :], out.v, out.y
     if keeper is not None:
         t, v, y = keeper.saved(plan, start, (np.broadcast_to(pacing.at[-1], plan.batch), v[-1], y[-1]))
-        t = sign * t
+        t = (-1.0 if plan.backward else 1.0) * t
+    run = run_of(request, out, t, v, y)
+    if request.record:
+        from .engine.recorded import recorded  # only runs that record need it
+
+        run.recorded = recorded(run.system, request.record, run.dt, run.v, run.y, plan.backend)
+    if with_events is not None:
+        with_events.write_to(run)
+    return run
+
+
+def run_of(request: Request, out: engine.Adapted, t: Array, v: Array, y: Array) -> Run:
+    """The run of what the engine made, with these states saved at these times."""
+    assert request.step_control is not None
+    plan, (pacing, _, t0, times, going_on, _, _), method = request.plan, request.step_control, request.plan.method
+    counted, stopped, control = (
+        paces_of(plan, out.paces, out.evaluations),
+        np.count_nonzero(out.status) > 0,
+        request.system.control,
+    )
     run = Run(
         t=t,
         v=v.astype(plan.dtype, copy=False),
         y=y.astype(plan.dtype, copy=False),
         status=out.status.astype(np.int8),
-        first_bad_step=np.where(out.status == 0, -1, accepted + 1) if stopped else np.full(plan.batch, -1),
+        first_bad_step=np.where(out.status == 0, -1, counted.accepted + 1) if stopped else np.full(plan.batch, -1),
         carry=None,
         system=request.system,
         method=method,
@@ -63,7 +76,7 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(sign * out.paces[engine.TIME], sign * out.paces[engine.STEP], accepted, rejected, evaluations),
+        paces=counted,
         controller_state=AdaptiveState(
             out.last_v, out.last_y, _with_target(out.paces, pacing.at[-1]), times[-1], method.name, going_on
         ),
@@ -71,15 +84,19 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
         force=plan.force,
         work=None if control is None else out.paces[engine.WORK] / engine.pushes(control, method.attempt_evaluations),
     )
-    if request.record:
-        from .engine.recorded import recorded  # only runs that record need it
-
-        run.recorded = recorded(run.system, request.record, run.dt, run.v, run.y, plan.backend)
     if stopped:
-        run.stopped_at = np.where(out.status == 0, np.nan, sign * out.paces[engine.TIME])
-    if with_events is not None:
-        with_events.write_to(run)
+        run.stopped_at = np.where(out.status == 0, np.nan, counted.t)
     return run
+
+
+def paces_of(plan: engine.Plan, numbers: Array, evaluations: int) -> Paces:
+    """What a run tells of the step-size controllers at its end, whose attempts make so many function evaluations."""
+    accepted, rejected, extra_steps = numbers[engine.COUNTS].astype(np.int64)
+    # A series needs no further evaluation for the states within a step, unless operations are fused.
+    again = numbers[engine.HELD] > 0.0 if plan.method.has_series and not plan.fused else extra_steps
+    sign = -1.0 if plan.backward else 1.0
+    made = evaluations * (accepted + rejected + again)
+    return Paces(sign * numbers[engine.TIME], sign * numbers[engine.STEP], accepted, rejected, made)
 
 
 def _with_target(paces: Array, target: float) -> Array:

@@ -50,10 +50,10 @@ PLACES, FINER, TIMES = 1024, 33, 3
 ROUNDING = 2.0**-40
 
 
-def keeps_energy(run: Run) -> bool:
-    """Whether the true motion keeps its energy: no damping, drag, friction, floors, inputs or torques."""
-    system: System = run.system.uncontrolled
-    if run.force is not None or getattr(system, "torques_act", False):
+def keeps_energy(system: System, force: Array | None) -> bool:
+    """Whether the true motion keeps its energy: no damping, drag, friction, floors, inputs, torques or force."""
+    system = system.uncontrolled
+    if force is not None or getattr(system, "torques_act", False):
         return False
     if not all(part.keeps_energy for part in system.around):
         return False
@@ -69,6 +69,16 @@ def may_pass_barriers(system: System, method: Method, steps: int) -> bool:
     """Whether a run of fixed steps may pass a barrier, and is long enough to look for that; most systems have none."""
     has_barriers = isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS
     return method.limit != 0.0 and has_barriers and method.evaluations * steps >= FEW_EVALUATIONS
+
+
+def judged_by_change(system: System, force: Array | None) -> list[str] | None:
+    """The invariants by whose change a run of adaptive steps is judged; None if it is judged by more than that.
+
+    Changes below ``LITTLE`` of their size say that the run followed the motion.
+    """
+    if system.keeper is not None or not (names := _names(system)) or not keeps_energy(system, force):
+        return []
+    return None if _has_barriers(system) else names
 
 
 def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[type[Warning]], bool]) -> About | None:
@@ -91,7 +101,7 @@ def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[t
     evaluations = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
     if evaluations < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS:
         return None
-    if not keeps_energy(run) or not heard(AccuracyWarning):
+    if not keeps_energy(system, run.force) or not heard(AccuracyWarning):
         return None
     start = np.broadcast_to(start[0], run.v.shape[1:]), np.broadcast_to(start[1], run.y.shape[1:])
     with np.errstate(all="ignore"):
@@ -101,6 +111,12 @@ def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[t
             if about is not None and (system.kernel != KERNEL_OF_EQUATIONS or _is_constant(run, name)):
                 return about
     return None
+
+
+def _has_barriers(system: System) -> bool:
+    """Whether it moves along a line or a circle, where it may not pass what takes more energy than it has."""
+    is_line = system.kernel == KERNEL_OF_EQUATIONS and system.v_shape == () and system.y_shape == ()
+    return isinstance(system, Pendulum) or is_line
 
 
 def _is_constant(run: Run, name: str) -> bool:
@@ -130,8 +146,7 @@ def _of_one(run: Run, name: str, start: State, evaluations: int, visited: Visite
     # Of few members it takes some tenths of a millisecond; else a place takes as long as some hundred evaluations of the core.
     few = run.status.size * PLACES <= MOST_NUMBERS // 10
     places = PLACES if few else min(PLACES, MOST_NUMBERS // run.status.size, evaluations // 100)
-    is_line = system.kernel == KERNEL_OF_EQUATIONS and system.v_shape == () and system.y_shape == ()
-    has_barriers = isinstance(system, Pendulum) or (is_line and places >= FINER)
+    has_barriers = _has_barriers(system) and (isinstance(system, Pendulum) or places >= FINER)
     if not has_barriers and run.paces is None:
         return None
     region = None if not has_barriers else _saved(run, start) if run.paces is None else _farthest(run)

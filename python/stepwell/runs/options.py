@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .. import _core
 from ..base import checks, registry
 from ..base.arrays import Array, Shape
 from ..base.reprs import of_member
@@ -110,7 +110,7 @@ def check_algebraic(system: System, y: Array, t: Any, tolerances: Any = None) ->
 
 def machine_of(device: Any, backend: str) -> Any:
     """The machine that makes the steps, or None for the CPU; without looking for any if it is that."""
-    if (device is None and not os.environ.get("STEPWELL_DEVICE")) or device == "cpu" or backend != "rust":
+    if (device is None and not _core.names_device()) or device == "cpu" or backend != "rust":
         if device not in (None, "cpu") and backend != "rust":
             raise ArgumentError(f"device: works with backend='rust' only, got backend={backend!r}")
         return None
@@ -177,6 +177,12 @@ def quantities(system: System, record: Any) -> list[str]:
         v, y = (np.zeros((*shape, *system.batch)) for shape in (system.v_shape, system.y_shape))
         system.energy(v, y)  # raises if there is none, before any work
     return list(dict.fromkeys(names))
+
+
+def block_like(block: Any, like: Array) -> Array:
+    """A block as a request has it, of the shape of another."""
+    array = np.asarray(0.0 if block is None else block, np.float64)
+    return array if array.shape == like.shape else checks.over(array, like.shape)
 
 
 def spread(array: Array, block: Shape, batch: Shape) -> Array:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import ref
 
 import numpy as np
 
 from .. import _core
 from ..base import checks
-from ..base.arrays import Array, Shape
+from ..base.arrays import Shape
 from ..base.immutable import frozen
 from ..errors import ArgumentError
 from ..model.methods import Method
@@ -20,9 +19,12 @@ from .diagnostics import findings_of, finds_growth_only
 from .findings import is_heard, warn_of
 from .fixed import fixed_run
 from .making import noticing
-from .options import Options, spread
+from .options import Options, block_like, spread
 from .request import Request
 from .result import Run
+
+if TYPE_CHECKING:
+    from .prepared_adaptive import ShortAdaptiveRun
 
 #: The most bytes of what is kept for later runs: the parameters of a system, and start and saved states of a run.
 MOST_BYTES = 1 << 17
@@ -42,7 +44,7 @@ class PreparedRun:
         #: The last small request that was checked as a whole, with the shapes of its blocks in the call; None if others would not
         #: be the same but for the start.
         self._request: tuple[Request, tuple[Shape, Shape]] | None = None
-        self._short: _ShortRun | None = None
+        self._short: _ShortRun | ShortAdaptiveRun | None = None
 
     def __repr__(self) -> str:
         """Of one line."""
@@ -95,8 +97,8 @@ class PreparedRun:
 def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = None, **options: Any) -> PreparedRun:
     """Check and prepare a run once, to make it from many starts: ``prepare(…)(v, y)`` is ``integrate(…)`` in less time.
 
-    The call takes a few microseconds beside the steps for short runs of fixed steps in the direct form, without control, force,
-    events and recorded quantities. Others save the checks of arguments; and nothing is saved where more than the state depends on
+    The call takes a few microseconds beside the steps for short runs of fixed steps in the direct form, and of some hundred
+    adaptive steps, without control, force, events and recorded quantities. Others save the checks of arguments; and nothing is saved where more than the state depends on
     the start: with a control, algebraic equations, ``force``, ``positive``, or in float32 if it is not short; nor for runs of
     more than 16 000 numbers, saved states and start together, beside which the checks are little.
 
@@ -169,7 +171,7 @@ class _ShortRun:
         )  # fmt: skip
         if outcome != TAME or not self.is_plain:
             request = self.request
-            request = request._replace(v=_block(v, request.v), y=_block(y, request.y))
+            request = request._replace(v=block_like(v, request.v), y=block_like(y, request.y))
             if findings := findings_of(run, request, is_heard):
                 run.findings = findings
         return run
@@ -194,8 +196,31 @@ class _Recent:
 _recent: dict[Any, _Recent] = {}
 #: So many are kept, of systems whose parameters have at most so many bytes.
 MOST_RECENT = 32
+
+
+class _Numbers(NamedTuple):
+    """The numbers of a list, a tuple or an array, to be looked up."""
+
+    kind: type
+    types: Any
+    numbers: Any
+
+
 #: Options of these types are what they were.
-_PLAIN = frozenset({type(None), bool, int, float, str})
+_PLAIN = frozenset({type(None), bool, int, float, str, np.float64, _Numbers})
+#: At most so many numbers are looked up.
+MOST_NUMBERS = 128
+
+
+def _numbers(option: Any) -> Any:
+    """An option as its numbers, if it is a short list, tuple or array of them; else itself."""
+    kind = type(option)
+    if (kind is list or kind is tuple) and len(option) <= MOST_NUMBERS:
+        types = tuple(map(type, option))
+        return _Numbers(kind, types, tuple(option)) if _PLAIN.issuperset(types) else option
+    if kind is np.ndarray and option.size <= MOST_NUMBERS and option.dtype == np.float64:
+        return _Numbers(kind, option.shape, option.tobytes())
+    return option
 
 
 def _bytes(system: System) -> int:
@@ -210,9 +235,9 @@ def recent(system: System, method: str | Method, options: Options) -> PreparedRu
 
     It is prepared at the second time, since most runs are made once.
     """
-    others = options[2:]
+    others = *options[2:5], _numbers(options.tolerance), _numbers(options.at), *options[7:]
     kinds = tuple(map(type, others))
-    if not _PLAIN.issuperset(kinds) or os.environ.get("STEPWELL_DEVICE"):
+    if not _PLAIN.issuperset(kinds) or _core.names_device():
         return None
     # The level may be chosen anew between two calls.
     key = (_core.isa(), id(system), method if isinstance(method, str) else id(method), *others)
@@ -231,12 +256,6 @@ def recent(system: System, method: str | Method, options: Options) -> PreparedRu
 
 #: What the core says of a short run: it was not made; or it is certain that no member has grown.
 NOT_MADE, TAME = 0, 2
-
-
-def _block(block: Any, like: Array) -> Array:
-    """A block as a request has it, of the shape of another."""
-    array = np.asarray(0.0 if block is None else block, np.float64)
-    return array if array.shape == like.shape else checks.over(array, like.shape)
 
 
 def _is_free(request: Request) -> bool:
@@ -270,16 +289,22 @@ def _from(request: Request, shapes: tuple[Shape, Shape], v: Any, y: Any) -> Requ
     return request._replace(v=v, y=y, step_control=control)
 
 
-def _short_run(request: Request, shapes: tuple[Shape, Shape]) -> _ShortRun | None:
+def _short_run(request: Request, shapes: tuple[Shape, Shape]) -> _ShortRun | ShortAdaptiveRun | None:
     """What the run is without its start; None if that is not known to be short."""
     plan = request.plan
     asks_for_more = plan.record or request.record or request.events is not None or request.progress
-    is_other = plan.form != "direct" or plan.backend != "rust" or plan.device is not None or request.step_control is not None
+    is_other = plan.form != "direct" or plan.backend != "rust" or plan.device is not None
     has_own = isinstance(plan.t0, np.ndarray) or plan.memory is not None
-    if asks_for_more or is_other or has_own or isinstance(request.system, NBody) or not plan.members:
+    if asks_for_more or is_other or has_own or not plan.members:
         return None
     # A block of another shape may mean another batch, or another system.
     if any(shape not in ((), whole.shape) for shape, whole in zip(shapes, (request.v, request.y), strict=True)):
+        return None
+    if request.step_control is not None:
+        from .prepared_adaptive import short_adaptive_run  # only such runs need it
+
+        return short_adaptive_run(request, shapes)
+    if isinstance(request.system, NBody):
         return None
     core = _core.prepared(engine.model(plan), plan, plan.members, list(map(list, shapes)))
     return None if core is None else _ShortRun(request, core)

@@ -3,6 +3,7 @@
 mod methods;
 mod model;
 mod prepared;
+mod prepared_adaptive;
 mod tape;
 mod world;
 
@@ -62,6 +63,12 @@ fn systems() -> Vec<&'static str> {
 #[pyfunction]
 fn isa() -> PyResult<&'static str> {
     Level::choose().map(Level::name).map_err(|unknown| core_error(unknown.into()))
+}
+
+/// Whether the environment names a device for all runs. (`os.environ` takes a microsecond to say so.)
+#[pyfunction]
+fn names_device() -> bool {
+    std::env::var_os("STEPWELL_DEVICE").is_some_and(|name| !name.is_empty())
 }
 
 /// The CPU levels that this machine has, ascending.
@@ -510,6 +517,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(systems, m)?)?;
     m.add_function(wrap_pyfunction!(isa, m)?)?;
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
+    m.add_function(wrap_pyfunction!(names_device, m)?)?;
     m.add_function(wrap_pyfunction!(ask, m)?)?;
     m.add_function(wrap_pyfunction!(listen, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
@@ -532,6 +540,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<tape::Symbol>()?;
     m.add_function(wrap_pyfunction!(prepared::prepared, m)?)?;
     m.add_class::<prepared::Prepared>()?;
+    m.add_function(wrap_pyfunction!(prepared_adaptive::prepared_adaptive, m)?)?;
+    m.add_class::<prepared_adaptive::PreparedAdaptive>()?;
     m.add_class::<world::World>()?;
     Ok(())
 }

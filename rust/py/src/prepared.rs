@@ -139,7 +139,7 @@ impl Prepared {
 }
 
 /// Takes the numbers of a block, all finite, and whether it could: from one number for all, or an array of floats of this shape.
-fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut [T]) -> bool {
+pub(crate) fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut [T]) -> bool {
     let mut is_finite = true;
     let mut taken = |number: f64| {
         let number = T::of(number);

@@ -347,7 +347,7 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     if not _adapt_by_core(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
         before = numbers_of(begun(plan, paces, v, y)).reshape(numbers, members)
         _adapt_by_core(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
-    each = _evaluations_of_attempt(plan)
+    each = evaluations_of_attempt(plan)
     last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
     paces = last_paces.reshape(numbers, *plan.batch)
     return Adapted(saved_v, saved_y, last_v, last_y, paces, status, each, steps, waypoints)
@@ -362,7 +362,8 @@ def _adapt_by_core(model: _core.ModelSpec, plan: Plan, pacing: CorePacing, array
     return adaptive.adapt(plan.device, model, plan, pacing, arrays)
 
 
-def _evaluations_of_attempt(plan: Plan) -> int:
+def evaluations_of_attempt(plan: Plan) -> int:
+    """Function evaluations of an attempt of a plan."""
     if plan.method.has_series:
         return _core.series_evaluations(model(plan._replace(t0=0.0)), attempts=True)
     return plan.method.attempt_evaluations
@@ -378,7 +379,7 @@ def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array
     waypoints = room_for_waypoints(pacing, numbers, pace_numbers(plan), plan.members)
     at, budget, every = pacing.at, pacing.budget, pacing.every
     out = adaptive.run(attempt, v, y, pace, at=at, budget=budget, jumps=jumps, series=series, every=every, waypoints=waypoints)
-    each = _evaluations_of_attempt(plan)
+    each = evaluations_of_attempt(plan)
     steps = _gathered(plan, out.steps) if pacing.every else None
     paces = numbers_of(out.pace)
     return Adapted(out.v, out.y, out.last_v, out.last_y, paces, out.status, each, steps, waypoints)

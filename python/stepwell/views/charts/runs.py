@@ -277,7 +277,7 @@ def _begins(scene: Scene, run: Run) -> bool:
 
 
 def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
-    if scene.exact is None and not keeps_energy(run):
+    if scene.exact is None and not keeps_energy(run.system, run.force):
         return None, ""  # it changes in the true motion, which is not known
     try:
         energy = run.energy

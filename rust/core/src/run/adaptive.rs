@@ -27,6 +27,9 @@ const LARGE_MEMBER_NUMBERS: usize = 1000;
 /// Members of a small system below which a second thread costs more time than it saves.
 const MIN_MEMBERS_FOR_THREADS: usize = 256;
 
+/// Operations of a run, by lanes, that takes some tenths of a millisecond.
+const MOST_OPERATIONS: usize = 1 << 21;
+
 /// Makes the run, and returns whether it did: where members stand at the start is not found for a system whose attempt is not one
 /// tape. The monitor is as that of [`crate::run::fixed::run`].
 pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<bool, Error> {
@@ -79,6 +82,43 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
     let workers = Workers { threads, background: traced.is_long(lanes), total: b as f64, stop: Stop::clone(&stop) };
     workers::share(parts, &workers, monitor, mine, worker, Worker::part)?;
     Ok(true)
+}
+
+/// Members in lanes, which are made once for runs that differ in their start alone.
+pub struct Prepared {
+    group: Option<Box<dyn AdaptiveBatch>>,
+    /// After so many calls of the monitor a run takes longer than others wait for.
+    most_checks: usize,
+}
+
+impl Prepared {
+    /// For runs such as this one, by one thread; None if where members stand at the start is to be found by others.
+    pub fn new(plan: &AdaptiveRun) -> Result<Option<Self>, Error> {
+        let traced = plan.model.traced()?;
+        plan.model.room(traced.shape, 1)?;
+        let machine = Machine { threads: 1, ..plan.machine };
+        let group = plan.model.adaptive(&traced, machine, plan.members, plan.budget as f64)?;
+        let most_checks = MOST_OPERATIONS / (traced.operations.1 * MOST_ATTEMPTS * group.lanes()).max(1);
+        Ok((!plan.begins || group.begins()).then_some(Prepared { group: Some(group), most_checks }))
+    }
+
+    /// Makes the run, and returns whether it did: not if it takes long.
+    pub fn run(&mut self, plan: &AdaptiveRun, arrays: Arrays) -> Result<bool, Error> {
+        let Some(group) = self.group.take() else { return Ok(false) };
+        let mut worker = Worker { plan, group, waypoints: WaypointSearch::new(plan.v.len() + plan.y.len()) };
+        let mut left = self.most_checks;
+        let mut go_on = |ended| {
+            left = if ended == 0 { left.saturating_sub(1) } else { left };
+            left > 0
+        };
+        let parts = arrays.parts(plan.members, vec![plan.members]);
+        let made = parts.into_iter().try_for_each(|part| worker.part(part, &mut go_on));
+        self.group = Some(worker.group);
+        match made {
+            Err(Error::Interrupted) => Ok(false),
+            other => other.map(|()| true),
+        }
+    }
 }
 
 /// How long a step is that ends at the wall if it would cross it.

@@ -287,6 +287,22 @@ impl<T: Steppable> World<T> {
         is_finite.then_some(held)
     }
 
+    /// The recorded quantities of a state, as rows of one number per member.
+    pub fn recorded(&mut self, v: &[T], y: &[T]) -> Vec<T> {
+        let members = self.members;
+        let mut rows = Vec::new();
+        for share in &mut self.shares {
+            share.load(v, y, members);
+            let (recorded, lanes) = (share.group.recorded(), share.group.lanes());
+            rows.resize(recorded * members, T::default());
+            let mut slot = vec![T::default(); recorded * lanes];
+            share.group.record(&mut slot);
+            store(&mut rows, members, (share.first, share.count), &slot, lanes);
+        }
+        self.is_written = false;
+        rows
+    }
+
     /// `n` steps, in place. `v` and `y` are rows of one number per member.
     pub fn step(&mut self, n: i64, v: &mut [T], y: &mut [T]) {
         let (k, until, members, carries) = (self.step, self.step + n, self.members, self.carries);

@@ -154,7 +154,7 @@ impl<N: Number> Pace<N> {
     /// Places of the time and of the step to try next among them.
     pub(crate) const PLACES: [usize; 2] = [0, 1];
     /// The place of the number of accepted attempts.
-    pub(crate) const ACCEPTED: usize = 15;
+    pub const ACCEPTED: usize = 15;
 
     /// Where the next step ends, and whether that is at the wall.
     fn reach(&self) -> (N, N::Truth) {

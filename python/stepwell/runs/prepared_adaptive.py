@@ -1,0 +1,111 @@
+"""Short runs of adaptive steps that differ in their start alone."""
+
+from __future__ import annotations
+
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..base.arrays import Shape
+from ..base.immutable import changed
+from ..model.methods import method
+from ..model.systems import NBody, System
+from . import engine, known_energy
+from .adaptive import paces_of, run_of
+from .diagnostics import findings_of
+from .findings import is_heard
+from .options import block_like
+from .request import Request
+from .result import AdaptiveState, Run
+from .tolerance import lost_in_tolerance
+
+#: What the core says of a run: it was not made; or nothing that it looks at can be found of it.
+NOT_MADE, TAME = 0, 2
+
+
+class ShortAdaptiveRun:
+    """A run of so few adaptive steps that all else takes longer, without its start."""
+
+    def __init__(self, request: Request, core: _core.PreparedAdaptive, is_plain: bool) -> None:
+        plan, control = request.plan, request.step_control
+        assert control is not None
+        times, shape_of_paces = len(control.times), (engine.pace_numbers(plan), *plan.batch)
+        self.request, self.core = request, core
+        self.shapes = (times, *request.v.shape), (times, *request.y.shape), request.v.shape, request.y.shape, shape_of_paces
+        self.evaluations = engine.evaluations_of_attempt(plan)
+        #: Whether nothing can be found of a run but what the core checks, and of its absolute tolerance.
+        self.is_plain = is_plain
+        is_absolute = not plan.acceptance.own and bool((control.paces[engine.ABSOLUTE] > engine.LEAST).any())
+        self.groups = engine.groups_of(plan) if is_absolute else None
+        #: All attributes of a run, of which most do not depend on the start.
+        self.attributes: dict[str, Any] = {}
+
+    def begin(self, v: Any, y: Any) -> bool:
+        """Make the run once, to know all attributes, from this start; returns whether it was made."""
+        plan, control = self.request.plan, self.request.step_control
+        assert control is not None
+        saved_v, saved_y, last_v, last_y, paces = map(np.empty, self.shapes)
+        if self.core.run(v, y, saved_v, saved_y, last_v, last_y, paces) == NOT_MADE:
+            return False
+        out = engine.Adapted(saved_v, saved_y, last_v, last_y, paces, np.zeros(plan.batch, np.int64), self.evaluations)
+        run = run_of(self.request, out, control.times, saved_v, saved_y)
+        self.attributes = vars(run)
+        self.t, self.status, self.first_bad_step = run.t, run.status, run.first_bad_step
+        assert run.controller_state is not None
+        self.end, self.last = control.pacing.at[-1], run.controller_state[3:]
+        return True
+
+    def run(self, v: Any, y: Any) -> Run | None:
+        """The run from this start; None if it is to be made as any other."""
+        if not self.attributes and not self.begin(v, y):
+            return None
+        saved_v, saved_y, last_v, last_y, pace = map(np.empty, self.shapes)
+        outcome = self.core.run(v, y, saved_v, saved_y, last_v, last_y, pace)
+        if outcome == NOT_MADE:
+            return None
+        request = self.request
+        paces = paces_of(request.plan, pace, self.evaluations)
+        pace[engine.TARGET] = self.end
+        run = object.__new__(Run)
+        attributes = run.__dict__
+        attributes.update(self.attributes)
+        attributes.update(
+            t=self.t.copy(), v=saved_v, y=saved_y, status=self.status.copy(), first_bad_step=self.first_bad_step.copy(),
+            paces=paces, controller_state=AdaptiveState(last_v, last_y, pace, *self.last), recorded={}, events={},
+        )  # fmt: skip
+        is_tame = outcome == TAME and self.is_plain
+        if not is_tame or (self.groups is not None and lost_in_tolerance(pace, self.groups).any()):
+            start = block_like(v, request.v), block_like(y, request.y)
+            if findings := findings_of(run, request._replace(v=start[0], y=start[1]), is_heard):
+                run.findings = findings
+        return run
+
+
+def short_adaptive_run(request: Request, shapes: tuple[Shape, Shape]) -> ShortAdaptiveRun | None:
+    """What the run is without its start; None if it cannot be prepared."""
+    plan, control, system = request.plan, request.step_control, request.system
+    assert control is not None
+    if control.every is not None or control.t0.ndim or control.times.ndim > 1 or plan.single:
+        return None
+    names, quantities = known_energy.judged_by_change(system, plan.force), None
+    if names and not isinstance(system, NBody):
+        alone = changed(system.uncontrolled, around=())  # no step is made, so any method will do
+        quantities = engine.model(engine.Plan(alone, method("false_euler"), plan.batch, 1.0, record=tuple(names)))
+    numbers, core_plan = [prod(system.v_shape), prod(system.y_shape)], plan._replace(t0=0.0)
+    core = _core.prepared_adaptive(
+        engine.model(core_plan),
+        core_plan,
+        engine.pacing_of_core(plan, control.pacing),
+        control.paces.reshape(len(control.paces), -1),
+        list(map(list, shapes)),
+        numbers,
+        plan.members,
+        quantities=quantities,
+        has_amounts=not numbers[0] and bool(system.groups) and not plan.backward,
+    )
+    if core is None:
+        return None
+    is_plain = names is not None and not isinstance(system, NBody) and type(system).doubt is System.doubt
+    return ShortAdaptiveRun(request, core, is_plain)
