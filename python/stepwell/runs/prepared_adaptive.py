@@ -21,7 +21,7 @@ from .request import Request
 from .result import AdaptiveState, Run
 from .tolerance import lost_in_tolerance
 
-#: What the core says of a run: it was not made; or nothing that it looks at can be found of it.
+#: What the core says of a run: it was not made; or nothing that it checks can be found of it.
 NOT_MADE, TAME = 0, 2
 
 
