@@ -98,9 +98,10 @@ def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = Non
     """Check and prepare a run once, to make it from many starts: ``prepare(…)(v, y)`` is ``integrate(…)`` in less time.
 
     The call takes a few microseconds beside the steps for short runs of fixed steps in the direct form, and of some hundred
-    adaptive steps, without control, force, events and recorded quantities. Others save the checks of arguments; and nothing is saved where more than the state depends on
-    the start: with a control, algebraic equations, ``force``, ``positive``, or in float32 if it is not short; nor for runs of
-    more than 16 000 numbers, saved states and start together, beside which the checks are little.
+    adaptive steps, without control, force, events and recorded quantities. Others save the checks of arguments; and nothing is
+    saved where more than the state depends on the start: with a control, algebraic equations, ``force``, ``positive``, or in
+    float32 if it is not short; nor for runs of more than 16 000 numbers, saved states and start together, beside which the
+    checks are little.
 
     Args:
         system: the system to step.
