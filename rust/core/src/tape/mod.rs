@@ -15,6 +15,7 @@ pub mod mass;
 pub mod number;
 mod op;
 pub mod print;
+mod quotients;
 pub mod real;
 pub mod reserved;
 pub(crate) mod series;
