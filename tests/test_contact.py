@@ -220,6 +220,32 @@ def test_many_particles_are_stepped_as_few() -> None:
         assert np.array_equal(many.y[-1], few.y[-1, 0].T)
 
 
+@pytest.mark.parametrize("members", [1, 3, 9])
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_no_point_that_meets_a_surface_is_overlooked(dim: int, members: int) -> None:
+    """A large system looks which points may have met a surface, many at once; the reference resolves each point.
+
+    Steps are so long that many points pass through the ball, or from one wall to the other, within one.
+    """
+    n = 1003  # whole vectors of points, and a part of one
+    rng = np.random.default_rng(10 * dim + members)
+    v, y = rng.normal(0.0, 6.0, (n, dim, members)), rng.uniform(-1.0, 1.0, (n, dim, members))
+    place, radius = rng.uniform(-0.2, 0.2, (dim, members)), rng.uniform(0.2, 0.4, members)
+    normal = np.eye(dim)[0] + 0.1
+    walls: list[Any] = [sw.Sphere(place, radius, restitution=0.9), sw.Floor(normal=normal, offset=-1.2, friction=0.1)]
+    walls.append(sw.Sphere(np.zeros(dim), 2.0 + radius, inside=True, friction=0.2))
+    for surfaces in (walls, walls[:1], walls[1:2], walls[2:]):
+        points = sw.Particles(gravity=0.1 * np.ones(dim), floor=surfaces)
+        runs = [
+            sw.integrate(points, "leapfrog", v=v, y=y, dt=0.1, steps=12, every=3, backend=by, threads=1)
+            for by in ("rust", "numpy")
+        ]
+        assert_same(*runs)
+        free = sw.integrate(sw.Particles(gravity=0.1 * np.ones(dim)), "leapfrog", v=v, y=y, dt=0.1, steps=12)
+        met = (runs[0].y[-1] != free.y[-1]).any(axis=1)
+        assert met.mean() > 0.02
+
+
 def test_a_point_that_is_not_finite_stays_so() -> None:
     floor = [sw.Floor(restitution=0.5, friction=0.1), sw.Sphere((0.0, 0.0), 9.0, inside=True)]
     for start in ([[np.inf, 1.0]], [[0.0, -1e308]]):

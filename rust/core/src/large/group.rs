@@ -20,6 +20,7 @@ use crate::{
 pub struct LargeGroup {
     blocks: Blocks,
     clock: Clock,
+    level: Level,
     step: Executor,
     start: Option<Executor>,
     finish: Option<Executor>,
@@ -45,6 +46,7 @@ impl LargeGroup {
         let executor = |schedule: &BlockSchedule| blocks.executor(schedule, level, clock);
         LargeGroup {
             clock: *clock,
+            level,
             step: executor(&blocks.schedules.step),
             start: blocks.schedules.start.as_ref().map(executor),
             finish: blocks.schedules.finish.as_ref().map(executor),
@@ -66,7 +68,7 @@ impl Group for LargeGroup {
         // Parameters that all members share are copied once: copying a large matrix takes longer than a step.
         if !std::mem::replace(&mut self.prepared, spec.is_common()) {
             self.blocks.rates.prepare(spec, first, count);
-            self.contacts = RowContacts::new(spec, self.clock.h, self.blocks.rates.lanes(), first, count);
+            self.contacts = RowContacts::new(spec, self.level, self.clock.h, [self.blocks.rates.lanes(), first, count]);
         }
         self.blocks.rates.tally_mut().fill(0.0);
     }

@@ -16,8 +16,8 @@ mod surface;
 
 use meet::{OPERATIONS, Step};
 use rods::RodContacts;
-pub(crate) use surface::ways;
 use surface::{ContactMode, Surface};
+pub(crate) use surface::{Form, Reach, ways};
 
 use super::{
     controls,
@@ -208,9 +208,9 @@ impl Contacts<f64> {
         self.rods.as_ref().is_some_and(|rods| rods.is_near(&self.surfaces, before, y))
     }
 
-    /// Whether a point may have met a surface in a step, from where it was and is.
-    pub(crate) fn is_near(&self, before: &[f64], y: &[f64]) -> bool {
-        self.surfaces.iter().any(|surface| surface.reaches(before, y))
+    /// How near points are to each surface.
+    pub(crate) fn reaches(&self) -> impl Iterator<Item = Reach<'_>> {
+        self.surfaces.iter().map(Surface::reach)
     }
 }
 
@@ -241,12 +241,25 @@ impl<N: Number> Springs<N> {
     }
 
     /// Adds their pushes to increments of the velocities of points that are there.
+    #[inline(always)]
     pub(crate) fn push(&self, y: &[N], dv: &mut [N]) {
-        let points = y.chunks(self.dim).zip(dv.chunks_mut(self.dim)).enumerate();
-        for (_, (y, dv)) in points.filter(|(i, _)| !is_among(&self.fixed, *i)) {
-            for surface in &self.surfaces {
-                surface.push(y, dv);
+        match self.dim {
+            1 => self.push_points::<1>(y, dv),
+            2 => self.push_points::<2>(y, dv),
+            _ => self.push_points::<3>(y, dv),
+        }
+    }
+
+    /// The same in D directions, to the points between those that are fixed.
+    #[inline(always)]
+    fn push_points<const D: usize>(&self, y: &[N], dv: &mut [N]) {
+        let (y, dv) = (y.as_chunks::<D>().0, dv.as_chunks_mut::<D>().0);
+        let mut first = 0;
+        for end in self.fixed.iter().map(|point| *point as usize).chain([y.len()]) {
+            if first < end {
+                self.surfaces.iter().for_each(|surface| surface.push(&y[first..end], &mut dv[first..end]));
             }
+            first = end + 1;
         }
     }
 }

@@ -28,8 +28,25 @@ pub(crate) enum ContactMode {
     Spring,
 }
 
+/// Which side of what form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Form {
+    Plane,
+    Inside,
+    Outside,
+}
+
+/// What says how near a point is to a surface.
+pub(crate) struct Reach<'a> {
+    pub form: Form,
+    /// The normal, or the centre.
+    pub place: &'a [f64],
+    /// The offset, or the radius.
+    pub size: f64,
+}
+
 /// Where it is.
-enum Form<N: Number> {
+enum Location<N: Number> {
     Plane { normal: Vec<N>, offset: N },
     Sphere { is_inside: bool, centre: Vec<N>, radius: N },
 }
@@ -43,7 +60,7 @@ pub(crate) struct Surface<N: Number> {
     pub friction: Option<N>,
     /// h·ω² of a spring.
     stiffness: Option<N>,
-    form: Form<N>,
+    location: Location<N>,
 }
 
 /// Where a point is to a surface after a step.
@@ -61,6 +78,7 @@ pub(crate) struct Place<N: Number> {
 }
 
 /// a·b, from the first component on.
+#[inline(always)]
 pub(crate) fn dot<N: Number>(a: &[N], b: &[N]) -> N {
     a.iter().zip(b).map(|(a, b)| *a * *b).reduce(|sum, next| sum + next).unwrap_or(N::of(0.0))
 }
@@ -118,11 +136,11 @@ pub(crate) fn all<N: Number>(p: &Parameters<N>, is_wanted: impl Fn(ContactMode) 
 impl<N: Number> Surface<N> {
     fn new(p: &Parameters<N>, i: usize) -> Surface<N> {
         let name = |part: &str| format!("contact_{i}{part}");
-        let form = if p.signature.word(&name("")) == "plane" {
-            Form::Plane { normal: p.numbers(&name("_normal")).to_vec(), offset: p.number(&name("_offset")) }
+        let location = if p.signature.word(&name("")) == "plane" {
+            Location::Plane { normal: p.numbers(&name("_normal")).to_vec(), offset: p.number(&name("_offset")) }
         } else {
             let is_inside = p.signature.word(&name("_side")) == "inside";
-            Form::Sphere { is_inside, centre: p.numbers(&name("_centre")).to_vec(), radius: p.number(&name("_radius")) }
+            Location::Sphere { is_inside, centre: p.numbers(&name("_centre")).to_vec(), radius: p.number(&name("_radius")) }
         };
         let way = match p.signature.word(&name("_way")) {
             "safe" => ContactMode::Safe,
@@ -134,13 +152,13 @@ impl<N: Number> Surface<N> {
             restitution: p.maybe(&name("_restitution")),
             friction: p.maybe(&name("_friction")),
             stiffness: p.maybe(&name("_omega")).map(|omega| p.h * (omega * omega)),
-            form,
+            location,
         }
     }
 
     /// Whether it is a sphere.
     pub(crate) fn is_curved(&self) -> bool {
-        matches!(self.form, Form::Sphere { .. })
+        matches!(self.location, Location::Sphere { .. })
     }
 
     /// Where a point is that began the step at `y0`.
@@ -148,15 +166,15 @@ impl<N: Number> Surface<N> {
     /// To a sphere it is measured from the plane that touches it where the straight way from `y0` to `y` meets it, or else
     /// nearest to `y`.
     pub(crate) fn place(&self, y0: &[N], y: &[N]) -> Place<N> {
-        match &self.form {
-            Form::Plane { normal, offset } => {
+        match &self.location {
+            Location::Plane { normal, offset } => {
                 let distance = dot(y, normal) - *offset;
                 let sizes = y.iter().zip(normal).map(|(y, n)| magnitude(*y * *n)).reduce(|sum, next| sum + next);
                 let slack = rounding::<N>() * (sizes.unwrap_or(N::of(0.0)) + magnitude(*offset));
                 let before = dot(y0, normal) - *offset;
                 Place { near: distance.at_most(slack), normal: normal.clone(), distance, before, slack }
             }
-            Form::Sphere { is_inside, centre, radius } => {
+            Location::Sphere { is_inside, centre, radius } => {
                 let (from0, along, from1) = (difference(y0, centre), difference(y, y0), difference(y, centre));
                 let (zero, one) = (N::of(0.0), N::of(1.0));
                 let (a, b, square) = (dot(&along, &along), dot(&from0, &along), dot(&from0, &from0));
@@ -186,19 +204,20 @@ impl<N: Number> Surface<N> {
     }
 
     /// The distance of a point from a sphere, from that from its centre.
+    #[inline(always)]
     fn depth(&self, length: N) -> N {
-        match self.form {
-            Form::Sphere { is_inside: true, radius, .. } => radius - length,
-            Form::Sphere { is_inside: false, radius, .. } => length - radius,
-            Form::Plane { .. } => length,
+        match self.location {
+            Location::Sphere { is_inside: true, radius, .. } => radius - length,
+            Location::Sphere { is_inside: false, radius, .. } => length - radius,
+            Location::Plane { .. } => length,
         }
     }
 
     /// The distance of a point from the surface itself.
     pub(crate) fn depth_of(&self, y: &[N]) -> N {
-        match &self.form {
-            Form::Plane { normal, offset } => dot(y, normal) - *offset,
-            Form::Sphere { centre, .. } => {
+        match &self.location {
+            Location::Plane { normal, offset } => dot(y, normal) - *offset,
+            Location::Sphere { centre, .. } => {
                 let way = difference(y, centre);
                 self.depth(dot(&way, &way).sqrt())
             }
@@ -207,9 +226,9 @@ impl<N: Number> Surface<N> {
 
     /// A point near the surface, put at that distance from it along the radius; on a plane it is already.
     pub(crate) fn back(&self, y: &[N], distance: N) -> Vec<N> {
-        match &self.form {
-            Form::Plane { .. } => y.to_vec(),
-            Form::Sphere { is_inside, centre, radius } => {
+        match &self.location {
+            Location::Plane { .. } => y.to_vec(),
+            Location::Sphere { is_inside, centre, radius } => {
                 let way = difference(y, centre);
                 let length = if *is_inside { *radius - distance } else { *radius + distance };
                 let scale = length / dot(&way, &way).sqrt();
@@ -218,22 +237,29 @@ impl<N: Number> Surface<N> {
         }
     }
 
-    /// Adds the push of its spring to an increment of the velocity of a point.
-    pub(crate) fn push(&self, y: &[N], dv: &mut [N]) {
+    /// Adds the push of its spring to increments of the velocities of points in D directions.
+    #[inline(always)]
+    pub(crate) fn push<const D: usize>(&self, y: &[[N; D]], dv: &mut [[N; D]]) {
         let (zero, stiffness) = (N::of(0.0), self.stiffness.unwrap_or(N::of(f64::NAN)));
-        match &self.form {
-            Form::Plane { normal, offset } => {
-                let distance = dot(y, normal) - *offset;
-                let strength = stiffness * N::choose(distance.below(zero), distance, zero);
-                dv.iter_mut().zip(normal).for_each(|(dv, n)| *dv -= strength * *n);
+        match &self.location {
+            Location::Plane { normal, offset } => {
+                let (mut along, offset) = ([zero; D], *offset);
+                along.copy_from_slice(normal);
+                for (y, dv) in y.iter().zip(dv) {
+                    let distance = dot(y, &along) - offset;
+                    let strength = stiffness * N::choose(distance.below(zero), distance, zero);
+                    (0..D).for_each(|c| dv[c] -= strength * along[c]);
+                }
             }
-            Form::Sphere { is_inside, centre, .. } => {
-                let way = difference(y, centre);
-                let length = dot(&way, &way).sqrt();
-                let distance = self.depth(length);
-                let strength = stiffness * N::choose(distance.below(zero), distance / length, zero);
-                for (dv, w) in dv.iter_mut().zip(way) {
-                    *dv -= strength * if *is_inside { -w } else { w };
+            Location::Sphere { is_inside, centre, .. } => {
+                let mut middle = [zero; D];
+                middle.copy_from_slice(centre);
+                for (y, dv) in y.iter().zip(dv) {
+                    let way: [N; D] = std::array::from_fn(|c| y[c] - middle[c]);
+                    let length = dot(&way, &way).sqrt();
+                    let distance = self.depth(length);
+                    let strength = stiffness * N::choose(distance.below(zero), distance / length, zero);
+                    (0..D).for_each(|c| dv[c] -= strength * if *is_inside { -way[c] } else { way[c] });
                 }
             }
         }
@@ -241,8 +267,13 @@ impl<N: Number> Surface<N> {
 }
 
 impl Surface<f64> {
-    /// Whether a point may have met it in a step.
-    pub(crate) fn reaches(&self, y0: &[f64], y: &[f64]) -> bool {
-        self.place(y0, y).near
+    /// How near points are to it.
+    pub(crate) fn reach(&self) -> Reach<'_> {
+        match &self.location {
+            Location::Plane { normal, offset } => Reach { form: Form::Plane, place: normal, size: *offset },
+            Location::Sphere { is_inside, centre, radius } => {
+                Reach { form: if *is_inside { Form::Inside } else { Form::Outside }, place: centre, size: *radius }
+            }
+        }
     }
 }

@@ -1,15 +1,26 @@
 //! Contact of the points of a large system: [`crate::model::around::contact`] over rows, member by member and point by point.
 
+mod near;
+mod tile;
+
 use std::sync::Arc;
 
+use self::{
+    near::Near,
+    tile::{Ends, Tile},
+};
 use super::{
     blocks::Blocks,
     executor::Executor,
     rates::{RateTraits, Rates, RatesRequest},
 };
-use crate::model::{
-    around::contact::{Contacts, Springs, dimensions, ways},
-    spec::{Parameters, Spec},
+use crate::{
+    aligned::Aligned,
+    isa::{Level, Task, with_isa},
+    model::{
+        around::contact::{Contacts, Springs, dimensions, ways},
+        spec::{Parameters, Spec},
+    },
 };
 
 /// The parameters of one member.
@@ -22,9 +33,13 @@ fn parameters<'a>(spec: &'a Spec, h: f64, member: usize) -> Parameters<'a, f64> 
 pub(crate) struct RowContacts {
     /// One for each lane.
     lanes: Vec<Contacts<f64>>,
-    dim: usize,
+    near: Near,
+    /// What contact makes of points; none if they are joined by rods.
+    tile: Option<Tile>,
+    /// The points that may have met a surface in a step, in any lane.
+    points: Vec<u32>,
     /// The slots before the step.
-    before: [Vec<f64>; 2],
+    before: [Aligned; 2],
     /// The slots after the step, what the method keeps, and the velocities at both ends; used if it carries something other than v
     /// or keeps anything.
     after: [Vec<f64>; 2],
@@ -34,37 +49,35 @@ pub(crate) struct RowContacts {
     touched: Vec<bool>,
 }
 
-/// The point of each row at a place (point, lane). Numbers of a point are `lanes` apart.
-fn point<const N: usize>(rows: [&[f64]; N], dim: usize, lanes: usize, at: (usize, usize)) -> [[f64; 3]; N] {
-    let (i, lane) = at;
-    rows.map(|row| {
-        let mut numbers = [0.0; 3];
-        numbers[..dim].iter_mut().enumerate().for_each(|(c, number)| *number = row[(dim * i + c) * lanes + lane]);
-        numbers
-    })
-}
-
 impl RowContacts {
-    /// The surfaces of the members from `first`; lanes past the `count`-th repeat the last one. None if no surface acts after a
-    /// step.
-    pub(crate) fn new(spec: &Spec, h: f64, lanes: usize, first: usize, count: usize) -> Option<RowContacts> {
+    /// The surfaces of `lanes` members from `first`; lanes past the `count`-th repeat the last one. None if no surface acts after
+    /// a step.
+    pub(crate) fn new(spec: &Spec, level: Level, h: f64, members: [usize; 3]) -> Option<RowContacts> {
+        let [lanes, first, count] = members;
         let member = |lane: usize| first + lane.min(count.saturating_sub(1));
-        let lanes = (0..lanes).map(|lane| Contacts::new(&parameters(spec, h, member(lane)))).collect::<Option<_>>()?;
-        let none = || [Vec::new(), Vec::new()];
-        let dim = dimensions(&spec.signature);
-        Some(RowContacts { lanes, dim, before: none(), after: none(), kept: Vec::new(), velocities: none(), touched: Vec::new() })
+        let lanes: Vec<_> = (0..lanes).map(|lane| Contacts::new(&parameters(spec, h, member(lane)))).collect::<Option<_>>()?;
+        let is_joined = lanes.iter().any(Contacts::are_joined);
+        Some(RowContacts {
+            near: Near::new(level, dimensions(&spec.signature), &lanes),
+            tile: if is_joined { None } else { Tile::new(spec, level, h, members) },
+            points: Vec::new(),
+            lanes,
+            before: <[Aligned; 2]>::default(),
+            after: <[Vec<f64>; 2]>::default(),
+            kept: Vec::new(),
+            velocities: <[Vec<f64>; 2]>::default(),
+            touched: Vec::new(),
+        })
     }
 
     /// Copies the state before a step.
     pub(crate) fn keep(&mut self, (v, y): (&[f64], &[f64])) {
-        copy(&mut self.before, [v, y]);
-    }
-
-    /// The index of every point in every lane.
-    fn points(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let lanes = self.lanes.len();
-        let points = self.before[1].len() / (self.dim * lanes);
-        (0..points).flat_map(move |i| (0..lanes).map(move |lane| (i, lane)))
+        for (to, from) in self.before.iter_mut().zip([v, y]) {
+            if to.len() != from.len() {
+                *to = Aligned::new(from.len());
+            }
+            to.copy_from_slice(from);
+        }
     }
 
     /// Changes members whose points are joined by rods and met a surface.
@@ -72,7 +85,7 @@ impl RowContacts {
         let count = self.lanes.len();
         for (lane, contacts) in self.lanes.iter().enumerate() {
             let of = |row: &[f64]| row.iter().skip(lane).step_by(count).copied().collect::<Vec<f64>>();
-            let [v0, y0, mut v1, mut y1] = [&self.before[0], &self.before[1], &*v, &*y].map(of);
+            let [v0, y0, mut v1, mut y1] = [&*self.before[0], &*self.before[1], &*v, &*y].map(of);
             if contacts.is_any_near(&y0, &y1) {
                 contacts.resolve_joined([&v0, &y0], [&mut v1, &mut y1]);
                 for (row, new) in [(&mut *v, v1), (&mut *y, y1)] {
@@ -82,32 +95,13 @@ impl RowContacts {
         }
     }
 
-    /// Whether any point may have met a surface.
-    fn is_near(&self, y: &[f64]) -> bool {
-        let (dim, lanes) = (self.dim, self.lanes.len());
-        self.points().any(|at| {
-            let [y0, y1] = point([&self.before[1], y], dim, lanes, at);
-            self.lanes[at.1].acts_on(at.0) && self.lanes[at.1].is_near(&y0[..dim], &y1[..dim])
-        })
-    }
-
-    /// Changes the points that met a surface. `v` and `v0` are velocities.
+    /// Changes the points that met a surface, of those that may have. `v` and `v0` are velocities.
     fn resolve(&mut self, v0: &[f64], v: &mut [f64], y: &mut [f64]) {
-        let (dim, lanes) = (self.dim, self.lanes.len());
         self.touched.clear();
         self.touched.resize(y.len(), false);
-        for at in self.points() {
-            let [v0, y0, mut v1, mut y1] = point([v0, &self.before[1], v, y], dim, lanes, at);
-            let contacts = &self.lanes[at.1];
-            if !contacts.acts_on(at.0) || !contacts.is_near(&y0[..dim], &y1[..dim]) {
-                continue;
-            }
-            let touched = contacts.resolve_point([&v0[..dim], &y0[..dim]], [&mut v1[..dim], &mut y1[..dim]]);
-            for c in 0..dim {
-                let number = (dim * at.0 + c) * lanes + at.1;
-                (v[number], y[number]) = (v1[c], y1[c]);
-                self.touched[number] = touched == Some(true);
-            }
+        if let Some(tile) = &mut self.tile {
+            let ends = Ends { before: [v0, &self.before[1]], after: [v, y] };
+            tile.resolve(&self.points, ends, &mut self.touched);
         }
     }
 
@@ -124,7 +118,10 @@ impl RowContacts {
             let (v, y) = blocks.slots_mut();
             return self.resolve_joined(v, y);
         }
-        if !self.is_near(blocks.slots().1) {
+        self.points.clear();
+        self.near.find(&self.before[1], blocks.slots().1, &mut self.points);
+        self.points.retain(|point| self.lanes[0].acts_on(*point as usize));
+        if self.points.is_empty() {
             return;
         }
         let (end, schedules) = (t + h, Arc::clone(&blocks.schedules));
@@ -148,10 +145,13 @@ impl RowContacts {
         let (Some(start), Some(to_carry)) = (start, &schedules.start) else { return };
         let (v, y) = blocks.slots();
         copy(&mut self.after, [v, y]);
-        for (i, (state, t)) in [(&self.before, t), (&self.after, end)].into_iter().enumerate() {
+        for (i, (state, t)) in [(self.before.each_ref().map(|row| &**row), t), (self.after.each_ref().map(|row| &**row), end)]
+            .into_iter()
+            .enumerate()
+        {
             let (v, y) = blocks.slots_mut();
-            v.copy_from_slice(&state[0]);
-            y.copy_from_slice(&state[1]);
+            v.copy_from_slice(state[0]);
+            y.copy_from_slice(state[1]);
             finish.run(to_v, blocks.rates.as_mut(), blocks.sizes, t, h, &mut blocks.arena);
             self.velocities[i].clear();
             self.velocities[i].extend_from_slice(blocks.slots().0);
@@ -176,14 +176,29 @@ fn copy(to: &mut [Vec<f64>; 2], from: [&[f64]; 2]) {
 /// Rates of one member by a hand-written kernel, and the springs of its surfaces.
 struct SprungRates {
     rates: Box<dyn Rates>,
+    level: Level,
     h: f64,
     springs: Option<Springs<f64>>,
+}
+
+/// Adds the pushes of surfaces.
+struct Push<'a> {
+    springs: &'a Springs<f64>,
+    y: &'a [f64],
+    dv: &'a mut [f64],
+}
+
+impl Task for Push<'_> {
+    #[inline(always)]
+    fn run(self) {
+        self.springs.push(self.y, self.dv);
+    }
 }
 
 /// The rates with the springs of surfaces, if there are any.
 pub(crate) fn wrap(rates: Box<dyn Rates>, asked: &RatesRequest) -> Box<dyn Rates> {
     let has_spring = ways(asked.signature).any(|way| way == "spring");
-    if has_spring { Box::new(SprungRates { rates, h: asked.h, springs: None }) } else { rates }
+    if has_spring { Box::new(SprungRates { rates, level: asked.machine.level, h: asked.h, springs: None }) } else { rates }
 }
 
 impl Rates for SprungRates {
@@ -207,7 +222,8 @@ impl Rates for SprungRates {
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
         self.rates.dv(t, v, y, out);
         if let Some(springs) = &self.springs {
-            springs.push(y, &mut out[..y.len()]);
+            let dv = &mut out[..y.len()];
+            with_isa!(self.level, |isa| isa.run(Push { springs, y, dv }));
         }
     }
 }
