@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.runs import prepared as module
+from stepwell.runs import recent as module
 from support.own_systems import duffing, lorenz, lotka_volterra, pendulum, top
 
 OPTIONS: list[dict[str, Any]] = [
@@ -381,6 +381,46 @@ def test_integrate_knows_a_run_by_all_of_its_options() -> None:
         ) if size == 0.0 else None
         run = sw.integrate(system, "rk4", v=0.0, y=1.0, force=push, dt=0.1, steps=3)
         assert run.y.tobytes() == whole(system, "rk4", v=0.0, y=1.0, force=size, dt=0.1, steps=3).y.tobytes()
+
+
+def test_integrate_knows_a_system_by_its_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that is made anew for each call is the same if all of its numbers are, to the bit, and belongs to its run."""
+    kinds: list[Any] = [
+        lambda x: sw.Oscillator(np.array([1.0, 1.5 + x])), lambda x: sw.Oscillator(2.0, a=sw.Sinusoid(x, 2.0)),
+        lambda x: sw.Pendulum(2.0, a=x), lambda x: sw.RestrictedThreeBody(0.0123 + 0.1 * x),
+    ]  # fmt: skip
+    for make in kinds:
+        start = (np.zeros(2), np.array([0.5, 0.5])) if make is kinds[-1] else (0.0, 1.0)
+        arguments = {"v": start[0], "y": start[1], "dt": 0.1, "steps": 3}
+        expected = [whole(make(x), "rk4", **arguments) for x in (0.0, -0.0, 0.5)]
+        assert len({run.y.tobytes() for run in expected}) >= 2
+        for _ in range(3):
+            for x, other in zip((0.0, -0.0, 0.5), expected, strict=True):
+                system = make(x)
+                run = sw.integrate(system, "rk4", **arguments)
+                assert_same(run, other)
+                assert run.system is system
+        with monkeypatch.context() as patched:
+            patched.setattr("stepwell.runs.request.Request.of", None)
+            assert_same(sw.integrate(make(0.5), "rk4", **arguments), expected[-1])
+
+
+STRENGTH = [1.0]
+
+
+def test_an_own_equation_is_known_as_this_object() -> None:
+    """Since its function may read what changes."""
+
+    @sw.system
+    def pulled(t: Any, v: Any, y: Any) -> Any:
+        return -STRENGTH[0] * y
+
+    for strength in (1.0, 2.0, 3.0):
+        STRENGTH[0] = strength
+        for _ in range(3):
+            run = sw.integrate(pulled(), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
+        assert_same(run, whole(pulled(), "rk4", v=0.0, y=1.0, dt=0.1, steps=3))
+        assert run.y[-1] == pytest.approx(np.cos(np.sqrt(strength) * 0.3), abs=1e-4)
 
 
 def test_integrate_notices_another_level(monkeypatch: pytest.MonkeyPatch) -> None:

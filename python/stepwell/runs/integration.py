@@ -11,7 +11,7 @@ from ..model.systems import System
 from .findings import is_heard, warn_of
 from .making import noticing
 from .options import Options
-from .prepared import recent
+from .recent import recent
 from .request import Request
 from .result import Run
 
@@ -165,7 +165,7 @@ def integrate(
         t0, start, max_steps, max_step, jumps, positive, progress, threads, backend, device, start_step, resume,
     )  # fmt: skip
     prepared = recent(system, method, options)
-    run = noticing(Request.of(system, method, options), is_heard) if prepared is None else prepared.run(v, y)
+    run = noticing(Request.of(system, method, options), is_heard) if prepared is None else prepared.run_of(system, v, y)
     if run.findings:
         warn_of(run.findings)
     return run

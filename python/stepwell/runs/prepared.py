@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
-from weakref import ref
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -84,6 +83,13 @@ class PreparedRun:
         if known is not None and (request := _from(*known, v, y)) is not None:
             return noticing(request, is_heard)
         return noticing(self.request(v, y), is_heard)
+
+    def run_of(self, system: System, v: Any, y: Any) -> Run:
+        """``run`` of a system that is equal to the prepared one."""
+        run = self.run(v, y)
+        if run.system is self._system:
+            run.system = system
+        return run
 
     def request(self, v: Any, y: Any) -> Request:
         """The request from this start, checked as a whole, after which others of these shapes are checked in less time."""
@@ -176,83 +182,6 @@ class _ShortRun:
             if findings := findings_of(run, request, is_heard):
                 run.findings = findings
         return run
-
-
-class _Recent:
-    """A run that ``integrate`` made."""
-
-    __slots__ = ("is_large", "kinds", "method", "run", "system")
-
-    def __init__(self, system: System, method: str | Method, kinds: tuple[type, ...]) -> None:
-        #: The numbers of both objects are in its key, and may be those of others once these are gone.
-        self.system, self.method = ref(system), method
-        #: The types of its options: 1, 1.0 and True are equal.
-        self.kinds = kinds
-        #: Made at the second time, unless it would keep much memory.
-        self.run: PreparedRun | None = None
-        self.is_large = False
-
-
-#: Those made last.
-_recent: dict[Any, _Recent] = {}
-#: So many are kept, of systems whose parameters have at most so many bytes.
-MOST_RECENT = 32
-
-
-class _Numbers(NamedTuple):
-    """The numbers of a list, a tuple or an array, to be looked up."""
-
-    kind: type
-    types: Any
-    numbers: Any
-
-
-#: Options of these types are what they were.
-_PLAIN = frozenset({type(None), bool, int, float, str, np.float64, _Numbers})
-#: At most so many numbers are looked up.
-MOST_NUMBERS = 128
-
-
-def _numbers(option: Any) -> Any:
-    """An option as its numbers, if it is a short list, tuple or array of them; else itself."""
-    kind = type(option)
-    if (kind is list or kind is tuple) and len(option) <= MOST_NUMBERS:
-        types = tuple(map(type, option))
-        return _Numbers(kind, types, tuple(option)) if _PLAIN.issuperset(types) else option
-    if kind is np.ndarray and option.size <= MOST_NUMBERS and option.dtype == np.float64:
-        return _Numbers(kind, option.shape, option.tobytes())
-    return option
-
-
-def _bytes(system: System) -> int:
-    """The memory of the arrays of a system."""
-    attributes = list(vars(system).values())
-    in_dictionaries = [each for attribute in attributes if isinstance(attribute, dict) for each in attribute.values()]
-    return sum(getattr(each, "nbytes", 0) for each in attributes + in_dictionaries)
-
-
-def recent(system: System, method: str | Method, options: Options) -> PreparedRun | None:
-    """The run of this system with all these options but the start, if ``integrate`` made it lately.
-
-    It is prepared at the second time, since most runs are made once.
-    """
-    others = *options[2:5], _numbers(options.tolerance), _numbers(options.at), *options[7:]
-    kinds = tuple(map(type, others))
-    if not _PLAIN.issuperset(kinds) or _core.names_device():
-        return None
-    # The level may be chosen anew between two calls.
-    key = (_core.isa(), id(system), method if isinstance(method, str) else id(method), *others)
-    known = _recent.get(key)
-    if known is not None and known.kinds == kinds and known.system() is system:
-        if known.run is None and not known.is_large:
-            known.is_large = _bytes(system) > MOST_BYTES
-            known.run = None if known.is_large else PreparedRun(system, method, options._replace(v=None, y=None))
-        return known.run
-    if isinstance(system, System):
-        while len(_recent) >= MOST_RECENT:
-            _recent.pop(next(iter(_recent)), None)
-        _recent[key] = _Recent(system, method, kinds)
-    return None
 
 
 #: What the core says of a short run: it was not made; or it is certain that no member has grown.

@@ -14,7 +14,7 @@ use stepwell_core::{
 };
 
 use crate::{
-    PlanOf,
+    PlanOf, all,
     model::{ModelSpec, core_error},
     world::machine,
 };
@@ -140,17 +140,11 @@ impl Prepared {
 
 /// Takes the numbers of a block, all finite, and whether it could: from one number for all, or an array of floats of this shape.
 pub(crate) fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut [T]) -> bool {
-    let mut is_finite = true;
-    let mut taken = |number: f64| {
-        let number = T::of(number);
-        is_finite &= number.is_below(T::INFINITY);
-        number
-    };
     if let Ok(number) = block.cast_exact::<PyFloat>() {
         if !shape.is_empty() {
             return false;
         }
-        to.fill(taken(number.value()));
+        to.fill(T::of(number.value()));
     } else if let Ok(array) = block.cast::<PyArrayDyn<f64>>() {
         let Ok(array) = array.try_readonly() else { return false };
         let Ok(numbers) = array.as_slice() else { return false };
@@ -158,27 +152,40 @@ pub(crate) fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut 
             return false;
         }
         match numbers {
-            [number] => to.fill(taken(*number)),
-            _ => to.iter_mut().zip(numbers).for_each(|(to, number)| *to = taken(*number)),
+            [number] => to.fill(T::of(*number)),
+            _ => to.iter_mut().zip(numbers).for_each(|(to, number)| *to = T::of(*number)),
         }
     } else {
         return to.is_empty() && block.is_none();
     }
-    is_finite
+    all(to, |x| x.is_below(T::INFINITY))
 }
 
+/// So many numbers are added side by side, as vectors.
+const SIDE_BY_SIDE: usize = 32;
+
+/// The sum of the squares of some numbers, in any order.
 fn squares<T: Real>(numbers: &[T]) -> f64 {
-    numbers.iter().fold(0.0, |sum, x| sum + x.wide() * x.wide())
+    let (chunks, rest) = numbers.as_chunks::<SIDE_BY_SIDE>();
+    let mut sums = [0.0; SIDE_BY_SIDE];
+    let mut add = |chunk: &[T]| sums.iter_mut().zip(chunk).for_each(|(sum, x)| *sum += x.wide() * x.wide());
+    chunks.iter().for_each(|chunk| add(chunk));
+    add(rest);
+    sums.iter().fold(0.0, |sum, x| sum + x)
 }
 
 /// The least of the squared lengths of all members; one at rest counts as one unit long.
 fn shortest<T: Real>(v: &[T], y: &[T], members: usize) -> f64 {
     let mut least = f64::INFINITY;
-    for member in 0..members {
-        let numbers = || [v, y].into_iter().flat_map(|block| block.iter().skip(member).step_by(members));
-        let square = numbers().fold(0.0, |sum, x| sum + x.wide() * x.wide());
-        let rests = square == 0.0 && numbers().all(|x| x.wide() == 0.0);
-        least = least.min(if rests { 1.0 } else { square });
+    for first in (0..members).step_by(SIDE_BY_SIDE) {
+        let some = first..members.min(first + SIDE_BY_SIDE);
+        let rows = || [v, y].into_iter().flat_map(|block| block.chunks_exact(members).map(|row| &row[some.clone()]));
+        let mut sums = [0.0; SIDE_BY_SIDE];
+        rows().for_each(|row| sums.iter_mut().zip(row).for_each(|(sum, x)| *sum += x.wide() * x.wide()));
+        for (i, square) in sums[..some.len()].iter().enumerate() {
+            let rests = *square == 0.0 && rows().all(|row| row[i].wide() == 0.0);
+            least = least.min(if rests { 1.0 } else { *square });
+        }
     }
     least
 }
