@@ -5,6 +5,7 @@ Which products are fused is decided on the tape of a step, so it is the same on 
 
 from collections.abc import Sequence
 
+from .forms import in_quick_forms
 from .increments import increments_last
 from .lines import Operation, of_any, ranks
 from .quotients import without_quotients
@@ -13,10 +14,12 @@ from .quotients import without_quotients
 def fused(tape: Sequence[Operation], roots: Sequence[int], *, single: bool = False) -> tuple[list[Operation], list[int]]:
     """The same tape with fused multiply-adds, and the lines of the roots on it.
 
-    ``roots`` are the lines of the next state, and all others are needed for them. First increments are multiplied last, and
-    quotients by numbers become products. Then a product is fused into the sum or the difference of which it is a term if nothing
-    else reads it and it depends on the state. Of two such products the one of the higher rank is fused.
+    ``roots`` are the lines of the next state, and all others are needed for them. First functions get their quick forms,
+    increments are multiplied last, and quotients by numbers become products. Then a product is fused into the sum or the
+    difference of which it is a term if nothing else reads it and it depends on the state. Of two such products the one of the
+    higher rank is fused.
     """
+    tape, roots = in_quick_forms(tape, roots)
     tape, roots = increments_last(tape, roots, single=single)
     tape, roots = without_quotients(tape, roots, single=single)
     rank = ranks(tape)

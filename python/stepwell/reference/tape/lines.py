@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from ..bits import Precision
 from .operations import COMMUTE
 
 
@@ -18,6 +19,32 @@ class Operation(NamedTuple):
     name: str
     of: tuple[int, ...]
     extra: int
+
+
+class Lines:
+    """A tape that is written line by line, each once.
+
+    Attributes:
+        precision: of its numbers.
+        lines: those written so far.
+    """
+
+    def __init__(self, precision: Precision) -> None:
+        self.precision = precision
+        self.lines: list[Operation] = []
+        self._known: dict[Operation, int] = {}
+
+    def write(self, name: str, *of: int, extra: int = 0) -> int:
+        """The line of an operation, which is appended unless it is there."""
+        operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, extra)
+        if operation not in self._known:
+            self._known[operation] = len(self.lines)
+            self.lines.append(operation)
+        return self._known[operation]
+
+    def number(self, x: float) -> int:
+        """The line of a number."""
+        return self.write("constant", extra=self.precision.pattern(x))
 
 
 def listed(tape: Any, symbols: Sequence[Any]) -> tuple[list[Operation], list[int]]:

@@ -11,7 +11,7 @@ from fractions import Fraction
 from math import ldexp
 
 from ..bits import DOUBLE, SINGLE, PerPrecision, Precision
-from .lines import Operation, needed, of_any
+from .lines import Lines, Operation, needed, of_any
 
 #: Beyond this power of two a number, or its inverse, is divided by as before: the lower part might be subnormal.
 LARGEST = PerPrecision(double=500, single=60)
@@ -45,19 +45,9 @@ def without_quotients(
     """
     precision: Precision = SINGLE if single else DOUBLE
     of_state = of_any(tape, "state")
-    lines: list[Operation] = []
-    known: dict[Operation, int] = {}
+    lines = Lines(precision)
     place: list[int] = []
-
-    def write(name: str, *of: int, extra: int = 0) -> int:
-        operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, extra)
-        if operation not in known:
-            known[operation] = len(lines)
-            lines.append(operation)
-        return known[operation]
-
-    def number(x: float) -> int:
-        return write("constant", extra=precision.pattern(x))
+    write, number = lines.write, lines.number
 
     def quotient(line: int) -> int | None:
         name, of, _ = tape[line]
@@ -78,4 +68,4 @@ def without_quotients(
     for line, (name, of, extra) in enumerate(tape):
         instead = quotient(line)
         place.append(write(name, *(place[each] for each in of), extra=extra) if instead is None else instead)
-    return needed(lines, [place[root] for root in roots])
+    return needed(lines.lines, [place[root] for root in roots])

@@ -32,6 +32,12 @@ pub(crate) trait InstructionSet: Sized {
         None
     }
 
+    /// The first number times two to the power of the second, a whole number; rounded once, so that no factor needs to be a normal
+    /// number. None if that takes more than one instruction.
+    fn scale(&self) -> Option<Self::Instruction> {
+        None
+    }
+
     /// Moves numbers of one member between lanes. Called only if [`InstructionSet::PACKS`].
     fn moving(&self, _to: Move) -> Self::Instruction {
         self.instruction(Op::Copy(0))

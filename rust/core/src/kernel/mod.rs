@@ -16,6 +16,7 @@ mod pages;
 mod plan;
 mod registers;
 pub(crate) mod runner;
+mod scaled;
 mod schedule;
 mod shape;
 mod timing;

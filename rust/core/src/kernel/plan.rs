@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use super::instruction_set::InstructionSet;
+use super::{instruction_set::InstructionSet, scaled::Scaled};
 use crate::tape::{Counts, Id, Op, split::Body};
 
 /// Where a value comes from.
@@ -127,8 +127,19 @@ impl<I: Copy> KernelPlan<I> {
         }
         let masks = masks(body);
         let adds_doubles = has_more_products(body);
-        let joined = joined(body, machine);
-        for (id, op) in body.ops.iter().enumerate().filter(|(id, op)| !op.is_leaf() && joined[*id].is_none()) {
+        let mut uses = uses(body);
+        let scaled = machine.scale().map(|instruction| (instruction, Scaled::new(body, &mut uses)));
+        let is_made = |id: usize| scaled.as_ref().is_none_or(|(_, scaled)| !scaled.replaced[id]);
+        let joined = joined(body, machine, &uses, &is_made);
+        for (id, op) in body.ops.iter().enumerate().filter(|(id, op)| !op.is_leaf() && joined[*id].is_none() && is_made(*id)) {
+            if let Some((instruction, scaled)) = &scaled
+                && let Some([x, n]) = scaled.of[id]
+            {
+                let of = [same[x as usize], same[n as usize]];
+                plan.steps.push(Step::new(*instruction, id as Id, &of));
+                continue;
+            }
+            let op = scaled.as_ref().and_then(|(_, scaled)| scaled.sums[id].as_ref()).unwrap_or(op);
             let ([a, b, c], n) = op.with(|operand| same[operand as usize]).operands();
             let (instruction, of, n) = match *op {
                 Op::Neg(_) => match machine.negate() {
@@ -228,6 +239,17 @@ pub(crate) fn masks(body: &Body) -> Vec<bool> {
     masks
 }
 
+/// How often each value is used.
+fn uses(body: &Body) -> Vec<u32> {
+    let mut uses = vec![0; body.ops.len()];
+    for op in &body.ops {
+        let (operands, n) = op.operands();
+        operands[..n].iter().for_each(|id| uses[*id as usize] += 1);
+    }
+    body.next.iter().for_each(|id| uses[*id as usize] += 1);
+    uses
+}
+
 /// What a comparison and a choice by it are made by.
 #[derive(Clone, Copy, Debug)]
 enum Joined<I> {
@@ -238,17 +260,18 @@ enum Joined<I> {
 }
 
 /// For each value that is a comparison and used by one choice only: the instruction that does both, if there is one.
-fn joined<M: InstructionSet>(body: &Body, machine: &M) -> Vec<Option<Joined<M::Instruction>>> {
-    let mut uses = vec![0u32; body.ops.len()];
+fn joined<M: InstructionSet>(
+    body: &Body,
+    machine: &M,
+    uses: &[u32],
+    is_made: &impl Fn(usize) -> bool,
+) -> Vec<Option<Joined<M::Instruction>>> {
     let mut chosen: Vec<Option<[Id; 2]>> = vec![None; body.ops.len()];
-    for op in &body.ops {
-        let (operands, n) = op.operands();
-        operands[..n].iter().for_each(|id| uses[*id as usize] += 1);
+    for (_, op) in body.ops.iter().enumerate().filter(|(id, _)| is_made(*id)) {
         if let Op::Select(m, a, b) = *op {
             chosen[m as usize] = Some([a, b]);
         }
     }
-    body.next.iter().for_each(|id| uses[*id as usize] += 1);
     let join = |id: usize| {
         let of = chosen[id].filter(|_| uses[id] == 1)?;
         // Where p < q is false, of a NaN for example, the second is chosen. p <= q would choose the first of two zeros.

@@ -1,7 +1,7 @@
 //! The second exact arithmetic: sums with a product in them become fused multiply-adds, which round once instead of twice.
 //!
-//! First increments are multiplied last (`increments.rs`), and quotients by numbers become products (`quotients.rs`). Then
-//! products are fused. The choice is made on the tape and not by a compiler, so it is the same on every machine. A product is
+//! First functions get their quick forms (`forms.rs`), increments are multiplied last (`increments.rs`), and quotients by numbers
+//! become products (`quotients.rs`). Then products are fused. The choice is made on the tape and not by a compiler, so it is the same on every machine. A product is
 //! fused into the sum or the difference of which it is a term if
 //!
 //! - nothing else reads it, so that it vanishes, and
@@ -12,12 +12,13 @@
 //! Of two such products the one of the higher rank (`uses.rs`) is fused. The rank of a value depends on the graph of operations
 //! alone, not on the order in which the tape was written: both languages fuse the same products.
 
-use super::{Id, Op, Tape, increments::increments_last, quotients::without_quotients, uses::UseCounts};
+use super::{Id, Op, Tape, forms::in_quick_forms, increments::increments_last, quotients::without_quotients, uses::UseCounts};
 
 /// The same tape for these values, with fused multiply-adds, and the values on it.
 #[must_use]
 pub fn fuse(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
-    let (tape, roots) = increments_last(tape, roots);
+    let (tape, roots) = in_quick_forms(tape, roots);
+    let (tape, roots) = increments_last(&tape, &roots);
     let (tape, roots) = without_quotients(&tape, &roots);
     let UseCounts { needed, reads, ranks, .. } = UseCounts::new(&tape, &roots);
     let ops = tape.ops();

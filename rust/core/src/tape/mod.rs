@@ -9,6 +9,8 @@
 pub mod equations;
 pub mod eval;
 mod fast_hash;
+mod forms;
+mod forms_table;
 pub mod fuse;
 mod increments;
 pub mod mass;

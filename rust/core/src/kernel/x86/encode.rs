@@ -65,6 +65,12 @@ pub(crate) const DIV: Form = arithmetic(0x5E);
 /// The lesser, or the greater of two; the second if either is a NaN or both are zeros.
 pub(crate) const MINIMUM: Form = arithmetic(0x5D);
 pub(crate) const MAXIMUM: Form = arithmetic(0x5F);
+/// The first times two to the power of the second, rounded once (EVEX).
+pub(crate) const SCALE: Form = Form {
+    double: Codes { first: Some((P66, 0x2D)), ..codes(P66, 0x2C) },
+    single: Codes { first: Some((P66, 0x2D)), ..codes(P66, 0x2C) },
+    ..form(2, P66, 0x2C)
+};
 pub(crate) const SQRT: Form = arithmetic(0x51);
 pub(crate) const COMPARE: Form = arithmetic(0xC2);
 /// Rounds to a whole number as the byte behind says.

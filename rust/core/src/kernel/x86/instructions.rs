@@ -138,6 +138,10 @@ impl InstructionSet for Code {
         Some(Instruction::Two(if is_greater { x::MAXIMUM } else { x::MINIMUM }, false))
     }
 
+    fn scale(&self) -> Option<Instruction> {
+        self.evex.then_some(Instruction::Two(x::SCALE, false))
+    }
+
     fn moving(&self, to: Move) -> Instruction {
         Instruction::Move(to)
     }

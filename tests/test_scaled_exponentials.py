@@ -1,0 +1,55 @@
+"""Where an instruction multiplies by a power of two: the bits of exponential functions at all their edges, on every level."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _core
+
+KERNELS = ["interpret", *(level for level in _core.isa_levels() if level != "interpret")]
+
+#: Where e^x and its kind end, and where two factors take turns.
+EDGES = [0.0, 709.78, 709.79, 710.0, 800.0, 1e300, 708.4, 708.3, 745.1, 745.2, 746.0, 744.4, 1022.0, 1024.0, 1074.0, 1075.0, 0.25]
+
+
+def states() -> np.ndarray:
+    rng = np.random.default_rng(6)
+    near = np.concatenate([[each, np.nextafter(each, 9e99), np.nextafter(each, -9e99)] for each in EDGES])
+    halves = (np.arange(-1080, 1030) + 0.5) * np.log(2.0)  # where n changes
+    some = [rng.uniform(-760.0, 720.0, 500), rng.uniform(-1.0, 1.0, 200), halves, np.nextafter(halves, 0.0)]
+    return np.concatenate([near, -near, *some])
+
+
+FUNCTIONS: dict[str, Any] = {
+    "exp": lambda y: np.exp(y),
+    "expm1": lambda y: np.expm1(y),
+    "exp2": lambda y: np.exp2(y),
+    "both": lambda y: np.exp(y) * np.expm1(-y),
+    "one of two": lambda y: np.where(y < 0.0, np.exp(y), -np.exp(y)),
+    "power": lambda y: 1.5**y,
+    "tanh": lambda y: np.tanh(y) + np.exp(-y),
+}
+
+
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
+@pytest.mark.parametrize("fused", [False, True])
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_all_levels_agree(name: str, fused: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    function = FUNCTIONS[name]
+
+    @sw.system
+    def own(t: Any, v: Any, y: Any) -> Any:
+        return function(y)
+
+    ask: dict[str, Any] = {"v": 0.0, "y": states(), "dt": 1.0, "steps": 1, "fused": fused}
+    with np.errstate(all="ignore"):
+        want = sw.integrate(own(), "standard_euler", backend="numpy", **ask)
+    for kernels in KERNELS:
+        monkeypatch.setenv("STEPWELL_KERNELS", kernels)
+        run = sw.integrate(own(), "standard_euler", **ask)
+        assert np.array_equal(run.v, want.v, equal_nan=True), kernels
+    one = sw.integrate(own(), "standard_euler", **ask | {"y": -720.0})
+    assert one.v[-1] == sw.integrate(own(), "standard_euler", backend="numpy", **ask | {"y": -720.0}).v[-1]
