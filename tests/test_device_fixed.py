@@ -285,6 +285,20 @@ def test_what_does_not_fit_and_what_does_not_compile_is_said(monkeypatch: Any) -
         sw.integrate(lorenz(), "rk4", y=start(3), dt=0.1, steps=1, device="opencl")
 
 
+def test_notes_of_a_compiler_are_not_passed_on() -> None:
+    """NVIDIA's has one on every kernel."""
+    import pyopencl
+    from stepwell.device import device_of
+
+    machine, text = device_of("opencl"), "#warning a note\n__kernel void noted() {}"
+    assert machine is not None
+    with pytest.warns(pyopencl.CompilerWarning):
+        pyopencl.Program(machine.context, text).build()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        machine.program(text)
+
+
 def failed(cl: Any, routine: str, code: int) -> Any:
     """An error as pyopencl raises it."""
     return cl.MemoryError(cl._cl._ErrorRecord(msg="no room", code=code, routine=routine))

@@ -45,10 +45,10 @@ _TEXTS: OrderedDict[Any, tuple[Stages, str]] = OrderedDict()
 
 #: What stands before the kernels: a time of many, by its number, of a member.
 TIMES = """
-inline double time_of(__global const double *times, const long width, const long i, const long g) {
+static inline double time_of(__global const double *times, const long width, const long i, const long g) {
     return times[i * width + (width > 1 ? g : 0)];
 }
-inline long passed_times(__global const double *times, const long width, const long count, const double t, const long g) {
+static inline long passed_times(__global const double *times, const long width, const long count, const double t, const long g) {
     long first = 0, last = count;
     while (first < last) {
         const long middle = (first + last) / 2;
@@ -56,7 +56,7 @@ inline long passed_times(__global const double *times, const long width, const l
     }
     return first;
 }
-inline double next_time(__global const double *times, const long width, const long count, const double t, const long g) {
+static inline double next_time(__global const double *times, const long width, const long count, const double t, const long g) {
     const long i = passed_times(times, width, count, t, g);
     return i < count ? time_of(times, width, i, g) : INFINITY;
 }
@@ -189,35 +189,40 @@ class _Run:
             if done[0] == width:
                 break
             if 2 * (width - done[0]) <= len(live):  # the others are in the way
-                status = np.empty(width, np.int64)
-                machine.get(status, marks, 8 * width * MARKS.index("status"))
+                status = self.mark(marks, "status", width)
                 live = np.flatnonzero(status == RUNNING).astype(np.int64)
                 list_of_live = machine.put(live)
         self.read(share, rows, marks, saved, steps, waypoints)
+
+    def mark(self, marks: Any, name: str, width: int) -> Array:
+        """A mark of so many members."""
+        numbers: Array = np.empty(width, np.int64)
+        self.machine.get(numbers, marks, 8 * width * MARKS.index(name))
+        return numbers
 
     def read(self, share: Share, rows: Any, marks: Any, saved: list[Any], steps: list[Any], waypoints: Any) -> None:
         """Take from the device what members have come to."""
         arrays, width, machine = self.arrays, share.end - share.first, self.machine
         columns = slice(share.first, share.end)
 
-        def take(to: Array, buffer: Any) -> None:
+        def take(to: Array, buffer: Any, offset: int = 0) -> None:
             """Fill the columns of these members of an array, whose last axes are the members."""
             whole = to.reshape(-1, self.members)  # a view, of arrays that the run has just made
+            if width == self.members and whole.flags.c_contiguous:
+                machine.get(whole, buffer, offset)
+                return
             taken: Array = np.empty((len(whole), width), to.dtype)
-            machine.get(taken, buffer)
+            machine.get(taken, buffer, offset)
             whole[:, columns] = taken
 
-        last, ends = np.empty((self.rows, width)), np.empty((len(MARKS), width), np.int64)
-        machine.get(last, rows)
-        machine.get(ends, marks)
-        arrays.last_state[:, columns] = last[: self.state]
-        arrays.last_paces[:, columns] = last[self.state : self.state + len(arrays.last_paces)]
-        arrays.status[columns] = ends[MARKS.index("status")]
+        take(arrays.last_state, rows)
+        take(arrays.last_paces, rows, 8 * width * self.state)
+        arrays.status[columns] = self.mark(marks, "status", width)
         for to, buffer in zip((arrays.saved_v, arrays.saved_y), saved, strict=True):
             if to.size:
                 take(to, buffer)
         if arrays.steps is not None:
-            arrays.steps.counts[columns] = ends[MARKS.index("kept")]
+            arrays.steps.counts[columns] = self.mark(marks, "kept", width)
             for to, buffer in zip((arrays.steps.t, arrays.steps.v, arrays.steps.y), steps, strict=True):
                 if to.size:
                     take(to, buffer)

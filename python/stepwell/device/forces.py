@@ -61,7 +61,8 @@ def _begun(dim: int, *names: str) -> list[str]:
 
 #: Puts a number of a place where the forces read it; and all places of a block.
 PLACES = """
-inline void put_place(real x, long g, int all, int n, __global const int *ranks, __global real *places, __global real *round) {
+static inline void put_place(real x, long g, int all, int n, __global const int *ranks, __global real *places,
+                             __global real *round) {
 const long row = g / all;
 const int rank = ranks[g % all];
 places[g] = x;
@@ -240,7 +241,7 @@ real part = of[lane];
 for (long i = lane + {LANES}; i < n; i += {LANES}) part = part + of[i];
 parts[g] = part;
 }}
-inline real total(__global const real *parts, const long row, const int n) {{
+static inline real total(__global const real *parts, const long row, const int n) {{
 if (n == 0) return 0.0;
 real sum = parts[row * {LANES}];
 for (int lane = 1; lane < min({LANES}, n); lane++) sum = sum + parts[row * {LANES} + lane];

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import warnings
 from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,6 +25,9 @@ MOST_PROGRAMS = 64
 ROUNDS_SINGLE = "-cl-fp32-correctly-rounded-divide-sqrt"
 #: The errors of OpenCL that a full device raises: drivers allocate when an array is made, or when it is used first.
 FULL = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY", "INVALID_BUFFER_SIZE")
+
+#: Filters of warnings are those of the process: one thread at a time changes them.
+_SILENCE = threading.Lock()
 
 
 class Device(NamedTuple):
@@ -146,7 +150,7 @@ class Machine:
         waits_for(f"compiling for {self.described.name}")
         options = ["-cl-std=CL1.2"] + [ROUNDS_SINGLE] * self.rounds_single
         try:
-            built = Program(self.cl.Program(self.context, text).build(options=options))
+            built = Program(self._built(self.cl.Program(self.context, text), options))
         except self.cl.Error as error:
             raise UnsupportedError(
                 f"device: the compiler of {self.described.name} ({self.described.title}) fails at a step of {text.count(';')} "
@@ -157,6 +161,12 @@ class Machine:
             while len(self._programs) > MOST_PROGRAMS:
                 self._programs.popitem(last=False)
         return built
+
+    def _built(self, program: Any, options: list[str]) -> Any:
+        """The program, built without a word: compilers have notes on texts of ours that do not concern who makes a run."""
+        with _SILENCE, warnings.catch_warnings():
+            warnings.simplefilter("ignore", self.cl.CompilerWarning)
+            return program.build(options=options)
 
     def put(self, array: Any) -> Any:
         """A copy of an array on the device, to read and to write."""

@@ -44,7 +44,7 @@ LINE = 6
 
 #: Reads lines from one to before another. It is not copied to where it is called: compilers would take several times as long.
 TEXT = f"""
-inline bits operand_of(const int i, __global const bits *constants, __global const bits *values, const long members,
+static inline bits operand_of(const int i, __global const bits *constants, __global const bits *values, const long members,
                        const long g) {{
     return i < 0 ? constants[~i] : values[i * members + g];
 }}

@@ -179,10 +179,11 @@ def in_double(line: str) -> str:
 
 #: A sample of a member, by the number of its row among those of all tables.
 SAMPLES = """
-inline real sample_of(__global const real *samples, __global const long *offsets, __global const int *widths, long row, long g) {
+static inline real sample_of(__global const real *samples, __global const long *offsets, __global const int *widths, long row,
+                             long g) {
     return samples[offsets[row] + g * widths[row]];
 }
-inline long sample_place(real at, long rows) {
+static inline long sample_place(real at, long rows) {
     const long row = at >= 0 ? (long)at : 0;
     return row < rows ? row : 0;
 }
