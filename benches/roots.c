@@ -18,6 +18,14 @@ typedef uint64_t w __attribute__((vector_size(8 * WIDTH)));
 #define sqrt(x) ((v)_mm256_sqrt_pd((__m256d)(x)))
 #endif
 
+/* a * b + c rounded once, in a sequence that asks for it; some of the three are numbers for all lanes, and x - 0 is x. */
+#if WIDTH == 8
+#define FMA(a, b, c) ((v)_mm512_fmadd_pd((__m512d)(a), (__m512d)(b), (__m512d)(c)))
+#else
+#define FMA(a, b, c) ((v)_mm256_fmadd_pd((__m256d)(a), (__m256d)(b), (__m256d)(c)))
+#endif
+#define fma(a, b, c) FMA((a) - (v){0}, (b) - (v){0}, (c) - (v){0})
+
 /* M less half the bits of x: exclusive or takes them from all ones. */
 INLINE v start(v x, uint64_t m)
 {
@@ -26,8 +34,8 @@ INLINE v start(v x, uint64_t m)
 
 INLINE v cube(v x)
 {
-    v y, s, u, q, f;
-    (void)y, (void)s, (void)u, (void)q;
+    v y, s, u, q, e, f;
+    (void)y, (void)s, (void)u, (void)q, (void)e;
     SEQUENCE
     return f;
 }

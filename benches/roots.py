@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from stepwell.reference.fma import fma
 
 #: With y = ±(3/2)^(1/5)/√x the product y³·(A − x·y²) is ±1/√x³; A = 5/3·(3/2)^(2/5).
 A = "1.9601317042077893"
@@ -68,6 +69,13 @@ SEQUENCES = [
         " y = y * (((u + 8.9473598635212482) * (s - 4.81009220396059078) + 36.0957951249926805) * (u + 0.784830735739541551)"
         f" + 2.13644859736149098); {LAST_OF_NEGATIVE}",
     ),
+    # What fused=True computes (the core's bodies.rs).
+    Sequence(
+        "fused=True",
+        "y = start(x, 0x5FE6E96BD011219C); e = fma(-x, y * y, 1.0);"
+        " y = fma(y * e, fma(e, 0.3758909929326057, 0.5010993791148002), y);"
+        " q = y * y; e = fma(-x, q, 1.0); f = q * y; f = fma(f * e, fma(fma(e, 2.1875, 1.875), e, 1.5), f)",
+    ),
 ]
 
 
@@ -78,19 +86,20 @@ def start(x: Any, magic: int) -> Any:
 
 def computed(sequence: Sequence, x: Any) -> Any:
     """1/√x³ by these statements."""
-    names = {"x": x, "sqrt": np.sqrt, "start": lambda x, magic: start(x, magic).view(np.float64)}
+    names = {"x": x, "sqrt": np.sqrt, "fma": fma, "start": lambda x, magic: start(x, magic).view(np.float64)}
     exec(sequence.text, {}, names)
     return names["f"]
 
 
 def operations(sequence: Sequence) -> tuple[int, int]:
-    """How many it has, three of them in a start; and how many of these are products, roots and divisions."""
+    """How many it has, three of them in a start; and how many of these are products, fused or not, roots and divisions."""
     nodes = list(ast.walk(ast.parse(sequence.text)))
     of = [node.op for node in nodes if isinstance(node, ast.BinOp)]
-    starts, roots = (
-        sum(isinstance(node, ast.Call) and getattr(node.func, "id", "") == name for node in nodes) for name in ("start", "sqrt")
+    starts, roots, fused = (
+        sum(isinstance(node, ast.Call) and getattr(node.func, "id", "") == name for node in nodes)
+        for name in ("start", "sqrt", "fma")
     )
-    return len(of) + 3 * starts + roots, sum(isinstance(op, (ast.Mult, ast.Div)) for op in of) + roots
+    return len(of) + 3 * starts + roots + fused, sum(isinstance(op, (ast.Mult, ast.Div)) for op in of) + roots + fused
 
 
 def error(sequence: Sequence, x: Any) -> float:

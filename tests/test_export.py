@@ -285,6 +285,7 @@ class Tangled:
         chosen = bits.where(near & slow, cut, bits.where(near | slow, logarithm, odd))
         other = bits.where(~slow, turned, bits.clamp(chosen, -0.25, 0.5))
         mixed = bits.add_bits(bits.where(near, bits.add_bits(v, 3), y), 0xFFFF_FFFF_FFFF_FFFE)
+        mixed = bits.sub_bits_from(bits.sub_bits_from(mixed, 0x7FFF_FFFF_FFFF_FFFF), 0x7FFF_FFFF_FFFF_FFFE)
         return -self.h * (chosen + other + mixed + trig.sin(t) * trig.cos(self.omega * v))
 
     def dy(self, t: Any, v: Any, y: Any) -> Any:
@@ -402,6 +403,7 @@ def test_bits_of_numbers(language: str, tmp_path: Path, monkeypatch: pytest.Monk
         "or_bits",
         "xor_bits",
         "add_bits",
+        "sub_bits",
         "shift_up",
         "shift_down",
         "turn_sign",

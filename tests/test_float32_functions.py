@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stepwell import _core
 from stepwell.reference import bits, functions, trig
+from stepwell.reference.fma import fma, odd_sum
 from stepwell.reference.functions import exponential, logarithms, trigonometric
 from stepwell.reference.tape.evaluate import Evaluation
-from stepwell.reference.tape.fma import fma, odd_sum
 from support.cases import assert_same
 
 F = np.float32

@@ -14,7 +14,7 @@ import stepwell as sw
 from hypothesis import given
 from hypothesis import strategies as st
 from stepwell import _core
-from stepwell.reference.tape.fma import exact_fma, fma
+from stepwell.reference.fma import exact_fma, fma
 from stepwell.reference.tape.fused import fused
 from stepwell.reference.tape.increments import increments_last
 from stepwell.reference.tape.lines import Operation, listed, needed

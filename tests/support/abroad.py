@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import stepwell as sw
-from stepwell.reference.tape.fma import fma
+from stepwell.reference.fma import fma
 from stepwell.source.exports.names import camel
 
 #: Seconds that compilers and programs may take on a busy machine.

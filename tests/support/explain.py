@@ -10,7 +10,7 @@ import numpy as np
 import stepwell as sw
 from stepwell import _core
 from stepwell.reference.bits import DOUBLE, SINGLE, Precision
-from stepwell.reference.tape.fma import fma
+from stepwell.reference.fma import fma
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
 from stepwell.source.explanation import naming
@@ -28,6 +28,7 @@ ON_BITS = {
     "or_bits": np.bitwise_or,
     "xor_bits": np.bitwise_xor,
     "add_bits": np.add,
+    "sub_bits": np.subtract,
     "shift_up": np.left_shift,
     "shift_down": np.right_shift,
 }

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
+from stepwell.reference.fma import fma
 
 Operation = tuple[Any, ...]
 
@@ -176,6 +177,18 @@ class Symbol:
             return self._write("add_both", self, whole)
         return self.tape.write("add_bits", self.id, whole)
 
+    def sub_bits_from(self, whole: Any) -> Any:
+        """A whole number less its bits."""
+        return self.tape.write("sub_bits_from", self.id, whole)
+
+    def mul_add(self, y: Any, z: Any) -> Any:
+        """Its product and a sum, rounded once."""
+        return self._write("mul_add", self, y, z)
+
+    def mul_sub_from(self, y: Any, z: Any) -> Any:
+        """A number less its product, rounded once."""
+        return self._write("mul_sub_from", self, y, z)
+
     def shift_up(self, places: int) -> Any:
         """Its bits, moved up."""
         return self.tape.write("shift_up", self.id, places)
@@ -224,13 +237,16 @@ DONE: dict[str, Callable[..., Any]] = {
     "or_bits": _on_bits(operator.or_),
     "add_bits": _on_bits(operator.add),
     "add_both": _on_bits(operator.add),
+    "sub_bits_from": _on_bits(lambda x, whole: whole - x),
+    "mul_add": fma,
+    "mul_sub_from": lambda x, y, z: fma(-x, y, z),
     "shift_up": _on_bits(operator.lshift),
     "shift_down": _on_bits(operator.rshift),
     "xor_bits": _on_bits(operator.xor),
 }
 
 #: How many of an operation's operands are values on the tape; all, if not said.
-VALUES = {"and_bits": 1, "or_bits": 1, "add_bits": 1, "shift_up": 1, "shift_down": 1}
+VALUES = {"and_bits": 1, "or_bits": 1, "add_bits": 1, "sub_bits_from": 1, "shift_up": 1, "shift_down": 1}
 
 
 def evaluate(

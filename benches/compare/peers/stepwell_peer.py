@@ -94,8 +94,8 @@ def kernels(*without: str, **how):
 
 
 as_many_as_pay = kernels("cluster_leapfrog", "cloth_leapfrog", *OWN, threads=None)
-#: Large clusters and nets are no single tape, and so are not fused.
-fused = kernels("cluster_leapfrog", "shared_cluster_leapfrog", "cloth_leapfrog", threads=1, fused=True)
+#: Nets are no single tape, and so are not fused.
+fused = kernels("shared_cluster_leapfrog", "cloth_leapfrog", threads=1, fused=True)
 all_of_them = {"shared_cluster_leapfrog": kernels(threads=threads())["shared_cluster_leapfrog"]}
 CONTESTANTS = [
     Contestant("stepwell, 1 thread", kernels(threads=1)),

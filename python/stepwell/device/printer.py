@@ -36,7 +36,7 @@ ARITHMETIC = {
     "floor": "floor({})",
 }
 COMPARISONS = {"less": "{} < {}", "at most": "{} <= {}", "equal": "{} == {}"}
-OF_BITS = {"and": "{} & {}", "or": "{} | {}", "exclusive or": "{} ^ {}", "add bits": "{} + {}"}
+OF_BITS = {"and": "{} & {}", "or": "{} | {}", "exclusive or": "{} ^ {}", "add bits": "{} + {}", "subtract bits": "{} - {}"}
 
 
 class Printer:
@@ -105,7 +105,11 @@ class Printer:
             if name in COMPARISONS:
                 return "truth", COMPARISONS[name].format(*map(number, of))
             if name in OF_BITS:
-                if name != "add bits" and all(map(is_truth, of)) and any(texts[each][0] == "truth" for each in of):
+                if (
+                    name not in ("add bits", "subtract bits")
+                    and all(map(is_truth, of))
+                    and any(texts[each][0] == "truth" for each in of)
+                ):
                     return "truth", OF_BITS[name].format(*map(truth, of))
                 for one, other in (of, of[::-1]):
                     if name == "and" and operations[one][0] == "constant" and operations[one][2] == self._all >> 1:

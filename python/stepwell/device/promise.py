@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..errors import UnsupportedError
-from ..reference.tape.fma import fma
+from ..reference.fma import fma
 from .opencl import Machine
 from .printer import HEAD, TYPES
 

@@ -33,6 +33,7 @@ READ = {
     "or": "a | b",
     "exclusive or": "a ^ b",
     "add bits": "a + b",
+    "subtract bits": "a - b",
     "shift up": "extra < 8 * (int)sizeof(bits) ? a << extra : 0",
     "shift down": "extra < 8 * (int)sizeof(bits) ? a >> extra : 0",
     "choose": "(a & b) | (~a & c)",

@@ -143,6 +143,18 @@ def sqrt(x: Any) -> Any:
     return _call("sqrt", x) if _objects(x) else np.sqrt(x)
 
 
+def mul_add(x: Any, y: Any, z: Any) -> Any:
+    """x·y + z, rounded once."""
+    from .fma import fma  # only what is fused needs it
+
+    return _call("mul_add", x, y, z) if _objects(x) else fma(x, y, z)
+
+
+def mul_sub_from(x: Any, y: Any, z: Any) -> Any:
+    """The number z − x·y, rounded once."""
+    return _call("mul_sub_from", x, y, z) if _objects(x) else mul_add(-x, y, z)
+
+
 def floor(x: Any) -> Any:
     """The largest whole number not above x."""
     return _call("floor", x) if _objects(x) else np.floor(x)
@@ -161,6 +173,11 @@ def or_bits(x: Any, bits: int) -> Any:
 def add_bits(x: Any, whole: int) -> Any:
     """The sum of the bits of x, as a whole number, and a constant."""
     return _call("add_bits", x, whole) if _objects(x) else DOUBLE.number_of(DOUBLE.bits_of(x) + np.uint64(whole))
+
+
+def sub_bits_from(x: Any, whole: int) -> Any:
+    """A constant as a whole number, less the bits of x."""
+    return _call("sub_bits_from", x, whole) if _objects(x) else DOUBLE.number_of(np.uint64(whole) - DOUBLE.bits_of(x))
 
 
 def shift_up(x: Any, places: int) -> Any:

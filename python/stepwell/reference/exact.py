@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from .tape.fma import halves, two_product, two_sum
+from .fma import halves, two_product, two_sum
 
 Twice = tuple[Array, Array]
 

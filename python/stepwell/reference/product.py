@@ -14,7 +14,7 @@ def times(matrix: Array, columns: "Sequence[Array] | Array", *, fused: bool = Fa
     """The matrix, of shape (rows, columns, *batch), times a column of numbers."""
     total: Array = matrix[:, 0] * columns[0]
     if fused:
-        from .tape.fma import double_fma  # only fused products need it
+        from .fma import double_fma  # only fused products need it
 
         for j in range(1, len(columns)):
             total = double_fma(matrix[:, j], columns[j], total)

@@ -101,7 +101,8 @@ def integrate(
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
-            same on every machine and with either backend. For steps of up to some 100 000 operations.
+            same on every machine and with either backend. For steps of up to some 100 000 operations, and for any number of
+            bodies, whose Newtonian force is then made without root and quotient (docs/theory/numerics.md).
         dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are
             rounded to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the
             same on every machine and with either backend. With a tolerance, of 2⁻²³ = 1.2e-7 or more, time and controller are

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use crate::{
     aligned::Aligned,
-    bodies::{LANES as SIDE, Law, meeting},
+    bodies::{LANES as SIDE, Law, Rounding, meeting},
     isa::{Level, Task, with_isa},
 };
 
@@ -97,7 +97,7 @@ impl Sums {
 }
 
 /// The bodies meet at the distances of one slab.
-struct Along<'a, const D: usize, const LAW: u8, const ENERGY: bool> {
+struct Along<'a, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> {
     n: usize,
     groups: &'a [Distances],
     round: &'a Round,
@@ -127,19 +127,28 @@ struct Partners<const D: usize> {
 impl<const D: usize> Bodies<D> {
     /// Adds the forces of a chunk of partners; `met` is a mask, with no bits for pairs that do not count.
     #[inline(always)]
-    fn meet<const LAW: u8, const ENERGY: bool>(&mut self, p: &mut Partners<D>, soft: f64, met: Option<&[u64; SIDE]>) {
+    fn meet<const LAW: u8, const ENERGY: bool, const FUSED: bool>(
+        &mut self,
+        p: &mut Partners<D>,
+        soft: f64,
+        met: Option<&[u64; SIDE]>,
+    ) {
         let mut d = [[0.0; SIDE]; D];
-        let mut r2 = [0.0; SIDE];
+        let mut r2 = if FUSED { [soft; SIDE] } else { [0.0; SIDE] };
         for c in 0..D {
             for l in 0..SIDE {
                 d[c][l] = p.place[c][l] - self.place[c][l];
-                r2[l] = if c == 0 { d[c][l] * d[c][l] } else { r2[l] + d[c][l] * d[c][l] };
+                r2[l] = if c == 0 && !FUSED {
+                    d[c][l] * d[c][l]
+                } else {
+                    const { Rounding::of(FUSED) }.plus(r2[l], d[c][l], d[c][l])
+                };
             }
         }
         let (mut to_i, mut to_j, mut more) = ([0.0; SIDE], [0.0; SIDE], [0.0; SIDE]);
         for l in 0..SIDE {
-            let r2 = r2[l] + soft;
-            let pull = const { law(LAW) }.pull(r2);
+            let r2 = if FUSED { r2[l] } else { r2[l] + soft };
+            let pull = const { law(LAW) }.pull(const { Rounding::of(FUSED) }, r2);
             to_i[l] = pull * p.strength[l];
             to_j[l] = pull * self.strength[l];
             if ENERGY {
@@ -147,10 +156,10 @@ impl<const D: usize> Bodies<D> {
             }
         }
         // Written out: as a loop it is so long that the compiler leaves it one, and gathers its vectors from three directions.
-        self.pull_along(0, p, &d, [&to_i, &to_j], met);
-        self.pull_along(1, p, &d, [&to_i, &to_j], met);
+        self.pull_along::<FUSED>(0, p, &d, [&to_i, &to_j], met);
+        self.pull_along::<FUSED>(1, p, &d, [&to_i, &to_j], met);
         if D == 3 {
-            self.pull_along(2, p, &d, [&to_i, &to_j], met);
+            self.pull_along::<FUSED>(2, p, &d, [&to_i, &to_j], met);
         }
         if ENERGY {
             add(&mut self.well, more, met);
@@ -159,7 +168,19 @@ impl<const D: usize> Bodies<D> {
 
     /// Adds the forces in one direction.
     #[inline(always)]
-    fn pull_along(&mut self, c: usize, p: &mut Partners<D>, d: &[Chunk; D], to: [&Chunk; 2], met: Option<&[u64; SIDE]>) {
+    fn pull_along<const FUSED: bool>(
+        &mut self,
+        c: usize,
+        p: &mut Partners<D>,
+        d: &[Chunk; D],
+        to: [&Chunk; 2],
+        met: Option<&[u64; SIDE]>,
+    ) {
+        if FUSED {
+            add_products(&mut self.pull[c], &d[c], to[0], met);
+            add_products(&mut p.pull[c], &d[c], to[1], met);
+            return;
+        }
         let (mut of_i, mut of_j) = ([0.0; SIDE], [0.0; SIDE]);
         for l in 0..SIDE {
             of_i[l] = d[c][l] * to[0][l];
@@ -184,8 +205,17 @@ fn add(sums: &mut Chunk, mut more: Chunk, met: Option<&[u64; SIDE]>) {
     }
 }
 
+/// Adds products to sums, each rounded once.
+#[inline(always)]
+fn add_products(sums: &mut Chunk, a: &Chunk, b: &Chunk, met: Option<&[u64; SIDE]>) {
+    for l in 0..SIDE {
+        let sum = a[l].mul_add(b[l], sums[l]);
+        sums[l] = met.map_or(sum, |met| f64::from_bits(sum.to_bits() & met[l] | sums[l].to_bits() & !met[l]));
+    }
+}
+
 /// The slices that the hot loop goes through, taken once.
-struct Hot<'a, const D: usize, const LAW: u8, const ENERGY: bool> {
+struct Hot<'a, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> {
     places: &'a [f64],
     partners: &'a [f64],
     bodies: &'a [f64],
@@ -195,7 +225,7 @@ struct Hot<'a, const D: usize, const LAW: u8, const ENERGY: bool> {
     wells: &'a mut [f64],
 }
 
-impl<const D: usize, const LAW: u8, const ENERGY: bool> Hot<'_, D, LAW, ENERGY> {
+impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Hot<'_, D, LAW, ENERGY, FUSED> {
     /// The chunks of bodies from `A` to `B`, of those that are held, meet the chunk of partners at `at`.
     #[inline(always)]
     fn partner<const A: usize, const B: usize, const U: usize>(
@@ -212,7 +242,7 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Hot<'_, D, LAW, ENERGY> 
             p.pull[c] = load(self.before, c * stride + at);
         }
         for t in A..B {
-            held[t].meet::<LAW, ENERGY>(&mut p, self.soft, if t == U - 1 { met } else { None });
+            held[t].meet::<LAW, ENERGY, FUSED>(&mut p, self.soft, if t == U - 1 { met } else { None });
         }
         for c in 0..D {
             store(self.before, c * stride + at, &p.pull[c]);
@@ -274,14 +304,14 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Hot<'_, D, LAW, ENERGY> 
     }
 }
 
-impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY> {
+impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Along<'_, D, LAW, ENERGY, FUSED> {
     #[inline(always)]
     fn meet(&mut self) {
         let Along { n, round, sums, stop, .. } = self;
         let n = *n;
         let (width, stride) = (round.bodies.len(), round.partners.len());
         let Sums { after, before, potential } = &mut **sums;
-        let mut hot = Hot::<D, LAW, ENERGY> {
+        let mut hot = Hot::<D, LAW, ENERGY, FUSED> {
             places: &round.places,
             partners: &round.partners,
             bodies: &round.bodies,
@@ -328,7 +358,7 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
     }
 }
 
-impl<const D: usize, const LAW: u8, const ENERGY: bool> Task for Along<'_, D, LAW, ENERGY> {
+impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Task for Along<'_, D, LAW, ENERGY, FUSED> {
     #[inline(always)]
     fn run(mut self) {
         self.meet();
@@ -352,6 +382,8 @@ const PRINTED: u8 = 2;
 pub struct Kernel {
     /// The force.
     pub law: Law,
+    /// How often its products are rounded.
+    pub rounding: Rounding,
     /// 2 or 3.
     pub dim: usize,
     /// What it may use.
@@ -397,6 +429,28 @@ impl Kernel {
 
     fn by<const D: usize, const LAW: u8, const ENERGY: bool>(self, m: Meeting) {
         let Meeting { n, groups, round, sums, more, stop, potential, out } = m;
-        with_isa!(self.level, |isa| isa.run(Along::<D, LAW, ENERGY> { n, groups, round, sums, more, stop, potential, out }));
+        match self.rounding {
+            Rounding::Twice => with_isa!(self.level, |isa| isa.run(Along::<D, LAW, ENERGY, false> {
+                n,
+                groups,
+                round,
+                sums,
+                more,
+                stop,
+                potential,
+                out
+            })),
+            // Without the instruction a fused multiply-add takes a hundred times as long, so the best of the machine is taken.
+            Rounding::Once => with_isa!(self.level.of_loops(), |isa| isa.run(Along::<D, LAW, ENERGY, true> {
+                n,
+                groups,
+                round,
+                sums,
+                more,
+                stop,
+                potential,
+                out
+            })),
+        }
     }
 }

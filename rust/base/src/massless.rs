@@ -5,8 +5,8 @@
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use crate::{
-    bodies::{LANES as SIDE, Law},
-    forces::{LOGARITHMIC, NEWTON, law},
+    bodies::{LANES as SIDE, Law, Rounding},
+    forces::{Kernel, LOGARITHMIC, NEWTON, law},
     isa::{Level, Task, with_isa},
 };
 
@@ -35,21 +35,29 @@ pub struct Pulled<'a> {
 
 impl Pulled<'_> {
     /// Computes the forces.
-    pub fn by(self, law: Law, dim: usize, level: Level) {
+    pub fn by(self, Kernel { law, rounding, dim, level }: Kernel) {
         match (dim, law) {
-            (2, Law::Newton) => with_isa!(level, |isa| isa.run(Of::<2, NEWTON>(self))),
-            (2, _) => with_isa!(level, |isa| isa.run(Of::<2, LOGARITHMIC>(self))),
-            (_, Law::Newton) => with_isa!(level, |isa| isa.run(Of::<3, NEWTON>(self))),
-            (_, _) => with_isa!(level, |isa| isa.run(Of::<3, LOGARITHMIC>(self))),
+            (2, Law::Newton) => self.rounded::<2, NEWTON>(rounding, level),
+            (2, _) => self.rounded::<2, LOGARITHMIC>(rounding, level),
+            (_, Law::Newton) => self.rounded::<3, NEWTON>(rounding, level),
+            (_, _) => self.rounded::<3, LOGARITHMIC>(rounding, level),
+        }
+    }
+
+    fn rounded<const D: usize, const LAW: u8>(self, rounding: Rounding, level: Level) {
+        match rounding {
+            Rounding::Twice => with_isa!(level, |isa| isa.run(Of::<D, LAW, false>(self))),
+            Rounding::Once => with_isa!(level.of_loops(), |isa| isa.run(Of::<D, LAW, true>(self))), // as of forces
         }
     }
 }
 
-struct Of<'a, const D: usize, const LAW: u8>(Pulled<'a>);
+struct Of<'a, const D: usize, const LAW: u8, const FUSED: bool>(Pulled<'a>);
 
-impl<const D: usize, const LAW: u8> Task for Of<'_, D, LAW> {
+impl<const D: usize, const LAW: u8, const FUSED: bool> Task for Of<'_, D, LAW, FUSED> {
     #[inline(always)]
     fn run(self) {
+        let rounding = const { Rounding::of(FUSED) };
         let Pulled { bodies, y, places, strengths, soft, stop, out, first } = self.0;
         let ((y, _), (places, _), (out, _)) = (y.as_chunks::<D>(), places.as_chunks::<D>(), out.as_chunks_mut::<D>());
         for some in bodies.chunks(STOPPED_AFTER) {
@@ -66,19 +74,21 @@ impl<const D: usize, const LAW: u8> Task for Of<'_, D, LAW> {
                 }
                 let mut sums = [[-0.0; SIDE]; D];
                 for (from, strength) in places.iter().zip(strengths) {
-                    let (mut d, mut r2, mut pull) = ([[0.0; SIDE]; D], [0.0; SIDE], [0.0; SIDE]);
+                    let (mut d, mut pull) = ([[0.0; SIDE]; D], [0.0; SIDE]);
+                    let mut r2 = if FUSED { [soft; SIDE] } else { [0.0; SIDE] };
                     for c in 0..D {
                         for l in 0..SIDE {
                             d[c][l] = from[c] - place[c][l];
-                            r2[l] = if c == 0 { d[c][l] * d[c][l] } else { r2[l] + d[c][l] * d[c][l] };
+                            r2[l] = if c == 0 && !FUSED { d[c][l] * d[c][l] } else { rounding.plus(r2[l], d[c][l], d[c][l]) };
                         }
                     }
                     for l in 0..SIDE {
-                        pull[l] = const { law(LAW) }.pull(r2[l] + soft) * strength;
+                        let r2 = if FUSED { r2[l] } else { r2[l] + soft };
+                        pull[l] = const { law(LAW) }.pull(rounding, r2) * strength;
                     }
                     for c in 0..D {
                         for l in 0..SIDE {
-                            sums[c][l] += d[c][l] * pull[l];
+                            sums[c][l] = rounding.plus(sums[c][l], d[c][l], pull[l]);
                         }
                     }
                 }

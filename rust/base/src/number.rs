@@ -78,6 +78,12 @@ pub trait Number:
     /// √x
     #[must_use]
     fn sqrt(self) -> Self;
+    /// x · y + z, rounded once.
+    #[must_use]
+    fn mul_add(self, y: Self, z: Self) -> Self;
+    /// z − x · y, rounded once.
+    #[must_use]
+    fn mul_sub_from(self, y: Self, z: Self) -> Self;
     /// The largest whole number not above x.
     #[must_use]
     fn floor(self) -> Self;
@@ -101,6 +107,9 @@ pub trait Number:
     /// Its bits as a whole number, and another added.
     #[must_use]
     fn add_bits(self, whole: u64) -> Self;
+    /// A whole number, and its bits subtracted.
+    #[must_use]
+    fn sub_bits_from(self, whole: u64) -> Self;
     /// Its bits, moved up.
     #[must_use]
     fn shift_up(self, places: u32) -> Self;
@@ -159,6 +168,14 @@ impl Number for f64 {
         f64::sqrt(self)
     }
     #[inline(always)]
+    fn mul_add(self, y: f64, z: f64) -> f64 {
+        f64::mul_add(self, y, z)
+    }
+    #[inline(always)]
+    fn mul_sub_from(self, y: f64, z: f64) -> f64 {
+        f64::mul_add(-self, y, z)
+    }
+    #[inline(always)]
     fn floor(self) -> f64 {
         f64::floor(self)
     }
@@ -193,6 +210,10 @@ impl Number for f64 {
     #[inline(always)]
     fn add_bits(self, whole: u64) -> f64 {
         f64::from_bits(self.to_bits().wrapping_add(whole))
+    }
+    #[inline(always)]
+    fn sub_bits_from(self, whole: u64) -> f64 {
+        f64::from_bits(whole.wrapping_sub(self.to_bits()))
     }
     #[inline(always)]
     fn shift_up(self, places: u32) -> f64 {

@@ -178,6 +178,16 @@ impl Symbol {
     fn sqrt(&self) -> Symbol {
         self.on(Op::Sqrt)
     }
+    /// x · y + z, rounded once.
+    fn mul_add(&self, y: Value, z: Value) -> PyResult<Symbol> {
+        let (y, z) = (self.id_of(&y)?, self.id_of(&z)?);
+        Ok(self.on(|id| Op::MulAdd(id, y, z)))
+    }
+    /// z − x · y, rounded once.
+    fn mul_sub_from(&self, y: Value, z: Value) -> PyResult<Symbol> {
+        let (y, z) = (self.id_of(&y)?, self.id_of(&z)?);
+        Ok(self.on(|id| Op::SubMul(id, y, z)))
+    }
     /// The largest whole number not above x.
     fn floor(&self) -> Symbol {
         self.on(Op::Floor)
@@ -216,6 +226,10 @@ impl Symbol {
     /// The bits of x as a whole number, and a constant added.
     fn add_bits(&self, bits: Bits) -> PyResult<Symbol> {
         self.with_bits(bits, Op::AddBits)
+    }
+    /// A constant as a whole number, and the bits of x subtracted.
+    fn sub_bits_from(&self, bits: Bits) -> PyResult<Symbol> {
+        self.with_bits(bits, |x, whole| Op::SubBits(whole, x))
     }
     /// A number on the tape of this symbol.
     fn number(&self, x: f64) -> Symbol {

@@ -165,6 +165,15 @@ class System(Immutable, ValueEquality, ABC):
             ],
         )
 
+    def with_fused_rates(self) -> System | None:
+        """The system with ``fused=True`` if it says itself which products of its rates are fused; None if a tape shows which."""
+        return None
+
+    @property
+    def fuses_on_tape(self) -> bool:
+        """Whether products of a step that the rates do not fuse are fused on the tape of the step."""
+        return True
+
     @abstractmethod
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The parameters of its equations by name, for states of that batch shape: the arguments of its reference after the step.

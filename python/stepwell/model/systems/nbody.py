@@ -18,6 +18,8 @@ from .base import System
 if TYPE_CHECKING:
     from ...base.literals import BodyForce
 
+#: Fused, so many bodies are a tape, however many members there are: the core has a kernel for one system of more.
+MOST_ON_TAPE = 9
 FORCES: tuple[BodyForce, ...] = ("logarithmic", "newton", "printed")
 
 
@@ -60,6 +62,8 @@ class NBody(System):
     unchanged: ClassVar[dict[str, float]] = {"softening": checks.NOT_NEGATIVE}
     reference = reference.NBody
     complex_step = True
+    #: Whether products of the forces are fused, which a run decides.
+    fused = False
     axes = "bodies, dim"
 
     def __init__(
@@ -182,12 +186,23 @@ class NBody(System):
         """Whether the energy is constant in the true motion."""
         return self.control is None and not self.contacts and self.force != "printed"
 
+    def with_fused_rates(self) -> NBody:
+        """The bodies with the forces of ``fused=True``."""
+        return changed(self, fused=True)
+
+    @property
+    def fuses_on_tape(self) -> bool:
+        """Whether there are so few that a step is one tape. More may be stepped in other ways, which must have the same bits."""
+        return len(self.masses) <= MOST_ON_TAPE
+
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
         """The force, the dimension, masses, G·m, the softening and which bodies have no mass."""
         masses = aligned(self.masses, 1, batch)
         sizes: dict[str, Any] = {"force": self.force, "dim": self.y_shape[1]}
         if len(self.massless):
             sizes["massless"] = self.massless.astype("<u4").tobytes()
+        if self.fused:
+            sizes["fused"] = 1
         return sizes | {"masses": masses, "strength": self.G * masses, "softening": self.softening}
 
     def named(self, name: str, index: Shape) -> str:

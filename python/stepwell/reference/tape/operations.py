@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import UnsupportedError
 from ..bits import DOUBLE, SINGLE, Precision
-from .fma import fma
+from ..fma import fma
 
 #: The factor by which a change of an operand is multiplied: a symbol, 1.0 or −1.0, or None where it changes nothing.
 Factor = Any
@@ -77,6 +77,7 @@ OPERATIONS: dict[str, Kind] = {
     "or": _of_bits(operator.or_, operator.or_, sign="or_bits", commutes=True),
     "exclusive or": _of_bits(operator.xor, lambda a, b: a.xor_bits(b), sign="xor_bits", commutes=True),
     "add bits": _of_bits(operator.add, lambda a, b: a.add_bits(b), sign="add_bits", commutes=True),
+    "subtract bits": _of_bits(operator.sub, lambda a, b: b.sub_bits_from(a), sign="sub_bits"),
     "shift up": _of_bits(operator.lshift, lambda a, places: a.shift_up(places), sign="shift_up", has_extra=True),
     "shift down": _of_bits(operator.rshift, lambda a, places: a.shift_down(places), sign="shift_down", has_extra=True),
 }

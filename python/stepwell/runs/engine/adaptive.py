@@ -259,7 +259,7 @@ def attempted_system(plan: Plan) -> Attempted:
     """The NumPy reference of the system for attempts, scaled to a step of 1, or of −1 if its time runs backward."""
     from ...reference import adaptive
 
-    s = plan.system.reference_at_step(-1.0 if plan.backward else 1.0, plan.batch)
+    s = plan.stepped.reference_at_step(-1.0 if plan.backward else 1.0, plan.batch)
     return adaptive.Attempted(adaptive.Backward(s) if plan.backward else s, plan.system.parts(plan.batch, plan.force))
 
 

@@ -32,7 +32,7 @@ def traced(plan: Plan, what: str) -> tuple[Tracer, Any, list[Any]]:
 
     _core.check(model(plan.of_core()))
     tape = _core.Tape(single=plan.single)
-    tracer = Tracer(plan.system, tape, plan.force)
+    tracer = Tracer(plan.stepped, tape, plan.force)
     match what:
         case "step":
             symbols = tracer.step(plan.method, plan.choice)
@@ -50,7 +50,7 @@ def steps_of_single(plan: Plan, what: str) -> Steps:
     from ...reference.tape.single import Steps
 
     tracer, tape, symbols = traced(plan, what)
-    return Steps(tape, symbols, dict(enumerate(tracer.numbers)), plan.fused, tracer.tables, tracer.times)
+    return Steps(tape, symbols, dict(enumerate(tracer.numbers)), plan.fuses, tracer.tables, tracer.times)
 
 
 def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
@@ -63,7 +63,7 @@ def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], 
     else:
         tracer, tape, symbols = traced(plan, what)
         numbers, [(_, _, number_of_budget)] = dict(enumerate(tracer.numbers)), tape.operations([tape.budget()])[0]
-        steps = Evaluation(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fused)
+        steps = Evaluation(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fuses)
 
     def next_rows(state: list[Array], t: Any) -> Array:
         rows = steps(state, t, plan.dt)

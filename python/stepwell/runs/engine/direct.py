@@ -41,7 +41,7 @@ def first_bad_steps(plan: Plan, before: Whole | None) -> Whole:
 def _run_by_reference(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     steps, remembered = plan.method.steps, None
     if plan.system.controller is not None:
-        loop, of_loop = plan.system.looped(plan.dt, plan.batch, plan.force)
+        loop, of_loop = plan.stepped.looped(plan.dt, plan.batch, plan.force)
         remembered = [row.astype(plan.dtype) for row in plan.memory]  # type: ignore[union-attr]  # there is one
         s = of_loop(loop.held(remembered))
     else:
@@ -177,7 +177,7 @@ def _begun(plan: Plan) -> Any:
     """The system as it is before the first step."""
     if plan.memory is None:
         return plan.scaled()
-    loop, of_loop = plan.system.looped(plan.dt, plan.batch, plan.force)
+    loop, of_loop = plan.stepped.looped(plan.dt, plan.batch, plan.force)
     return of_loop(loop.held(list(plan.memory)))
 
 

@@ -100,12 +100,28 @@ class Plan(NamedTuple):
 
     def scaled(self) -> Any:
         """The NumPy reference of the system, scaled to the step, with the force."""
-        return self.system.scaled(self.dt, self.batch, self.force)
+        return self.stepped.scaled(self.dt, self.batch, self.force)
+
+    @property
+    def stepped(self) -> System:
+        """The system whose rates make the steps: that of the plan, or with fused products where it says which these are."""
+        return self._of_fused or self.system
+
+    @property
+    def fuses(self) -> bool:
+        """Whether products are fused on the tape of a step, which shows which these are, beside those that the rates fuse."""
+        return self.fused and (self._of_fused is None or self.system.fuses_on_tape)
+
+    @property
+    def _of_fused(self) -> System | None:
+        # Series and solutions of equations need the derivatives of rates, and Kepler's motions are no forces: on a tape as it is.
+        of_rates = self.fused and not (self.method.has_derivatives or self.method.splits)
+        return self.system.with_fused_rates() if of_rates else None
 
     @property
     def by_tape(self) -> bool:
-        """Whether the NumPy backend evaluates the tape of the reference: for fused steps, float32 and series."""
-        return self.fused or self.single or self.method.has_derivatives
+        """Whether the NumPy backend evaluates the tape of the reference: for steps that are fused there, float32 and series."""
+        return self.fuses or self.single or self.method.has_derivatives
 
     @property
     def slot_shape(self) -> Shape:
@@ -199,7 +215,7 @@ class Outcome(NamedTuple):
 def model(plan: Plan) -> _core.ModelSpec:
     """The model of a plan, as the core takes it."""
     series = plan.method.has_derivatives
-    parameters = plan.system.parameters(plan.batch, series=series, single=plan.single)
+    parameters = plan.stepped.parameters(plan.batch, series=series, single=plan.single)
     own = isinstance(plan.t0, np.ndarray) or plan.lengths is not None
     if own and plan.system.has_time and not plan.single:
         parameters.append((BEGINS, rows(np.asarray(plan.t0, np.float64), plan.batch, 0)))
@@ -214,8 +230,8 @@ def model(plan: Plan) -> _core.ModelSpec:
     if plan.watched is not None:
         parameters.append(("watched()", plan.watched.quantities))
     options: Any = {}
-    if plan.record or plan.fused:
-        options = {"record": list(plan.record), "fused": plan.fused}
+    if plan.record or plan.fuses:
+        options = {"record": list(plan.record), "fused": plan.fuses}
     if plan.order or plan.backward or plan.acceptance != Acceptance():
         options |= {"order": plan.order, "acceptance": tuple(plan.acceptance), "backward": plan.backward}
     if plan.single:

@@ -30,7 +30,7 @@ def lines_beside(plan: Plan, choice: int, record: Sequence[str]) -> tuple[Sectio
 def _lines(plan: Plan, when: str, traced: Callable[[Tracer], list[Any]]) -> Section:
     """The section of a computation that is not split."""
     tape = _core.Tape(single=plan.single)
-    tracer = Tracer(plan.system, tape)
+    tracer = Tracer(plan.stepped, tape)
     symbols = traced(tracer)
     numbers, tables = parameters(plan._replace(form="direct"))
     system, carry = plan.system, plan.method.carry or "v"
@@ -46,7 +46,7 @@ def _lines(plan: Plan, when: str, traced: Callable[[Tracer], list[Any]]) -> Sect
         results = [indexed(makes, index) for index in np.ndindex(system.v_shape if is_end else system.quantities[makes])]
         wanted = symbols[: len(results)]
     # Recorded quantities are computed without fused multiply-adds.
-    on, wanted = tape.fused(wanted) if plan.fused and is_end else (tape, wanted)
+    on, wanted = tape.fused(wanted) if plan.fuses and is_end else (tape, wanted)
     params = [tape.param(i) for i in range(len(numbers))]
 
     def leaf(name: str, i: int) -> Leaf:

@@ -221,10 +221,10 @@ class Writer:
 def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Section, ...]:
     """The sections of a step that is one tape, split as in the core."""
     tape = _core.Tape(single=plan.single)
-    tracer = Named(plan.system, tape)
+    tracer = Named(plan.stepped, tape)
     roots = traced(tracer, plan, attempts)
     names, notes = tracer.names, dict[int, str]()
-    if plan.fused:
+    if plan.fuses:
         tape, names, notes = increments_last(tracer, roots, plan.single)
     numbers, tables = parameters(plan)
     of_state, next_state = states(plan, attempts), states(plan, attempts, "'")

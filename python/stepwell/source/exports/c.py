@@ -102,6 +102,7 @@ HELPERS = {
     "or_bits": _on_bits("or_bits", TWO, "a | b"),
     "xor_bits": _on_bits("xor_bits", TWO, "a ^ b"),
     "add_bits": _on_bits("add_bits", TWO, "a + b"),
+    "sub_bits": _on_bits("sub_bits", TWO, "a - b"),
     "shift_up": _on_bits("shift_up", SHIFT, "a << n"),
     "shift_down": _on_bits("shift_down", SHIFT, "a >> n"),
 }

@@ -73,6 +73,7 @@ HELPERS = {
     "or_bits": _on_bits("or_bits", "a, b", "a | b"),
     "xor_bits": _on_bits("xor_bits", "a, b", "a ^ b"),
     "add_bits": _on_bits("add_bits", "a, b", f"(a + b) & {ALL_BITS}"),
+    "sub_bits": _on_bits("sub_bits", "a, b", f"(a - b) & {ALL_BITS}"),
     "shift_up": _on_bits("shift_up", "a, n", f"(a << n) & {ALL_BITS}"),
     "shift_down": _on_bits("shift_down", "a, n", "a >> n"),
 }

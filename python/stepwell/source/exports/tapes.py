@@ -176,7 +176,7 @@ class Traced:
         self.count = sum(bool(of) for _, of, _ in self.operations.all)
         if self.count > MAX_IN_LOOPS:
             raise too_long(plan, str(self.count))
-        if not plan.fused:  # with fused multiply-adds, products of a function may be fused with sums around it
+        if not plan.fuses:  # with fused multiply-adds, products of a function may be fused with sums around it
             named(self.operations.all, plan.single)
 
         def own(values: Any, before: int = 0) -> Any:
@@ -198,7 +198,7 @@ class Traced:
 
     def _part(self, which: str) -> tuple[Part, Named]:
         plan, tape = self.plan, _core.Tape(single=self.plan.single)
-        tracer = Named(plan.system, tape, plan.force)
+        tracer = Named(plan.stepped, tape, plan.force)
         method, v_shape, y_shape = plan.method, plan.system.v_shape, plan.system.y_shape
         if which == "step":
             symbols = tracer.step(method, plan.choice)
@@ -206,9 +206,9 @@ class Traced:
             state = prod(v_shape) + prod(y_shape)
             made = slice(state, state + self.kept) if self.kept else slice(prod(v_shape))
             symbols = tracer.slot(method, which, plan.choice)[made]
-        operations, roots = _fused(tape, symbols) if plan.fused else tape.operations(symbols)
+        operations, roots = _fused(tape, symbols) if plan.fuses else tape.operations(symbols)
         names = tracer.names
-        if plan.fused:
+        if plan.fuses:
             tape, names, _ = increments_last(tracer, symbols, plan.single)
         slot = method.carry or "v"
         before, after = {"step": (slot, slot), "start": ("v", slot), "finish": (slot, "v")}[which]

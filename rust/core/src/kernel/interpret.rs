@@ -241,6 +241,7 @@ fn apply<T: Real>(op: Op, scratch: &mut [T], to: usize, [a, b, c]: [usize; 3], l
         Op::Or(..) => Op::Or(ANY, ANY),
         Op::Xor(..) => Op::Xor(ANY, ANY),
         Op::AddBits(..) => Op::AddBits(ANY, ANY),
+        Op::SubBits(..) => Op::SubBits(ANY, ANY),
         Op::ShiftUp(_, n) if n < bits => Op::ShiftUp(ANY, n),
         Op::ShiftDown(_, n) if n < bits => Op::ShiftDown(ANY, n),
         Op::Copy(_) => Op::Copy(ANY),

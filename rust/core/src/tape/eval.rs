@@ -35,6 +35,7 @@ macro_rules! meaning {
                 Or(..) => a | b,
                 Xor(..) => a ^ b,
                 AddBits(..) => a.wrapping_add(b),
+                SubBits(..) => a.wrapping_sub(b),
                 ShiftUp(_, n) => a.checked_shl(n).unwrap_or(0),
                 ShiftDown(_, n) => a.checked_shr(n).unwrap_or(0),
                 Copy(_) => a,

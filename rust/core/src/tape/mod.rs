@@ -193,6 +193,7 @@ impl Tape {
                 Neg(x) => x,
                 _ => self.keep(op),
             },
+            MulAdd(a, b, c) if self.bits(c) == minus_zero => self.shorten(Mul(a, b)),
             Add(a, b) => {
                 // x + −0 is x, and so is x + 0 unless x is −0.
                 for (x, y) in [(a, b), (b, a)] {

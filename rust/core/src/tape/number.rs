@@ -25,6 +25,12 @@ impl Number for Symbol {
     fn sqrt(self) -> Symbol {
         Symbol::new(Op::Sqrt(self.0))
     }
+    fn mul_add(self, y: Symbol, z: Symbol) -> Symbol {
+        Symbol::new(Op::MulAdd(self.0, y.0, z.0))
+    }
+    fn mul_sub_from(self, y: Symbol, z: Symbol) -> Symbol {
+        Symbol::new(Op::SubMul(self.0, y.0, z.0))
+    }
     fn floor(self) -> Symbol {
         Symbol::new(Op::Floor(self.0))
     }
@@ -51,6 +57,9 @@ impl Number for Symbol {
     }
     fn add_bits(self, whole: u64) -> Symbol {
         Symbol::new(Op::AddBits(self.0, bits(whole)))
+    }
+    fn sub_bits_from(self, whole: u64) -> Symbol {
+        Symbol::new(Op::SubBits(bits(whole), self.0))
     }
     fn shift_up(self, places: u32) -> Symbol {
         Symbol::new(Op::ShiftUp(self.0, places))

@@ -151,6 +151,8 @@ operations! {
     Xor(a: Id, b: Id), [a, b], 0u32, "exclusive or", "%{a} xor %{b}", bits, commutes;
     /// The sum of both as whole numbers of as many bits, without a carry out.
     AddBits(a: Id, b: Id), [a, b], 0u32, "add bits", "%{a} plus %{b}", bits, commutes;
+    /// The first as a whole number less the second, without a borrow.
+    SubBits(a: Id, b: Id), [a, b], 0u32, "subtract bits", "%{a} minus %{b}", bits;
     /// Bits moved up by so many places, zeros after them.
     ShiftUp(a: Id, n: u32), [a], n, "shift up", "%{a} << {n}", bits;
     /// Bits moved down by so many places, zeros before them.
@@ -202,7 +204,7 @@ impl Op {
     pub(super) fn rounds(self) -> bool {
         use Op::*;
         let is_mask = matches!(self, Less(..) | LessEqual(..) | Equal(..));
-        let of_bits = matches!(self, And(..) | Or(..) | Xor(..) | AddBits(..) | ShiftUp(..) | ShiftDown(..));
+        let of_bits = matches!(self, And(..) | Or(..) | Xor(..) | AddBits(..) | SubBits(..) | ShiftUp(..) | ShiftDown(..));
         !(self.is_leaf() || is_mask || of_bits || matches!(self, Neg(_) | Copy(_) | Select(..) | Sample(..) | Gather(_)))
     }
 

@@ -74,6 +74,7 @@ pub const INSERT_WHERE: Form = bitwise(0x6EA0_1C00);
 /// Overwrites by the first where the second is not set (BIF).
 pub const INSERT_WHERE_NOT: Form = bitwise(0x6EE0_1C00);
 pub const ADD_BITS: Form = whole(0x4EE0_8400);
+pub const SUB_BITS: Form = whole(0x6EE0_8400);
 /// Adds first · second to what is overwritten, rounded once. Of one number that is [`Code::fused`].
 pub const ADD_PRODUCT: Words = sized(0x4E60_CC00);
 /// Subtracts it.

@@ -76,6 +76,7 @@ impl InstructionSet for Code {
             Op::Or(..) => Instruction::Two(n::OR),
             Op::Xor(..) => Instruction::Two(n::XOR),
             Op::AddBits(..) => Instruction::Two(n::ADD_BITS),
+            Op::SubBits(..) => Instruction::Two(n::SUB_BITS),
             Op::Sqrt(_) => Instruction::One(n::SQRT),
             Op::Floor(_) => Instruction::One(n::FLOOR),
             Op::ShiftUp(_, places) => Instruction::One(n::shift_up(bits, places)),

@@ -110,6 +110,7 @@ pub(crate) const AND_NOT: Form = plain(0x55);
 pub(crate) const OR: Form = plain(0x56);
 pub(crate) const XOR: Form = plain(0x57);
 pub(crate) const ADD_BITS: Form = sized(1, P66, 0xD4, 0xFE);
+pub(crate) const SUB_BITS: Form = sized(1, P66, 0xFB, 0xFA);
 /// Shifts by the byte behind; the place of the result in the operands says which way, [`UP`] or [`DOWN`].
 pub(crate) const SHIFT: Form = sized(1, P66, 0x73, 0x72);
 pub(crate) const UP: u8 = 6;

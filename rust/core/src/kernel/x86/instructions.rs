@@ -109,6 +109,7 @@ impl InstructionSet for Code {
             Op::Or(..) => Instruction::Two(x::OR, true),
             Op::Xor(..) => Instruction::Two(x::XOR, true),
             Op::AddBits(..) => Instruction::Two(x::ADD_BITS, true),
+            Op::SubBits(..) => Instruction::Two(x::SUB_BITS, false),
             Op::Sqrt(_) => Instruction::One(x::SQRT, None),
             Op::Floor(_) => Instruction::One(x::ROUND, Some(FLOOR)),
             Op::ShiftUp(_, n) => Instruction::Shift(x::UP, n as u8),

@@ -7,7 +7,7 @@ mod share;
 use std::sync::atomic::Ordering::Relaxed;
 
 use stepwell_base::{
-    bodies::{Law, partners},
+    bodies::{Law, Rounding, partners},
     forces::{Distances, Kernel, Meeting, Round, Sums},
     massless::Pulled,
 };
@@ -78,7 +78,7 @@ pub(crate) fn make(asked: &RatesRequest) -> Box<dyn Rates> {
     let shares = if threads > 1 { slabs.iter().map(|_| Share::new(n, dim)).collect() } else { Vec::new() };
     Box::new(Bodies {
         n,
-        kernel: Kernel { law, dim, level: machine.level },
+        kernel: Kernel { law, rounding: nbody::rounding(asked.signature), dim, level: machine.level },
         h: asked.h,
         mass: vec![0.0; all],
         own: vec![0.0; n],
@@ -102,32 +102,32 @@ pub(crate) fn make(asked: &RatesRequest) -> Box<dyn Rates> {
 }
 
 impl Bodies {
-    fn meet(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
+    fn meet(&mut self, kernel: Kernel, energy: bool, y: &[f64], out: &mut [f64]) {
         let out = &mut out[..y.len()];
         if self.order.massless().is_empty() {
-            return self.among(energy, y, out);
+            return self.among(kernel, energy, y, out);
         }
-        let (Kernel { law, dim, level }, mut order) = (self.kernel, std::mem::take(&mut self.order));
+        let (dim, mut order) = (kernel.dim, std::mem::take(&mut self.order));
         order.take_places(dim, y);
         let (places, pushes) = order.places_and_pushes();
         if self.n > 0 {
-            self.among(energy, places, pushes);
+            self.among(kernel, energy, places, pushes);
         }
         let (strengths, soft, stop, places) = (&self.strength[..], self.round.soft, &*self.stop, order.places());
         share_massless(self.threads, order.massless(), dim, out, |bodies, out, first| {
-            Pulled { bodies, y, places, strengths, soft, stop, out, first }.by(law, dim, level);
+            Pulled { bodies, y, places, strengths, soft, stop, out, first }.by(kernel);
         });
         order.spread_pushes(dim, out);
         self.order = order;
     }
 
     /// The forces of bodies with mass on each other.
-    fn among(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
-        match self.kernel.dim {
+    fn among(&mut self, kernel: Kernel, energy: bool, y: &[f64], out: &mut [f64]) {
+        match kernel.dim {
             2 => self.round.fill::<2>(y),
             _ => self.round.fill::<3>(y),
         }
-        let (n, kernel, round, stop, potential) = (self.n, self.kernel, &self.round, &*self.stop, &mut self.potential[..]);
+        let (n, round, stop, potential) = (self.n, &self.round, &*self.stop, &mut self.potential[..]);
         if let [sums] = &mut self.sums[..] {
             for (i, groups) in self.slabs.iter().enumerate() {
                 kernel.meet(energy, Meeting { n, groups, round, sums, more: i > 0, stop, potential, out });
@@ -159,7 +159,7 @@ impl Bodies {
             return;
         }
         self.has_potentials &= !energy;
-        self.meet(energy, y, out);
+        self.meet(self.kernel, energy, y, out);
         if self.long && !self.stop.load(Relaxed) {
             self.dv.clear();
             self.dv.extend_from_slice(&out[..y.len()]);
@@ -214,11 +214,11 @@ impl Rates for Bodies {
     }
 
     fn cache_forces(&mut self, y: &[f64]) {
-        if !self.has(true, y) {
+        if self.kernel.rounding == Rounding::Twice && !self.has(true, y) {
             let mut dv = std::mem::take(&mut self.dv);
             dv.resize(y.len(), 0.0);
             (self.has_forces, self.has_potentials) = (false, false);
-            self.meet(true, y, &mut dv);
+            self.meet(self.kernel, true, y, &mut dv);
             self.dv = dv;
             if !self.stop.load(Relaxed) {
                 self.keep(true, y);
@@ -241,6 +241,11 @@ impl Rates for Bodies {
     }
 
     fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
+        if self.kernel.rounding == Rounding::Once && self.record.contains(&Quantity::Energy) {
+            // What is recorded is not fused, so the pass over the pairs is one of its own.
+            self.has_potentials = false;
+            self.meet(Kernel { rounding: Rounding::Twice, ..self.kernel }, true, y, &mut vec![0.0; y.len()]);
+        }
         let (level, h, what, mass, half, potential) =
             (self.kernel.level, self.h, &self.record[..], &self.own[..], &self.half[..], &self.potential[..]);
         let [v, y] = self.order.all_of(self.kernel.dim, [v, y]);

@@ -11,10 +11,14 @@
 //! where bodies are taken side by side. The order of these sums depends on the number of bodies only, not on the code that
 //! computes them.
 //!
+//! Fused, every product of the forces that is added is rounded with its sum only: `r²` is a sum from ε² on, and a pull an
+//! addend of what a body gets. Newton's f is then made without a root and a quotient (`Law::pull`). What is recorded is rounded as
+//! without; what a method makes of the forces, too, unless that is asked for as of any tape.
+//!
 //! Bodies without mass, if it is known which these are, attract no other: the rest move as if these were not there, and each of
 //! these as if it were alone with the rest, which pull it one after the other. No sum over bodies has a term of theirs.
 
-use stepwell_base::bodies::{LANES, Law, meeting, partners};
+use stepwell_base::bodies::{LANES, Law, Rounding, meeting, partners};
 
 use crate::{
     error::Error,
@@ -27,7 +31,7 @@ use crate::{
 };
 
 /// What the core knows of it. Given: the word `force`; the whole number `dim`; `masses` and `strength`, G·m, of the bodies;
-/// `softening`, ε; the list `massless` of bodies without mass, in ascending order, if there are any.
+/// `softening`, ε; the whole number `fused`, 1 if products are; the list `massless` of bodies without mass, in ascending order, if there are any.
 pub const KIND: Kind = Kind { name: "nbody", shape, velocity_term: |_| None, quantities, controllable: true, operations, make };
 
 fn shape(signature: &Signature) -> Result<Shape, Error> {
@@ -77,6 +81,11 @@ pub(crate) fn law(signature: &Signature) -> Option<Law> {
     }
 }
 
+/// How often products of forces are rounded, but for those of recorded quantities.
+pub(crate) fn rounding(signature: &Signature) -> Rounding {
+    Rounding::of(signature.whole("fused") == 1)
+}
+
 /// Whether bodies of that signature have Kepler motions, which [`System::drift`] makes.
 pub(crate) fn splits(signature: &Signature) -> bool {
     signature.system == KIND.name && law(signature) == Some(Law::Newton) && signature.count("masses") > 1
@@ -103,6 +112,8 @@ pub(crate) fn square<N: Number>(d: &[N]) -> N {
 struct Bodies<N: Number> {
     h: N,
     law: Law,
+    /// How often products of forces are rounded.
+    rounding: Rounding,
     dim: usize,
     masses: Vec<N>,
     /// G·m
@@ -123,16 +134,16 @@ pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let strength = alone.iter().map(|strength| h * *strength).collect();
     let half = masses.iter().map(|mass| (N::of(0.5) * h) * *mass).collect();
     let law = law(p.signature).unwrap_or(Law::Logarithmic); // `shape` has seen that there is one
-    let massless = p.signature.list("massless").iter().map(|i| *i as usize).collect();
+    let (rounding, massless) = (rounding(p.signature), p.signature.list("massless").iter().map(|i| *i as usize).collect());
     let (dim, soft, massive) = (p.signature.whole("dim"), softening * softening, massive(p.signature));
-    Box::new(Bodies { h, law, dim, masses, alone, strength, soft, half, massive, massless })
+    Box::new(Bodies { h, law, rounding, dim, masses, alone, strength, soft, half, massive, massless })
 }
 
 impl<N: Number> Bodies<N> {
     /// h·v̇ from every pair once, and with `wells` h·G·Σⱼ mⱼ·φ for each body with mass, else zeros.
-    fn meet(&self, y: &Block<N>, with_wells: bool) -> (Block<N>, Vec<N>) {
+    fn meet(&self, rounding: Rounding, y: &Block<N>, with_wells: bool) -> (Block<N>, Vec<N>) {
         let dim = self.dim;
-        let (among, potential) = self.among(y, with_wells);
+        let (among, potential) = self.among(rounding, y, with_wells);
         let mut dv = Block::from_element(dim * self.masses.len(), N::of(-0.0));
         for (pushes, i) in among.chunks(dim).zip(&self.massive) {
             pushes.iter().enumerate().for_each(|(c, push)| dv[dim * i + c] = *push);
@@ -140,15 +151,15 @@ impl<N: Number> Bodies<N> {
         for &i in &self.massless {
             for &j in &self.massive {
                 let d: Vec<N> = (0..dim).map(|c| y[dim * j + c] - y[dim * i + c]).collect();
-                let to_i = self.law.pull(square(&d) + self.soft) * self.strength[j];
-                d.into_iter().enumerate().for_each(|(c, d)| dv[dim * i + c] += d * to_i);
+                let to_i = self.law.pull(rounding, rounding.softened(&d, self.soft)) * self.strength[j];
+                d.into_iter().enumerate().for_each(|(c, d)| dv[dim * i + c] = rounding.plus(dv[dim * i + c], d, to_i));
             }
         }
         (dv, potential)
     }
 
     /// The same of bodies with mass among each other.
-    fn among(&self, y: &Block<N>, with_wells: bool) -> (Vec<N>, Vec<N>) {
+    fn among(&self, rounding: Rounding, y: &Block<N>, with_wells: bool) -> (Vec<N>, Vec<N>) {
         let (bodies, n, dim, zero) = (&self.massive, self.massive.len(), self.dim, N::of(0.0));
         // Sums of pushes start from −0, for x + −0 is x, also where x is a zero: the first term costs no operation.
         let none = N::of(-0.0);
@@ -162,12 +173,12 @@ impl<N: Number> Bodies<N> {
                     for &k in group.iter().filter(|k| i < meeting(n, **k)) {
                         let (one, other) = (bodies[i], bodies[(i + k) % n]);
                         let d: Vec<N> = (0..dim).map(|c| y[dim * other + c] - y[dim * one + c]).collect();
-                        let r2 = square(&d) + self.soft;
-                        let pull = self.law.pull(r2);
+                        let r2 = rounding.softened(&d, self.soft);
+                        let pull = self.law.pull(rounding, r2);
                         let (to_i, to_j) = (pull * self.strength[other], pull * self.strength[one]);
                         for (c, d) in d.into_iter().enumerate() {
-                            after[dim * i + c] += d * to_i;
-                            before[dim * (i + k) + c] += d * to_j;
+                            after[dim * i + c] = rounding.plus(after[dim * i + c], d, to_i);
+                            before[dim * (i + k) + c] = rounding.plus(before[dim * (i + k) + c], d, to_j);
                         }
                         if with_wells {
                             wells[i] += self.law.potential(r2, pull, self.strength[other]);
@@ -229,6 +240,14 @@ impl<N: Number> Bodies<N> {
         all
     }
 
+    fn energies_by(&self, rounding: Rounding, v: &Block<N>, y: &Block<N>) -> Energies<N> {
+        let (dv, potential) = self.meet(rounding, y, true);
+        let halves = self.massive.iter().map(|i| self.half[*i]);
+        let kinetic = total(halves.zip(self.each(v, y)).map(|(half, (_, _, v))| half * square(v)));
+        let whole = kinetic + total(self.each(v, y).zip(potential).map(|((mass, ..), potential)| mass * potential));
+        Energies { dv, kinetic, whole }
+    }
+
     /// What is said of each body with mass in turn: its mass, its place and its velocity.
     fn each<'a>(&'a self, v: &'a Block<N>, y: &'a Block<N>) -> impl Iterator<Item = (N, &'a [N], &'a [N])> {
         let row = |block: &'a Block<N>, i: usize| &block.as_slice()[self.dim * i..][..self.dim];
@@ -238,7 +257,7 @@ impl<N: Number> Bodies<N> {
 
 impl<N: Number> System<N> for Bodies<N> {
     fn dv(&self, _t: N, _v: &Block<N>, y: &Block<N>) -> Block<N> {
-        self.meet(y, false).0
+        self.meet(self.rounding, y, false).0
     }
 
     fn dy(&self, _t: N, v: &Block<N>, _y: &Block<N>) -> Block<N> {
@@ -276,11 +295,7 @@ impl<N: Number> System<N> for Bodies<N> {
     }
 
     fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
-        let (dv, potential) = self.meet(y, true);
-        let halves = self.massive.iter().map(|i| self.half[*i]);
-        let kinetic = total(halves.zip(self.each(v, y)).map(|(half, (_, _, v))| half * square(v)));
-        let whole = kinetic + total(self.each(v, y).zip(potential).map(|((mass, ..), potential)| mass * potential));
-        Some(Energies { dv, kinetic, whole })
+        Some(self.energies_by(self.rounding, v, y))
     }
 
     /// m·v in the velocities and −m·a in the coordinates.
@@ -294,7 +309,7 @@ impl<N: Number> System<N> for Bodies<N> {
 
     fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
         match quantity {
-            "energy" => Some(vec![self.energies(v, y)?.whole / self.h]),
+            "energy" => Some(vec![self.energies_by(Rounding::Twice, v, y).whole / self.h]),
             "momentum" => Some((0..self.dim).map(|c| total(self.each(v, y).map(|(mass, _, v)| mass * v[c]))).collect()),
             "angular_momentum" => {
                 let axes: &[(usize, usize)] = if self.dim == 2 { &[(0, 1)] } else { &[(1, 2), (2, 0), (0, 1)] };

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Array
+from ..base.arrays import Array
 
 #: Half of a number's bits and one more: what splits it into two halves (Veltkamp).
 SPLIT = 2.0**27 + 1.0
