@@ -209,7 +209,7 @@ fn add(sums: &mut Chunk, mut more: Chunk, met: Option<&[u64; SIDE]>) {
 #[inline(always)]
 fn add_products(sums: &mut Chunk, a: &Chunk, b: &Chunk, met: Option<&[u64; SIDE]>) {
     for l in 0..SIDE {
-        let sum = a[l].mul_add(b[l], sums[l]);
+        let sum = Rounding::Once.plus(sums[l], a[l], b[l]);
         sums[l] = met.map_or(sum, |met| f64::from_bits(sum.to_bits() & met[l] | sums[l].to_bits() & !met[l]));
     }
 }
