@@ -29,6 +29,15 @@ FUNCTIONS: dict[str, Any] = {
     "exp2": lambda y: np.exp2(y),
     "both": lambda y: np.exp(y) * np.expm1(-y),
     "one of two": lambda y: np.where(y < 0.0, np.exp(y), -np.exp(y)),
+    # Fused, the last product and the sum are one operation.
+    "one more": lambda y: 1.0 + np.exp(y),
+    "one less": lambda y: 1.0 - np.exp(y),
+    "less one": lambda y: np.exp(y) - 1.0,
+    "logistic": lambda y: 1.0 / (1.0 + np.exp(-y)),
+    "next to what is subnormal": lambda y: np.exp(y) + 1e-320,
+    "far from it": lambda y: 1e-270 - np.exp(y),
+    "next to what is infinite": lambda y: np.exp(y) - 1.7e308,
+    "beside zero": lambda y: np.exp(y) + 0.0 * y,
     "power": lambda y: 1.5**y,
     "tanh": lambda y: np.tanh(y) + np.exp(-y),
 }
