@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stepwell import _core
 from stepwell.reference.bits import DOUBLE, SINGLE
-from stepwell.reference.tape.fma import fma
+from stepwell.reference.fma import fma
 from stepwell.reference.tape.fused import fused
 from stepwell.reference.tape.lines import Operation, listed, needed
 from stepwell.reference.tape.quotients import LARGEST, inverse

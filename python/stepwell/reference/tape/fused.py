@@ -9,19 +9,21 @@ from .forms import in_quick_forms
 from .increments import increments_last
 from .lines import Operation, of_any, ranks
 from .quotients import without_quotients
+from .terms import terms_apart
 
 
 def fused(tape: Sequence[Operation], roots: Sequence[int], *, single: bool = False) -> tuple[list[Operation], list[int]]:
     """The same tape with fused multiply-adds, and the lines of the roots on it.
 
     ``roots`` are the lines of the next state, and all others are needed for them. First functions get their quick forms,
-    increments are multiplied last, and quotients by numbers become products. Then a product is fused into the sum or the
-    difference of which it is a term if nothing else reads it and it depends on the state. Of two such products the one of the
-    higher rank is fused.
+    increments are multiplied last, quotients by numbers become products, and sums of two products are taken apart. Then a product
+    is fused into the sum or the difference of which it is a term if nothing else reads it and it depends on the state. Of two
+    such products the one of the higher rank is fused.
     """
     tape, roots = in_quick_forms(tape, roots)
     tape, roots = increments_last(tape, roots, single=single)
     tape, roots = without_quotients(tape, roots, single=single)
+    tape, roots = terms_apart(tape, roots)
     rank = ranks(tape)
     reads = [0] * len(tape)
     for line in [*roots, *(line for operation in tape for line in operation.of)]:

@@ -28,24 +28,15 @@ pub(super) fn in_quick_forms(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
             Some((x, ops)) => {
                 let mut of = vec![place[x as usize]];
                 for op in &ops[1..] {
-                    of.push(put(&mut made, op.with(|id| of[id as usize])));
+                    of.push(made.put(op.with(|id| of[id as usize])));
                 }
                 of[of.len() - 1]
             }
-            None => put(&mut made, op.with(|id| place[id as usize])),
+            None => made.put(op.with(|id| place[id as usize])),
         };
     }
     let roots = roots.iter().map(|root| place[*root as usize]).collect();
     (made, roots)
-}
-
-/// Writes an operation. Nothing is folded or left out: the reference does the same.
-fn put(made: &mut Tape, op: Op) -> Id {
-    made.keep(match op {
-        Op::Add(a, b) => Op::Add(a.min(b), a.max(b)),
-        Op::Mul(a, b) => Op::Mul(a.min(b), a.max(b)),
-        _ => op,
-    })
 }
 
 /// The argument and the quick form, if a value is a function that is replaced.

@@ -1,7 +1,8 @@
 //! The second exact arithmetic: sums with a product in them become fused multiply-adds, which round once instead of twice.
 //!
-//! First functions get their quick forms (`forms.rs`), increments are multiplied last (`increments.rs`), and quotients by numbers
-//! become products (`quotients.rs`). Then products are fused. The choice is made on the tape and not by a compiler, so it is the same on every machine. A product is
+//! First functions get their quick forms (`forms.rs`), increments are multiplied last (`increments.rs`), quotients by numbers
+//! become products (`quotients.rs`), and sums of two products are taken apart (`terms.rs`). Then products are fused. The choice is
+//! made on the tape and not by a compiler, so it is the same on every machine. A product is
 //! fused into the sum or the difference of which it is a term if
 //!
 //! - nothing else reads it, so that it vanishes, and
@@ -12,7 +13,10 @@
 //! Of two such products the one of the higher rank (`uses.rs`) is fused. The rank of a value depends on the graph of operations
 //! alone, not on the order in which the tape was written: both languages fuse the same products.
 
-use super::{Id, Op, Tape, forms::in_quick_forms, increments::increments_last, quotients::without_quotients, uses::UseCounts};
+use super::{
+    Id, Op, Tape, forms::in_quick_forms, increments::increments_last, quotients::without_quotients, terms::terms_apart,
+    uses::UseCounts,
+};
 
 /// The same tape for these values, with fused multiply-adds, and the values on it.
 #[must_use]
@@ -20,6 +24,7 @@ pub fn fuse(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let (tape, roots) = in_quick_forms(tape, roots);
     let (tape, roots) = increments_last(&tape, &roots);
     let (tape, roots) = without_quotients(&tape, &roots);
+    let (tape, roots) = terms_apart(&tape, &roots);
     let UseCounts { needed, reads, ranks, .. } = UseCounts::new(&tape, &roots);
     let ops = tape.ops();
     let is_higher = |a: Id, b: Id| ranks[a as usize] > ranks[b as usize];

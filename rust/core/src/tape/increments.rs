@@ -60,7 +60,7 @@ fn negated_sums(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
             && let Op::Neg(x) = tape.op(*a)
         {
             let (x, y) = (place[x as usize], place[*b as usize]);
-            let sum = made.keep(Op::Add(x.min(y), x.max(y)));
+            let sum = made.put(Op::Add(x, y));
             made.keep(Op::Neg(sum))
         } else {
             made.keep(op.with(|id| place[id as usize]))
@@ -182,12 +182,7 @@ impl Rewriting<'_> {
         Value::Plain(self.put(op))
     }
 
-    /// Writes an operation of the new tape. Nothing is folded or left out: the reference does the same.
     fn put(&mut self, op: Op) -> Id {
-        self.made.keep(match op {
-            Op::Add(a, b) => Op::Add(a.min(b), a.max(b)),
-            Op::Mul(a, b) => Op::Mul(a.min(b), a.max(b)),
-            _ => op,
-        })
+        self.made.put(op)
     }
 }

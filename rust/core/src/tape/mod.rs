@@ -23,6 +23,7 @@ pub mod reserved;
 pub(crate) mod series;
 pub mod split;
 mod symbol;
+mod terms;
 mod uses;
 
 use std::collections::BTreeSet;
@@ -154,6 +155,16 @@ impl Tape {
             Op::Add(a, b) if self.bits(b) == Some(0) => Some(a),
             _ => None,
         }
+    }
+
+    /// Writes an operation, with the operands of a sum or a product in order. Nothing is folded or left out: the reference does the
+    /// same.
+    fn put(&mut self, op: Op) -> Id {
+        self.keep(match op {
+            Op::Add(a, b) => Op::Add(a.min(b), a.max(b)),
+            Op::Mul(a, b) => Op::Mul(a.min(b), a.max(b)),
+            _ => op,
+        })
     }
 
     fn keep(&mut self, op: Op) -> Id {

@@ -22,19 +22,15 @@ pub(super) fn without_quotients(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
                 let x = place[x as usize];
                 if lower == 0.0 {
                     let upper = made.constant(upper);
-                    made.keep(Op::Mul(x.min(upper), x.max(upper)))
+                    made.put(Op::Mul(x, upper))
                 } else {
                     let lower = made.constant(lower);
-                    let rest = made.keep(Op::Mul(x.min(lower), x.max(lower)));
+                    let rest = made.put(Op::Mul(x, lower));
                     let upper = made.constant(upper);
                     made.keep(Op::MulAdd(x.min(upper), x.max(upper), rest))
                 }
             }
-            None => made.keep(match op.with(|id| place[id as usize]) {
-                Op::Add(a, b) => Op::Add(a.min(b), a.max(b)),
-                Op::Mul(a, b) => Op::Mul(a.min(b), a.max(b)),
-                other => other,
-            }),
+            None => made.put(op.with(|id| place[id as usize])),
         };
     }
     let roots = roots.iter().map(|root| place[*root as usize]).collect();
