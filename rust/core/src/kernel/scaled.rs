@@ -7,7 +7,11 @@
 //! A fused step has c ± (…)·2 in one operation where c is a number, as in 1 + eˣ. The product with 2 or 2⁻¹⁰⁰ is exact there but
 //! where it is subnormal or infinite, and beside a c that is far from both that makes no difference.
 
-use crate::tape::{Id, Op, real::Precision, split::Body};
+use crate::tape::{
+    Id, Op,
+    real::{Precision, power_of_two},
+    split::Body,
+};
 
 /// Such products.
 pub(super) struct Scaled {
@@ -73,7 +77,7 @@ impl Scaled {
 }
 
 fn is_far(body: &Body, c: Id) -> bool {
-    let far = 2.0f64.powi(FAR);
+    let far = power_of_two(FAR);
     match body.ops[c as usize] {
         Op::Const(bits) => (1.0 / far..=far).contains(&f64::from_bits(bits).abs()),
         _ => false,
@@ -92,7 +96,7 @@ fn product(body: &Body, inner: Id, factor: Id) -> Option<Product> {
     let op = |id: Id| body.ops[id as usize];
     let is = |id: Id, x: f64| op(id) == Op::Const(x.to_bits());
     let (Op::Mul(a, b), Op::Select(low, small, two)) = (op(inner), op(factor)) else { return None };
-    if !(is(small, 2.0f64.powi(-RAISED)) && is(two, 2.0)) {
+    if !(is(small, power_of_two(-RAISED)) && is(two, 2.0)) {
         return None;
     }
     [(a, b), (b, a)].into_iter().find_map(|(x, shifted)| {

@@ -8,7 +8,7 @@
 //! (N. Brisebarre, J.-M. Muller, S. K. Raina, Accelerating correctly rounded floating-point division when the divisor is known
 //! in advance, IEEE Trans. Computers 53 (2004) 1069.) `reference/tape/quotients.py` says the same in Python.
 
-use super::{Id, Op, Precision, Tape};
+use super::{Id, Op, Precision, Tape, real::power_of_two};
 
 /// The same tape for these values, with products in place of quotients by numbers of what depends on the state; and the values
 /// on it.
@@ -55,7 +55,7 @@ fn inverse(c: f64, precision: Precision) -> Option<[f64; 2]> {
         Precision::Double => 500,
         Precision::Single => 60,
     };
-    let largest = 2.0f64.powi(largest);
+    let largest = power_of_two(largest);
     if !(c.abs() <= largest && c.abs() >= 1.0 / largest) {
         return None;
     }

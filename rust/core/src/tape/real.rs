@@ -151,5 +151,10 @@ macro_rules! real {
 }
 // The difference of two coordinates divided by the step overflows only beyond 2¹⁰²³ (2¹²⁷) times the step. To miss that between
 // two checks, it would have to grow by a factor of 2⁶⁰ and shrink again.
-real!(f64, Double, apply, f64::from_bits((1023 + 960) << 52));
+real!(f64, Double, apply, power_of_two(960));
 real!(f32, Single, apply_single, f32::from_bits((127 + 64) << 23));
+
+/// 2ⁿ, where that is a normal number.
+pub(crate) const fn power_of_two(n: i32) -> f64 {
+    f64::from_bits(((1023 + n) as u64) << 52)
+}
