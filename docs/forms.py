@@ -10,7 +10,14 @@ from stepwell.reference.tape.lines import Operation
 
 HEAD = """//! Functions and their quick forms, which `docs/forms.py` prints: see `forms.rs`.
 
-use super::{Op, forms::Form};
+use super::Op;
+
+/// A function as operations, of which the first is its argument and the last its value; and with fused operations.
+#[derive(Debug)]
+pub(super) struct Form {
+    pub plain: &'static [Op],
+    pub quick: &'static [Op],
+}
 
 #[rustfmt::skip]
 pub(super) static FORMS: &[Form] = &["""

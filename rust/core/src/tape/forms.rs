@@ -11,13 +11,6 @@
 
 use super::{Id, Op, Tape, forms_table::FORMS, uses::UseCounts};
 
-/// A function as operations, of which the first is its argument and the last its value; and with fused operations.
-#[derive(Debug)]
-pub(super) struct Form {
-    pub plain: &'static [Op],
-    pub quick: &'static [Op],
-}
-
 /// The same tape for these values with functions in their quick forms, and the values on it.
 pub(super) fn in_quick_forms(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let uses = UseCounts::new(tape, roots);
