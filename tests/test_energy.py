@@ -219,3 +219,21 @@ def test_another_formula_is_noticed(kernel: str, case: str, old: str, new: str, 
 def test_every_kind_with_an_energy_has_a_mutant() -> None:
     kernels = {made(name)[0].kernel for name in ENERGETIC} - {"equations"}
     assert {kernel for kernel, *_ in MUTANTS} == kernels
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("force", ["logarithmic", "newton", "printed"])
+@pytest.mark.parametrize("n", [2, 3, 12, 100])
+@pytest.mark.parametrize("where", ["together", "far", "nowhere"])
+def test_bodies_without_a_distance_have_no_energy(n: int, force: Any, where: str, backend: Any) -> None:
+    """Two in one place, so far away that the square of a distance is infinite, or at no place: no number is recorded."""
+    v, y = np.zeros((n, 2)), np.random.default_rng(n).normal(size=(n, 2))
+    y[1] = {"together": y[0], "far": 1e200, "nowhere": y[1]}[where]
+    steps = 400 if where == "nowhere" else 1
+    if where == "nowhere":
+        v[1] = 1e308
+    bodies = sw.NBody(np.ones(n), force=force)
+    run = sw.integrate(bodies, "euler", v=v, y=y, dt=1.0, steps=steps, every=steps, record="energy", backend=backend)
+    # The printed potential is −1/r, found from 1/r²: that is 0 where r² is infinite, as it should be.
+    vanishes = where == "far" and force == "printed"
+    assert np.isfinite(run.recorded["energy"][-1 if where == "nowhere" else 0]) == vanishes

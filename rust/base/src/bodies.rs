@@ -65,7 +65,8 @@ impl Law {
     #[inline(always)]
     pub fn potential<N: Number>(self, r2: N, pull: N, strength: N) -> N {
         match self {
-            Law::Logarithmic => (N::of(0.5) * log(r2)) * strength,
+            // The logarithm is of normal numbers; what is added is 0 for these, and of others, such as a distance of 0, a NaN.
+            Law::Logarithmic => (N::of(0.5) * log(r2) + (r2 - r2) * pull) * strength,
             Law::Newton => -(r2 * (pull * strength)), // the product is at hand
             Law::Printed => -(pull.sqrt() * strength),
         }

@@ -249,7 +249,8 @@ class NBody(Recorded):
     def phi(self, r2: Array, pull: Array, strength: Array) -> Array:
         """The potential, per mass, that a partner makes: ln r, or −1/r (which ``printed`` has with the wrong force)."""
         if self.force == "logarithmic":
-            return (0.5 * log(r2)) * strength
+            # The logarithm is of normal numbers; what is added is 0 for these, and of others, such as a distance of 0, a NaN.
+            return (0.5 * log(r2) + (r2 - r2) * pull) * strength
         if self.force == "newton":
             return -(r2 * (pull * strength))  # the product is at hand
         return -(np.sqrt(pull) * strength)
