@@ -307,6 +307,31 @@ def test_threads_may_call_it_at_once() -> None:
     assert not wrong
 
 
+def test_threads_may_call_integrate_at_once() -> None:
+    """More runs than are kept, of systems that are made anew."""
+    expected = [
+        whole(sw.Oscillator(1.0 + i), "rk4", v=0.0, y=1.0, dt=0.1, steps=3).y.tobytes() for i in range(2 * module.MOST_RECENT)
+    ]
+    wrong: list[int] = []
+
+    def work() -> None:
+        for _ in range(20):
+            for i, bits in enumerate(expected):
+                run = sw.integrate(sw.Oscillator(1.0 + i), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
+                wrong.extend([i] * (run.y.tobytes() != bits))
+        done.append(True)
+
+    done: list[bool] = []
+    threads = [threading.Thread(target=work) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+    assert len(done) == len(threads)
+    assert len(module._recent) <= module.MOST_RECENT + len(threads)
+
+
 def test_only_what_depends_on_the_start_is_checked_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """A prepared run makes no request, and nor does ``integrate`` from its third call on."""
     system = sw.Oscillator()

@@ -126,7 +126,9 @@ def recent(system: System, method: str | Method, options: Options) -> PreparedRu
             known.is_large = _bytes(system) > MOST_BYTES
             known.run = None if known.is_large else PreparedRun(system, method, options._replace(v=None, y=None))
         return known.run
-    while len(_recent) >= MOST_RECENT:
-        _recent.pop(next(iter(_recent)), None)
+    if len(_recent) >= MOST_RECENT:
+        # A list at once: another thread may change the dictionary between two steps of an iteration.
+        for oldest in list(_recent)[: len(_recent) + 1 - MOST_RECENT]:
+            _recent.pop(oldest, None)
     _recent[key] = _Recent(system, method, kinds)
     return None
