@@ -201,9 +201,12 @@ class NBody(System):
         sizes: dict[str, Any] = {"force": self.force, "dim": self.y_shape[1]}
         if len(self.massless):
             sizes["massless"] = self.massless.astype("<u4").tobytes()
-        if self.fused:
-            sizes["fused"] = 1
         return sizes | {"masses": masses, "strength": self.G * masses, "softening": self.softening}
+
+    def own_parameters(self, batch: Shape) -> dict[str, Any]:
+        """Those of the equations, of all members or some, and whether the forces are fused."""
+        parameters = super().own_parameters(batch)
+        return parameters | {"fused": 1} if self.fused else parameters
 
     def named(self, name: str, index: Shape) -> str:
         """The parameter of G·m is called Gm."""
