@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -20,6 +20,9 @@ from ..runs.findings import Finding, warn_of
 
 #: A state is looked at once it is this many times as long as at the start; from rest, once it is this many units long.
 GROWN = 1e6
+
+#: So many numbers are compared at once.
+AT_ONCE = 4096
 
 #: Lengths between this and its reciprocal have squares with all of their digits.
 SQUARABLE = 1e-140
@@ -239,28 +242,42 @@ def _is_tame(run: Any, start: tuple[Array, Array]) -> bool:
 
     Then all numbers at the end, taken as one vector, are at most ``GROWN`` times as long as the shortest member at the start.
     """
-    least = _shortest(run, start)
-    return least > SQUARABLE and math.sqrt(_square(run.v[-1]) + _square(run.y[-1])) <= GROWN * least
+    after = math.sqrt(_square(run.v[-1]) + _square(run.y[-1]))
+    return any(least > SQUARABLE and after <= GROWN * least for least in _shortest(run, start))
 
 
-def _shortest(run: Any, start: tuple[Array, Array]) -> float:
-    """A lower bound of the lengths of all members at the start; a member at rest counts as one unit long."""
+def _shortest(run: Any, start: tuple[Array, Array]) -> Iterator[float]:
+    """Lower bounds of the lengths of all members at the start, as few as are asked for; one at rest counts as one unit long."""
     if run.status.size == 1:
         squares = _square(start[0]) + _square(start[1])
-        return math.sqrt(squares) if squares > 0.0 or any(block.any() for block in start) else 1.0
+        yield math.sqrt(squares) if squares > 0.0 or any(block.any() for block in start) else 1.0
+        return
     least = 0.0
-    for block, shape in zip(start, (run.system.v_shape, run.system.y_shape), strict=True):
+    for block, shape in ((start[1], run.system.y_shape), (start[0], run.system.v_shape)):
         own = once_of(block)
         if own.size == 1:
-            least = max(least, abs(float(own.item())))  # every member has this number, so NumPy's reductions are left out
-            continue
-        sizes = np.abs(own)
-        sizes = sizes.max(axis=tuple(range(len(shape)))) if shape and block.size else sizes
-        least = max(least, float(sizes.min(initial=np.inf)) if block.size else 0.0)
+            bound = abs(float(own.item()))  # every member has this number, so NumPy's reductions are left out
+        elif not own.size:
+            bound = 0.0
+        elif not shape:
+            bound = _smallest(own)
+        else:
+            bound = float(np.abs(own).max(axis=tuple(range(len(shape)))).min())
+        yield bound
+        least = max(least, bound)
     if least == 0.0:
         before = lengths(run.system, *start)
-        least = float(np.where(before > 0.0, before, 1.0).min(initial=np.inf))
-    return least
+        yield float(np.where(before > 0.0, before, 1.0).min(initial=np.inf))
+
+
+def _smallest(numbers: Array) -> float:
+    """The least size of some numbers; without an array as large as they are, which takes longer than the rest."""
+    low, high = float(numbers.min()), float(numbers.max())
+    if not low <= 0.0 <= high:
+        return min(abs(low), abs(high))
+    flat, room = numbers.reshape(-1), np.empty(AT_ONCE)
+    parts = (flat[first : first + AT_ONCE] for first in range(0, flat.size, AT_ONCE))
+    return min(float(np.abs(part, out=room[: part.size]).min()) for part in parts)
 
 
 def watched(
