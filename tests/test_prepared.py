@@ -332,6 +332,23 @@ def test_threads_may_call_integrate_at_once() -> None:
     assert len(module._recent) <= module.MOST_RECENT + len(threads)
 
 
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("of_start", [np.float32, np.float64])
+def test_starts_of_either_precision_are_taken(of_start: Any, dtype: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the short way, and others are not prepared anew at each call."""
+    system = sw.Oscillator(np.linspace(0.5, 2.0, 5))
+    v, y = np.linspace(0.1, 0.3, 5).astype(of_start), np.linspace(1.0, 0.7, 5).astype(of_start)
+    expected = whole(system, "rk4", v=v, y=y, dtype=dtype, **DT)
+    run = sw.prepare(system, "rk4", v=v, y=y, dtype=dtype, **DT)
+    assert run._short is not None
+    got = run._short.run(v, y)
+    assert got is not None
+    assert_same(got, expected)
+    monkeypatch.setattr("stepwell.runs.prepared._short_run", None)
+    for _ in range(2):
+        assert_same(run(v.tolist(), y.tolist()), whole(system, "rk4", v=v.tolist(), y=y.tolist(), dtype=dtype, **DT))
+
+
 def test_only_what_depends_on_the_start_is_checked_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """A prepared run makes no request, and nor does ``integrate`` from its third call on."""
     system = sw.Oscillator()

@@ -96,7 +96,9 @@ class PreparedRun:
         request = Request.of(self._system, self._method, self._options._replace(v=v, y=y))
         if _is_free(request) and _is_small(request):
             shapes = (request.v.shape if v is None else np.shape(v)), np.shape(y)
-            self._request, self._short = (request, shapes), _short_run(request, shapes)
+            if self._request is None or self._request[1] != shapes:
+                self._short = _short_run(request, shapes)
+            self._request = request, shapes
         return request
 
 

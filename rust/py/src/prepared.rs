@@ -138,7 +138,7 @@ impl Prepared {
     }
 }
 
-/// Takes the numbers of a block, all finite, and whether it could: from one number for all, or an array of floats of this shape.
+/// Takes the numbers of a block, all finite, and whether it could: from one number for all, or an array of floats of 64 or 32 bits of this shape.
 pub(crate) fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut [T]) -> bool {
     if let Ok(number) = block.cast_exact::<PyFloat>() {
         if !shape.is_empty() {
@@ -146,19 +146,36 @@ pub(crate) fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut 
         }
         to.fill(T::of(number.value()));
     } else if let Ok(array) = block.cast::<PyArrayDyn<f64>>() {
-        let Ok(array) = array.try_readonly() else { return false };
-        let Ok(numbers) = array.as_slice() else { return false };
-        if array.shape() != shape || !array.data().is_aligned() {
+        if !take(array, shape, to, T::of) {
             return false;
         }
-        match numbers {
-            [number] => to.fill(T::of(*number)),
-            _ => to.iter_mut().zip(numbers).for_each(|(to, number)| *to = T::of(*number)),
+    } else if let Ok(array) = block.cast::<PyArrayDyn<f32>>() {
+        if !take(array, shape, to, |number| T::of(f64::from(number))) {
+            return false;
         }
     } else {
         return to.is_empty() && block.is_none();
     }
     all(to, |x| x.is_below(T::INFINITY))
+}
+
+/// Takes the numbers of an array of this shape, and whether it could.
+fn take<F: Element + Copy, T: Real>(
+    array: &Bound<'_, PyArrayDyn<F>>,
+    shape: &[usize],
+    to: &mut [T],
+    of: impl Fn(F) -> T,
+) -> bool {
+    let Ok(array) = array.try_readonly() else { return false };
+    let Ok(numbers) = array.as_slice() else { return false };
+    if array.shape() != shape || !array.data().is_aligned() {
+        return false;
+    }
+    match numbers {
+        [number] => to.fill(of(*number)),
+        _ => to.iter_mut().zip(numbers).for_each(|(to, number)| *to = of(*number)),
+    }
+    true
 }
 
 /// So many numbers are added side by side, as vectors.
