@@ -62,6 +62,7 @@ impl Law {
     }
 
     /// The potential, per mass, that a partner makes.
+    #[allow(clippy::eq_op, reason = "a difference with itself is 0 for numbers alone")]
     #[inline(always)]
     pub fn potential<N: Number>(self, r2: N, pull: N, strength: N) -> N {
         match self {
