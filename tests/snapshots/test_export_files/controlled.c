@@ -192,8 +192,8 @@ void controlled_step(const controlled *m, controlled_state *s, const float force
     const float a5 = m->c2 * a4;
     const float a6 = m->c1 * a4;
     const float a7 = m->c5 * (v_0_0 * v_0_0 + v_0_1 * v_0_1) + m->c6 * (v_1_0 * v_1_0 + v_1_1 * v_1_1);
-    const float a8 = a7 + (m->masses[0] * (0.0f + m->c2 * (0.5f * controlled_logarithm(a3))) + m->c8) - m->c7;
-    const float a9 = 1.0f - m->c9 * a8 / (1.0f + m->c9 * a7);
+    const float a8 = m->masses[0] * (0.0f + m->c2 * (0.5f * controlled_logarithm(a3) + a4 * (a3 - a3))) + m->c8;
+    const float a9 = 1.0f - m->c9 * (a7 + a8 - m->c7) / (1.0f + m->c9 * a7);
     const float a10 = a9 < 0.25f ? 0.25f : a9;
     const float a11 = 1.0f - sqrtf(4.0f < a10 ? 4.0f : a10);
     const float next_tally = tally - a11 * (2.0f - a11) * a7;

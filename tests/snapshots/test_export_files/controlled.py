@@ -160,8 +160,8 @@ class Controlled:
         a5 = self.c2 * a4
         a6 = self.c1 * a4
         a7 = self.c5 * (v_0_0 * v_0_0 + v_0_1 * v_0_1) + self.c6 * (v_1_0 * v_1_0 + v_1_1 * v_1_1)
-        a8 = a7 + (self.masses[0] * (float32(0.0) + self.c2 * (float32(0.5) * logarithm(a3))) + self.c8)
-        a9 = float32(1.0) - self.c9 * (a8 - self.c7) / (float32(1.0) + self.c9 * a7)
+        a8 = self.masses[0] * (float32(0.0) + self.c2 * (float32(0.5) * logarithm(a3) + a4 * (a3 - a3)))
+        a9 = float32(1.0) - self.c9 * (a7 + (a8 + self.c8) - self.c7) / (float32(1.0) + self.c9 * a7)
         a10 = float32(0.25) if a9 < float32(0.25) else a9
         a11 = float32(1.0) - numpy.sqrt(float32(4.0) if float32(4.0) < a10 else a10)
         next_tally = tally - a11 * (float32(2.0) - a11) * a7

@@ -184,8 +184,8 @@ impl Controlled {
         let a5 = self.c2 * a4;
         let a6 = self.c1 * a4;
         let a7 = self.c5 * (v_0_0 * v_0_0 + v_0_1 * v_0_1) + self.c6 * (v_1_0 * v_1_0 + v_1_1 * v_1_1);
-        let a8 = self.c9 * (a7 + (self.masses[0] * (0.0 + self.c2 * (0.5 * logarithm(a3))) + self.c8) - self.c7);
-        let a9 = 1.0 - a8 / (1.0 + self.c9 * a7);
+        let a8 = a7 + (self.masses[0] * (0.0 + self.c2 * (0.5 * logarithm(a3) + a4 * (a3 - a3))) + self.c8);
+        let a9 = 1.0 - self.c9 * (a8 - self.c7) / (1.0 + self.c9 * a7);
         let a10 = if a9 < 0.25 { 0.25 } else { a9 };
         let a11 = 1.0 - f32::sqrt(if 4.0 < a10 { 4.0 } else { a10 });
         let next_tally = tally - a11 * (2.0 - a11) * a7;
