@@ -307,6 +307,25 @@ def test_threads_may_call_it_at_once() -> None:
     assert not wrong
 
 
+def test_threads_may_make_the_first_adaptive_run_at_once() -> None:
+    """From which what does not depend on the start is known."""
+    expected = [whole(sw.Oscillator(), "dop853", v=0.0, y=float(i), **ORBIT) for i in range(8)]
+    for _ in range(50):
+        run, gate, same = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, **ORBIT), threading.Barrier(8), [False] * 8
+
+        def work(i: int, run: Any = run, gate: Any = gate, same: Any = same) -> None:
+            gate.wait()
+            assert_same(run(0.0, float(i)), expected[i])
+            same[i] = True
+
+        threads = [threading.Thread(target=work, args=(i,)) for i in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert all(same)
+
+
 def test_threads_may_call_integrate_at_once() -> None:
     """More runs than are kept, of systems that are made anew."""
     expected = [

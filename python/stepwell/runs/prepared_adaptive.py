@@ -51,10 +51,10 @@ class ShortAdaptiveRun:
             return False
         out = engine.Adapted(saved_v, saved_y, last_v, last_y, paces, np.zeros(plan.batch, np.int64), self.evaluations)
         run = run_of(self.request, out, control.times, saved_v, saved_y)
-        self.attributes = vars(run)
         self.t, self.status, self.first_bad_step = run.t, run.status, run.first_bad_step
         assert run.controller_state is not None
         self.end, self.last = control.pacing.at[-1], run.controller_state[3:]
+        self.attributes = vars(run)  # last, since another thread goes on from here as soon as there are some
         return True
 
     def run(self, v: Any, y: Any) -> Run | None:

@@ -97,16 +97,7 @@ impl Sums {
 }
 
 /// The bodies meet at the distances of one slab.
-struct Along<'a, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> {
-    n: usize,
-    groups: &'a [Distances],
-    round: &'a Round,
-    sums: &'a mut Sums,
-    more: bool,
-    stop: &'a AtomicBool,
-    potential: &'a mut [f64],
-    out: &'a mut [f64],
-}
+struct Along<'a, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool>(Meeting<'a>);
 
 /// A chunk of bodies, with what they collect.
 #[derive(Clone, Copy)]
@@ -307,8 +298,8 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Hot<'
 impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Along<'_, D, LAW, ENERGY, FUSED> {
     #[inline(always)]
     fn meet(&mut self) {
-        let Along { n, round, sums, stop, .. } = self;
-        let n = *n;
+        let Meeting { n, groups, round, sums, more, stop, potential: potentials, out } = &mut self.0;
+        let (n, more) = (*n, *more);
         let (width, stride) = (round.bodies.len(), round.partners.len());
         let Sums { after, before, potential } = &mut **sums;
         let mut hot = Hot::<D, LAW, ENERGY, FUSED> {
@@ -325,7 +316,7 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Along
         if ENERGY {
             hot.wells.fill(0.0);
         }
-        for &(first, last) in self.groups {
+        for &(first, last) in groups.iter() {
             if stop.load(Relaxed) {
                 return;
             }
@@ -339,20 +330,20 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Along
                 (start, end, distances) = (end, n, many - 1);
             }
         }
-        let (out, _) = self.out.as_chunks_mut::<D>();
+        let (out, _) = out.as_chunks_mut::<D>();
         for c in 0..D {
             let (after, before) = (&hot.after[c * width..][..n], &hot.before[c * stride..][..2 * n]);
             let (low, high) = before.split_at(n);
             let sums = after.iter().zip(low).zip(high).map(|((after, low), high)| after - (low + high));
-            if self.more {
+            if more {
                 out.iter_mut().zip(sums).for_each(|(out, sum)| out[c] += sum);
             } else {
                 out.iter_mut().zip(sums).for_each(|(out, sum)| out[c] = sum);
             }
         }
         if ENERGY {
-            for (out, well) in self.potential.iter_mut().zip(hot.wells.iter()) {
-                *out = if self.more { *out + well } else { *well };
+            for (out, well) in potentials.iter_mut().zip(hot.wells.iter()) {
+                *out = if more { *out + well } else { *well };
             }
         }
     }
@@ -428,29 +419,10 @@ impl Kernel {
     }
 
     fn by<const D: usize, const LAW: u8, const ENERGY: bool>(self, m: Meeting) {
-        let Meeting { n, groups, round, sums, more, stop, potential, out } = m;
         match self.rounding {
-            Rounding::Twice => with_isa!(self.level, |isa| isa.run(Along::<D, LAW, ENERGY, false> {
-                n,
-                groups,
-                round,
-                sums,
-                more,
-                stop,
-                potential,
-                out
-            })),
+            Rounding::Twice => with_isa!(self.level, |isa| isa.run(Along::<D, LAW, ENERGY, false>(m))),
             // Without the instruction a fused multiply-add takes a hundred times as long, so the best of the machine is taken.
-            Rounding::Once => with_isa!(self.level.of_loops(), |isa| isa.run(Along::<D, LAW, ENERGY, true> {
-                n,
-                groups,
-                round,
-                sums,
-                more,
-                stop,
-                potential,
-                out
-            })),
+            Rounding::Once => with_isa!(self.level.of_loops(), |isa| isa.run(Along::<D, LAW, ENERGY, true>(m))),
         }
     }
 }
