@@ -12,7 +12,8 @@ from stepwell.runs import engine
 from stepwell.studies.measuring import data, known, measure, peers, timing
 from stepwell.views.charts import style
 from support import stiff
-from support.charted import LADDER, METHODS, SCENES, read, the_charts, the_small, the_whole  # noqa: F401
+from support.charted import LADDER, METHODS, SCENES, SHOWN, read, the_charts, the_small, the_whole  # noqa: F401
+from support.families import family
 
 #: Those without a formula; the stiff ones are compared with published values in test_stiff_scenes.py.
 UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None and scene.name not in stiff.SCENES]
@@ -36,10 +37,7 @@ def slope(curve):
 # ---- orders
 
 
-#: A linear scene and one that is not; test_orders.py looks at every method on more of either.
-SHOWN = ("clover", "oscillator")
-
-
+# test_orders.py looks at every method on more scenes.
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
 @pytest.mark.parametrize(
     "scene", [pytest.param(s, marks=() if s.name in SHOWN else pytest.mark.long) for s in SCENES], ids=lambda s: s.name
@@ -429,7 +427,7 @@ def test_the_summary_is_what_the_points_say(charts):
                 assert cost == (min(better) if better else math.inf)
 
 
-@pytest.mark.parametrize("scene", SCENES, ids=lambda s: s.name)
+@pytest.mark.parametrize("scene", family(SCENES, lambda scene: scene.name in SHOWN, lambda scene: scene.name))
 def test_nothing_in_the_picture_is_cut_off_or_covered(charts, scene, tmp_path):
     chart = charts[scene.name]
     figure = chart.plot(tmp_path / "chart.png")

@@ -10,7 +10,7 @@ import pytest
 import stepwell as sw
 from stepwell.base import tables
 from stepwell.errors import ArgumentError, DTypeError, UnknownNameError, UnsupportedError
-from stepwell.studies.measuring import peers, timing
+from stepwell.studies.measuring import data, measure, peers, timing
 from stepwell.views.charts import style
 from support.charted import METHODS, read, the_small  # noqa: F401
 
@@ -120,8 +120,14 @@ def test_a_panel_is_its_charts(tmp_path):
 # ---- what is refused
 
 
-def test_implicit_methods_are_left_out_where_they_would_take_most_of_an_hour():
-    """Of 23 bodies in space, 138 numbers, all are; of 21, 126 numbers, or if they are named, none is."""
+def test_implicit_methods_are_left_out_where_they_would_take_most_of_an_hour(monkeypatch):
+    """Of 23 bodies in space, 138 numbers, all are; of 21, 126 numbers, or if they are named, none is. No step is made."""
+    point = data.Point(steps=4, dt=1.0, cost=1.0, state_error=0.5, energy_error=0.0, unstable=False)
+    monkeypatch.setattr(measure, "assess", lambda *_: point)
+    monkeypatch.setattr(measure, "largest_stable_step", lambda *_: math.inf)
+    monkeypatch.setattr(
+        timing, "step_times", lambda scene, able, *_: {method.name: data.Timing(1.0, 1.0, 1.0) for method in able}
+    )
     implicit = {each.name for each in sw.methods() if each.is_implicit}
 
     def left_out(bodies: int, methods: list[str] | None) -> dict[str, str]:

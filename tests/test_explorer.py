@@ -17,6 +17,7 @@ from stepwell.views.explorer import data as of_page
 from stepwell.views.explorer import sliders
 from stepwell.views.explorer.data import of_scene
 from stepwell.views.explorer.page import MODULES, WEB, script
+from support.cases import SOME
 from support.explored import CHANGED, STEPS, data_of, expected, in_node, needs_node, page, races, scene_of
 
 # ---- steps
@@ -30,10 +31,11 @@ told = given.map(([name, key, values, steps]) => {
 """
 
 
+@SOME
 @needs_node
-def test_every_step_has_the_bits_of_integrate(tmp_path: Path) -> None:
-    """Each scene by each method that can step it; and with sliders moved, against the scene made with these parameters."""
-    every = races()
+def test_every_step_has_the_bits_of_integrate(some: int | None, tmp_path: Path) -> None:
+    """Each scene by methods that can step it; and with sliders moved, against the scene made with these parameters."""
+    every = races(some)
     assert {name for name, *_ in every} == set(sliders.OFFERS)
     assert {key for _, key, *_ in every} == {m.name for m in sw.methods()}
     results = in_node(RUN, tmp_path, [[name, key, values, STEPS] for name, key, values, _ in every])

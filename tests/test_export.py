@@ -28,10 +28,10 @@ from support.tracing import CONTROLS, METHODS
 WRONG: Any = "yes"
 
 
-def controlled(language: str) -> list[Journey]:
-    """Every control, with some methods."""
+def controlled(language: str, implicit: bool = False) -> list[Journey]:
+    """Every control, with some methods; with implicit ones, which compilers take longest for, in the long run."""
     pairs = [(control, name) for control in CONTROLS for name in ("three bodies", "two bodies", "three bodies in space, newton")]
-    able = [method for method in METHODS if not method.needs_acceleration and method.name != "dop853"]
+    able = [m for m in METHODS if not m.needs_acceleration and m.name != "dop853" and m.is_implicit is implicit]
     journeys = []
     for i, (control, name) in enumerate(pairs):
         method = able[(i + number(language)) % len(able)]
@@ -90,7 +90,7 @@ def test_every_bit_is_that_of_integrate(language: str, tmp_path: Path) -> None:
 @languages
 @pytest.mark.filterwarnings("ignore")
 def test_every_bit_of_other_pairs(language: str, tmp_path: Path) -> None:
-    every = other_journeys(language)
+    every = [*other_journeys(language), *controlled(language, implicit=True)]
     assert len(every) > 40
     assert_same(every, run(language, every, tmp_path))
 

@@ -355,12 +355,21 @@ def number(*words: Any) -> int:
     return int.from_bytes(hashlib.blake2b(repr(words).encode(), digest_size=8).digest(), "little")
 
 
+#: Systems by which a step of an implicit method, whose equations are written out, has the most operations.
+LARGEST = ("linear, seventeen states", "chain of nineteen")
+
+
 def representative(every: Iterable[Case], several: Mapping[str, int], *salt: str) -> list[Case]:
     """Cases in which every system and every method occurs so many times in each of its forms, with all its starts.
 
     They are drawn by their names, so that a new system or method moves few others; another salt draws others.
     """
-    drawn = {case: number(*salt, case.system, case.method, case.form) for case in every}
+    # Those that take longest come last: they are drawn only where there is no other.
+    drawn = {
+        case: number(*salt, case.system, case.method, case.form)
+        + (1 << 64) * (case.system in LARGEST and sw.method(case.method).is_implicit)
+        for case in every
+    }
     groups: dict[tuple[str, str], set[int]] = defaultdict(set)
     for case, lot in drawn.items():
         groups[case.system, case.form].add(lot)

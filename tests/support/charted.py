@@ -8,6 +8,8 @@ import pytest
 import stepwell as sw
 from stepwell.studies.measuring import timing
 
+from support.families import family
+
 #: The scenes with a solution that a fixed step does well; the others have their own test of orders. That of a ball is not smooth.
 HARD = ("bouncing_ball", "figure_eight", "kepler", "pythagorean", "arenstorf", "sliding_block", "sticking_block")
 SCENES = [scene for scene in sw.scenes.scenes() if scene.exact is not None and scene.name not in HARD]
@@ -17,18 +19,24 @@ METHODS = sw.methods()
 LADDER = importlib.import_module("stepwell.studies.measuring.work_precision")
 
 
+#: Those of which all is tried by default: a linear scene of one number and one of several bodies, which some methods cannot step.
+SHOWN = ("clover", "oscillator")
+
+
 @functools.cache
-def _made():
+def _made(some):
     with pytest.MonkeyPatch.context() as patched:
         hasty(patched)
         patched.setattr(LADDER, "SMALLEST", 1 / 30)
-        return {scene.name: sw.charts.work_precision(scene) for scene in SCENES}
+        return {scene.name: sw.charts.work_precision(scene) for scene in SCENES if scene.name in SHOWN or not some}
 
 
-@pytest.fixture(scope="module", name="charts")
-def the_charts():
+@pytest.fixture(
+    scope="module", name="charts", params=family([True, False], lambda some: some, lambda some: "some" if some else "all")
+)
+def the_charts(request):
     """These scenes by every method: what `stepwell chart` draws, but for the finest rungs of the ladder and with hasty times."""
-    return _made()
+    return _made(request.param)
 
 
 @pytest.fixture(scope="module", name="whole")

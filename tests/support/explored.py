@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import pickle
 import shutil
 import warnings
 from dataclasses import replace
@@ -16,7 +18,9 @@ import stepwell as sw
 from stepwell.views.explorer import sliders
 from stepwell.views.explorer.page import WEB
 
+from support import families
 from support.abroad import bits, executed
+from support.cases import number
 
 #: Steps that are compared to the bit: some impacts of the ball and the stop of the sliding block are among them.
 STEPS = 60
@@ -59,8 +63,16 @@ CHANGED: dict[str, tuple[str, dict[str, float], Any]] = {
 
 @cache
 def page() -> sw.Explorer:
-    """The page with all scenes and methods."""
-    return sw.explore()
+    """The page with all scenes and methods, whose data one worker makes for all."""
+    shown = sw.explore()
+    if families.SHARED is not None:
+        kept = families.SHARED / "explorer.pickle"
+        if not kept.exists():
+            own = kept.with_suffix(f".{os.getpid()}")
+            own.write_bytes(pickle.dumps(shown.data))
+            own.replace(kept)
+        vars(shown)["data"] = pickle.loads(kept.read_bytes())
+    return shown
 
 
 def scene_of(name: str) -> sw.Scene:
@@ -117,11 +129,21 @@ def expected(scene: sw.Scene, method: str, steps: int = STEPS) -> list[str]:
     return [f"{bits(float(x)):x}" for block in (run.v[-1], run.y[-1]) for x in np.ravel(block)]
 
 
-def races() -> list[tuple[str, str, dict[str, float], Any]]:
-    """Name of a scene, method, sliders, the scene in Python: every scene by every method, and some with other parameters."""
+def races(some: int | None = None) -> list[tuple[str, str, dict[str, float], Any]]:
+    """Name of a scene, method, sliders, the scene in Python: every scene by every method, and some with other parameters.
+
+    Or every scene by some methods that are drawn for it, and every method once.
+    """
     rows: list[tuple[str, str, dict[str, float], Any]] = []
+    met: set[str] = set()
     for each in page().data["scenes"]:
-        rows += [(each["name"], key, {}, scene_of(each["name"])) for key in each["steps"] if key != "truth"]
+        keys = sorted((key for key in each["steps"] if key != "truth"), key=lambda key: number(each["name"], key))
+        rows += [
+            (each["name"], key, {}, scene_of(each["name"]))
+            for i, key in enumerate(keys)
+            if some is None or i < some or key not in met
+        ]
+        met |= set(keys)
     for name, values, make in CHANGED.values():
         scene = make(scene_of(name))
         rows += [(name, key, values, scene) for key in ("false_euler", "leapfrog", "rk4") if key in data_of(name)["steps"]]

@@ -58,7 +58,7 @@ LONGEST = "thirty-five bodies in space, newton"
 SHORT = ("false_euler", "verlet", "leapfrog", "standard_heun")
 
 
-#: The most operations of an implicit step that is exported: compilers take long for longer ones, whose parts are the same.
+#: The most operations of an implicit step, or of a series, that is exported: compilers take long for more, of the same parts.
 MOST_TO_COMPILE = 1500
 
 
@@ -68,10 +68,9 @@ def pairs() -> Iterator[tuple[str, sw.Method, str | None]]:
         system = make(np.random.default_rng(1), 1)
         for method in METHODS:
             if name != LONGEST and fits(system, method) and (name not in LONG or method.name in SHORT):
-                if (
-                    method.is_implicit
-                    and _core.operations(engine.model(engine.Plan(system, method, (1,), 0.1))) > MOST_TO_COMPILE
-                ):
+                if (method.is_implicit or method.has_series) and _core.operations(
+                    engine.model(engine.Plan(system, method, (1,), 0.1))
+                ) > MOST_TO_COMPILE:
                     continue
                 yield from ((name, method, start) for start in method.starts or (None,))
 
@@ -82,26 +81,39 @@ def drawn(language: str, pair: tuple[str, sw.Method, str | None]) -> int:
     return number(language, name, method.name, start) % SHARE[language]
 
 
+#: Languages whose compilers take longest, and which of so many systems each is tried with: what is written is of operations, of
+#: which every system has some that others have too. In the long run each is tried with all.
+OF_SYSTEMS = {"c": (0, 2), "rust": (1, 2)}
+
+
 def journeys(language: str) -> list[Journey]:
-    """Every method and every system, and some pairs of them."""
+    """Every method and every system, in as few pairs as there are systems: each language has others."""
+    share, of = OF_SYSTEMS.get(language, (0, 1))
+    wanted = {name for i, name in enumerate(SYSTEMS) if i % of == share and (name != LONGEST or language == "python")}
+    every = sorted(
+        (each for each in pairs() if each[0] in wanted), key=lambda each: number(language, each[0], each[1].name, each[2])
+    )
     chosen: list[tuple[str, sw.Method, str | None]] = []
     systems: set[str] = set()
     methods: set[str] = set()
-    for each in pairs():
-        name, method, _ = each
-        if drawn(language, each) == 0 or (method.name not in methods and name not in LONG):
-            chosen.append(each)
-            systems.add(name)
-            methods.add(method.name)
-    for name in SYSTEMS:  # those that were not drawn
-        if name not in systems and (name != LONGEST or language == "python"):
-            chosen.append((name, sw.method("false_euler"), None))
+    # First pairs of a new system and a new method, then what is left of either.
+    for is_wanted in (lambda s, m: s and m, lambda s, m: s or m):
+        for name, method, start in every:
+            if is_wanted(name not in systems, method.name not in methods):
+                chosen.append((name, method, start))
+                systems.add(name)
+                methods.add(method.name)
+    chosen += [(name, sw.method("false_euler"), None) for name in sorted(wanted - systems)]
     return [journey(*each) for each in chosen]
 
 
 def other_journeys(language: str) -> list[Journey]:
-    """Twice as many other pairs, for the long run."""
-    return [journey(*each) for each in pairs() if drawn(language, each) in (1, 2)]
+    """The systems that the language is not tried with by default, and three times as many other pairs, for the long run."""
+    every = [each for each in pairs() if drawn(language, each) in (0, 1, 2)]
+    names = {each[0] for each in every} | {LONGEST}
+    return [
+        journey(*each) for each in [*every, *((name, sw.method("false_euler"), None) for name in SYSTEMS if name not in names)]
+    ]
 
 
 def assert_same(journeys: list[Journey], results: list[list[float]]) -> None:

@@ -38,7 +38,7 @@ def odd_sum(a: Array, b: Array) -> Array:
     """The sum rounded to odd: where it is not exact, to the neighbour whose last bit is set."""
     s, rest = two_sum(a, b)
     even = (s.view(np.uint64) & np.uint64(1)) == 0
-    beside = np.nextafter(s, np.where(rest > 0, np.inf, -np.inf))
+    beside = np.nextafter(s, np.copysign(np.inf, rest))
     return np.where((rest != 0) & even, beside, s)
 
 
@@ -53,19 +53,22 @@ def exact_fma(a: float, b: float, c: float) -> float:
 
 def double_fma(a: Any, b: Any, c: Any) -> Array:
     """Of float64 (Boldo and Melquiond 2008), arrays that broadcast."""
-    a, b, c = (np.array(x) for x in np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in (a, b, c))))
+    a, b, c = (np.asarray(x, dtype=np.float64) for x in (a, b, c))
     with np.errstate(all="ignore"):
         p, p_rest = two_product(a, b)
         s, s_rest = two_sum(c, p_rest)
         t, t_rest = two_sum(p, s)
-        out = t + odd_sum(s_rest, t_rest)
+        out = np.asarray(t + odd_sum(s_rest, t_rest))
+        inside = (np.abs(p) >= SMALL) & (np.abs(p) <= LARGE) & (np.abs(a) <= LARGE) & (np.abs(b) <= LARGE) & (np.abs(c) <= LARGE)
+        if inside.all():
+            return out  # as almost always
+        a, b, c, inside = np.broadcast_arrays(a, b, c, inside)
         plain = a * b + c
         # A product of a zero is exact. What is not finite goes its own way, but a finite product added to an infinity is that.
         finite = np.isfinite(a) & np.isfinite(b)
         zero = finite & ((a == 0) | (b == 0))
         out = np.where(zero | ~finite | np.isnan(c), plain, out)
         out = np.where(finite & np.isinf(c), c, out)
-        inside = (np.abs(p) >= SMALL) & (np.abs(p) <= LARGE) & (np.abs(a) <= LARGE) & (np.abs(b) <= LARGE) & (np.abs(c) <= LARGE)
         for at in np.argwhere(finite & np.isfinite(c) & ~zero & ~inside):
             i = tuple(at)
             out[i] = exact_fma(float(a[i]), float(b[i]), float(c[i]))
