@@ -28,6 +28,9 @@ const MAX_WAITING_AROUND_SLOW: usize = 32;
 /// leave gaps.
 const MAX_BEHIND: usize = 3;
 const MIN_OPERATIONS_PER_BEHIND: usize = 6;
+/// The most where a single vector leaves no registers, as with three bodies in space: side by side, all need most at once. So they
+/// are spread over the step. Fitted likewise, to two to four bodies; two vectors gain nothing by it.
+const MAX_BEHIND_IF_WIDE: usize = 24;
 /// Of the operations whose operands are made or under way, so many are compared, from the first one on.
 const MAX_COMPARED: usize = 64;
 /// A CPU begins two operations on long vectors in a cycle.
@@ -49,7 +52,8 @@ pub fn in_turn(operations: usize, shape: Shape, behind: usize) -> Order {
 
 /// The order in which a plan is written; `ops` are the operations of its body.
 pub(super) fn order<I: Copy>(plan: &KernelPlan<I>, ops: &[Op], shape: Shape) -> Order {
-    let interleaves = shape.interleaved.min(shape.block_vectors) > 1;
+    let together = shape.interleaved.min(shape.block_vectors);
+    let interleaves = together > 1;
     let is_single = shape.width == 1 && shape.block_vectors == 1;
     let shared = plan.sources.iter().filter(|source| source.is_shared()).count();
     let waits = Waits::of(plan, ops, shape);
@@ -62,15 +66,19 @@ pub(super) fn order<I: Copy>(plan: &KernelPlan<I>, ops: &[Op], shape: Shape) -> 
     // A state that is in registers leaves none to interleaved vectors for more results that wait.
     let is_best =
         if interleaves { shape.resident || shared > MAX_SHARED } else { !is_single && plan.steps.len() < MIN_STEP_OPERATIONS };
+    // The other registers hold shared numbers and the state.
+    let fit = shape.registers() * 3 / 4;
     // With 16 registers a distance gains here what it loses there.
-    let behind = if shape.registers() > 16 { MAX_BEHIND.min(plan.steps.len() / MIN_OPERATIONS_PER_BEHIND) } else { 0 };
+    let may_be_behind = shape.registers() > 16;
+    if may_be_behind && together > 2 && !shape.resident && !has_slow && waits.width(plan) > fit {
+        return in_turn(plan.steps.len(), shape, MAX_BEHIND_IF_WIDE.min(plan.steps.len() / together));
+    }
+    let behind = if may_be_behind { MAX_BEHIND.min(plan.steps.len() / MIN_OPERATIONS_PER_BEHIND) } else { 0 };
     if is_best {
         return in_turn(plan.steps.len(), shape, behind);
     }
     // Vectors that wait for the one unit of roots and quotients fall behind each other by that.
     let order = in_turn(plan.steps.len(), shape, if has_slow { 0 } else { behind });
-    // The other registers hold shared numbers and the state.
-    let fit = shape.registers() * 3 / 4;
     if interleaves {
         return waits.shortened(&order, fit);
     }
@@ -117,6 +125,12 @@ impl Waits {
         };
         let operands = plan.steps.iter().map(|step| made_by(step.of())).collect();
         Waits::new(operands, plan.steps.iter().map(|step| time(ops[step.id as usize])).collect())
+    }
+
+    /// How many registers a vector would need: for the state that it reads, and for the most results that wait.
+    fn width<I>(&self, plan: &KernelPlan<I>) -> usize {
+        let order = (0..plan.steps.len()).map(|i| (i, 0)).collect();
+        plan.old.iter().flatten().count() + self.waiting(&order)
     }
 
     /// The most results that wait to be used at once, in an order of the operations of one vector.

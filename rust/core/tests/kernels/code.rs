@@ -1,7 +1,7 @@
 //! Machine code, read back: that it touches nothing but its frame, and does nothing but arithmetic.
 
 use iced_x86::{Decoder, DecoderOptions, FlowControl, Instruction, Mnemonic, OpAccess, OpKind, Register};
-use stepwell_core::kernel::writer::Written;
+use stepwell_core::kernel::writer::{Assembled, Written};
 
 /// Panics if anything is in the code that should not be. Fused multiply-adds should be if the body has some. Returns how many
 /// instructions move numbers between lanes.
@@ -83,6 +83,16 @@ pub(crate) fn read(kernel: &Written, is_fused: bool) -> usize {
     // One word of the stack, and no operand is there: no guard page of Windows is passed over, and nothing is below rsp.
     assert_eq!(pushes, 1);
     moves
+}
+
+/// How many sums and products are written before the first instruction that reads the state of a vector of the block.
+pub(crate) fn sums_before(assembled: &Assembled, vector: u64) -> usize {
+    let row = (assembled.shape.bytes * assembled.frame.lanes) as u64;
+    let size = (assembled.shape.bytes * assembled.shape.width) as u64;
+    let is_of = |i: &Instruction| i.memory_base() == Register::RDI && i.memory_displacement64() % row / size == vector;
+    let arithmetic = [Mnemonic::Vaddpd, Mnemonic::Vsubpd, Mnemonic::Vmulpd];
+    let decoder = Decoder::with_ip(64, &assembled.code, 0, DecoderOptions::NONE);
+    decoder.into_iter().take_while(|i| !is_of(i)).filter(|i| arithmetic.contains(&i.mnemonic())).count()
 }
 
 /// Which vector registers are in the code.

@@ -4,6 +4,14 @@ use stepwell_core::{
     isa::Level,
     kernel::writer::{Order, Shape, Waits, in_turn},
 };
+#[cfg(target_arch = "x86_64")]
+use {
+    crate::code::sums_before,
+    stepwell_core::{
+        kernel::writer::assemble,
+        tape::{Op, real::Precision, split::Body},
+    },
+};
 
 use crate::random::Random;
 
@@ -35,6 +43,33 @@ fn a_vector_is_behind_the_one_before() {
     assert_eq!(in_turn(2, interleaved(3, 2), 1), [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (1, 2)]);
     // Further behind than a step is long: one vector after the other.
     assert_eq!(in_turn(2, interleaved(2, 2), 5), [(0, 0), (1, 0), (0, 1), (1, 1)]);
+}
+
+/// A step of so many numbers: each grows by the sum of all squares, which wait for each other.
+#[cfg(target_arch = "x86_64")]
+fn squares(numbers: u32) -> Body {
+    let mut ops: Vec<Op> = (0..numbers).map(Op::State).collect();
+    ops.extend((0..numbers).map(|s| Op::Mul(s, s)));
+    ops.push(Op::Add(numbers, numbers + 1));
+    for square in numbers + 2..2 * numbers {
+        ops.push(Op::Add(ops.len() as u32 - 1, square));
+    }
+    let sum = ops.len() as u32 - 1;
+    ops.extend((0..numbers).map(|s| Op::Add(s, sum)));
+    let next = (0..numbers).map(|s| sum + 1 + s).collect();
+    Body { ops, next, rows: 0, uniforms: 0, per_step: 0, precision: Precision::Double }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn vectors_that_leave_no_registers_are_spread_over_the_step() {
+    let before = |numbers, shape| sums_before(&assemble(&squares(numbers), shape).unwrap(), 1);
+    // By a quarter of 3 · 14 − 1 operations; by as many as gain anything of 3 · 40 − 1. One more is written at the same moment.
+    assert_eq!([before(14, interleaved(4, 4)), before(40, interleaved(4, 4))], [41 / 4 + 1, 24 + 1]);
+    // Two vectors, those that leave registers, and 16 registers gain nothing.
+    let avx2 = Shape { level: Level::Avx2, width: 4, ..interleaved(4, 4) };
+    let close = [before(14, interleaved(2, 2)), before(12, interleaved(4, 4)), before(14, avx2)];
+    assert!(close.iter().all(|sums| *sums <= 4), "{close:?}");
 }
 
 #[test]
