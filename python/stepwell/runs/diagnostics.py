@@ -316,31 +316,34 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
     The two are taken to move alone from the start, from a saved state, or backward from the end.
     """
     n, evaluations = bodies.y_shape[0], run.method.evaluations * run.steps
+    numbers = _numbers_of_pairs(run, bodies)
+    drifts, few = run.method.splits and bodies.force == "newton", run.status.ndim == 0 and n <= FEW_BODIES
+    # Checked before any array is made, as that takes longer than the rest.
+    if drifts:
+        pays = evaluations >= FEW_EVALUATIONS and numbers <= MOST_NUMBERS
+    elif few:
+        pays = evaluations >= FEW_EVALUATIONS
+    else:
+        pays = evaluations >= EVALUATIONS and evaluations * numbers >= 2 * PAIRS and numbers <= MOST_NUMBERS
+    if not pays:
+        return []
     # Where time runs back, velocities are reversed.
     h, time, way = abs(run.dt), run.steps * abs(run.dt), 1.0 if run.dt > 0.0 else -1.0
     # As many states as are little work beside the run. From the last one time runs back.
-    few = run.status.ndim == 0 and n <= FEW_BODIES
-    looked = min(STATES, len(run.t) - 1, evaluations // EVALUATIONS)
+    looked = min(STATES, len(run.t) - 1, evaluations // EVALUATIONS) if drifts or few else 0
     between = np.linspace(1, len(run.t) - 1, looked, endpoint=False, dtype=int).tolist() if len(run.t) > 2 else []
     states = [(way * v, y) for v, y in (start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1]))]
-    if run.method.splits and bodies.force == "newton":
-        if evaluations < FEW_EVALUATIONS or _numbers_of_pairs(run, bodies) > MOST_NUMBERS:
-            return []
+    if drifts:
         near = [encounters.may_come_near(bodies, np.broadcast_to(v, y.shape), y) for v, y in states]
         return [tuple(index) for index in np.argwhere(np.logical_or.reduce(near)).tolist()]
     if few:
-        if evaluations < FEW_EVALUATIONS:
-            return []
         return (
             [()]
             if any(encounters.may_meet(bodies, h, time, *(_lists(block, bodies.y_shape) for block in state)) for state in states)
             else []
         )
-    numbers = _numbers_of_pairs(run, bodies)
-    if evaluations < EVALUATIONS or evaluations * numbers < 2 * PAIRS or numbers > MOST_NUMBERS:
-        return []
     may = np.zeros(run.status.shape, dtype=bool)
-    for v, y in (states[0], states[-1]):
+    for v, y in states:
         may |= encounters.may_meet_each(bodies, h, time, np.broadcast_to(v, y.shape), y)
     return [tuple(index) for index in np.argwhere(may).tolist()]
 
