@@ -2,19 +2,22 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::{
+    marker::PhantomData,
+    sync::atomic::{AtomicBool, Ordering::Relaxed},
+};
 
 use crate::{
     aligned::Aligned,
     bodies::{LANES as SIDE, Law, Rounding, meeting},
-    isa::{Level, Task, with_isa},
+    isa::{Isa, Level, Task, with_isa},
 };
 
 /// A group of distances k, from one to another, `LANES` apart. All pairs of a chunk of bodies in a group are computed before
 /// those of the next chunk.
 pub type Distances = (usize, usize);
 
-type Chunk = [f64; SIDE];
+pub(crate) type Chunk = [f64; SIDE];
 
 #[inline(always)]
 fn load(from: &[f64], at: usize) -> Chunk {
@@ -26,6 +29,60 @@ fn load(from: &[f64], at: usize) -> Chunk {
 #[inline(always)]
 fn store(to: &mut [f64], at: usize, chunk: &Chunk) {
     to[at..at + SIDE].copy_from_slice(chunk);
+}
+
+/// Adds products to sums, each rounded once: all, or what the mask has bits for.
+///
+/// Where a fused multiply-add is a function's, so is this: the calls of one lane after the other would be most of the kernels.
+#[inline(always)]
+pub(crate) fn fuse<I: Isa>(sums: &mut Chunk, a: &Chunk, b: &Chunk, met: Option<&[u64; SIDE]>) {
+    #[inline(always)]
+    fn each(sums: &mut Chunk, a: &Chunk, b: &Chunk, met: Option<&[u64; SIDE]>) {
+        for l in 0..SIDE {
+            let sum = Rounding::Once.plus(sums[l], a[l], b[l]);
+            sums[l] = met.map_or(sum, |met| f64::from_bits(sum.to_bits() & met[l] | sums[l].to_bits() & !met[l]));
+        }
+    }
+    #[inline(never)]
+    fn by_function(sums: &mut Chunk, a: &Chunk, b: &Chunk, met: Option<&[u64; SIDE]>) {
+        each(sums, a, b, met);
+    }
+    if I::FUSES { each(sums, a, b, met) } else { by_function(sums, a, b, met) }
+}
+
+/// d·d + ε²: see [`Rounding::softened`].
+#[inline(always)]
+pub(crate) fn softened<I: Isa, const D: usize, const FUSED: bool>(d: &[Chunk; D], soft: f64) -> Chunk {
+    let mut r2 = [soft; SIDE];
+    if FUSED {
+        d.iter().for_each(|d| fuse::<I>(&mut r2, d, d, None));
+        return r2;
+    }
+    for l in 0..SIDE {
+        let mut length = d[0][l] * d[0][l];
+        for c in 1..D {
+            length += d[c][l] * d[c][l];
+        }
+        r2[l] += length;
+    }
+    r2
+}
+
+/// f(r²) of the law of that number.
+#[inline(always)]
+pub(crate) fn pulls<I: Isa, const LAW: u8, const FUSED: bool>(r2: &Chunk) -> Chunk {
+    #[inline(never)]
+    fn by_function(r2: &Chunk) -> Chunk {
+        r2.map(|r2| Law::Newton.pull(Rounding::Once, r2))
+    }
+    if FUSED && LAW == NEWTON && !I::FUSES {
+        return by_function(r2);
+    }
+    let mut pull = [0.0; SIDE];
+    for l in 0..SIDE {
+        pull[l] = const { law(LAW) }.pull(const { Rounding::of(FUSED) }, r2[l]);
+    }
+    pull
 }
 
 /// Places and masses of the bodies as rows, repeated for two rounds and more.
@@ -97,7 +154,12 @@ impl Sums {
 }
 
 /// The bodies meet at the distances of one slab.
-struct Along<'a, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool>(Meeting<'a>);
+struct Along<'a, I, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> {
+    level: PhantomData<I>,
+    /// That of the potential; the force is that of `LAW`.
+    law: Law,
+    meeting: Meeting<'a>,
+}
 
 /// A chunk of bodies, with what they collect.
 #[derive(Clone, Copy)]
@@ -118,48 +180,51 @@ struct Partners<const D: usize> {
 impl<const D: usize> Bodies<D> {
     /// Adds the forces of a chunk of partners; `met` is a mask, with no bits for pairs that do not count.
     #[inline(always)]
-    fn meet<const LAW: u8, const ENERGY: bool, const FUSED: bool>(
+    fn meet<I: Isa, const LAW: u8, const ENERGY: bool, const FUSED: bool>(
         &mut self,
         p: &mut Partners<D>,
+        potential: Law,
         soft: f64,
         met: Option<&[u64; SIDE]>,
     ) {
         let mut d = [[0.0; SIDE]; D];
-        let mut r2 = if FUSED { [soft; SIDE] } else { [0.0; SIDE] };
         for c in 0..D {
             for l in 0..SIDE {
                 d[c][l] = p.place[c][l] - self.place[c][l];
-                r2[l] = if c == 0 && !FUSED {
-                    d[c][l] * d[c][l]
-                } else {
-                    const { Rounding::of(FUSED) }.plus(r2[l], d[c][l], d[c][l])
-                };
             }
         }
-        let (mut to_i, mut to_j, mut more) = ([0.0; SIDE], [0.0; SIDE], [0.0; SIDE]);
-        for l in 0..SIDE {
-            let r2 = if FUSED { r2[l] } else { r2[l] + soft };
-            let pull = const { law(LAW) }.pull(const { Rounding::of(FUSED) }, r2);
-            to_i[l] = pull * p.strength[l];
-            to_j[l] = pull * self.strength[l];
-            if ENERGY {
-                more[l] = const { law(LAW) }.potential(r2, pull, p.strength[l]);
+        let r2 = softened::<I, D, FUSED>(&d, soft);
+        let pull = pulls::<I, LAW, FUSED>(&r2);
+        if ENERGY {
+            let mut more = [0.0; SIDE];
+            // Two laws have the same force, so that one kernel serves both.
+            if LAW != NEWTON && potential == Law::Printed {
+                for l in 0..SIDE {
+                    more[l] = Law::Printed.potential(r2[l], pull[l], p.strength[l]);
+                }
+            } else {
+                for l in 0..SIDE {
+                    more[l] = const { law(LAW) }.potential(r2[l], pull[l], p.strength[l]);
+                }
             }
+            add(&mut self.well, more, met);
+        }
+        let (mut to_i, mut to_j) = ([0.0; SIDE], [0.0; SIDE]);
+        for l in 0..SIDE {
+            to_i[l] = pull[l] * p.strength[l];
+            to_j[l] = pull[l] * self.strength[l];
         }
         // Written out: as a loop it is so long that the compiler leaves it one, and gathers its vectors from three directions.
-        self.pull_along::<FUSED>(0, p, &d, [&to_i, &to_j], met);
-        self.pull_along::<FUSED>(1, p, &d, [&to_i, &to_j], met);
+        self.pull_along::<I, FUSED>(0, p, &d, [&to_i, &to_j], met);
+        self.pull_along::<I, FUSED>(1, p, &d, [&to_i, &to_j], met);
         if D == 3 {
-            self.pull_along::<FUSED>(2, p, &d, [&to_i, &to_j], met);
-        }
-        if ENERGY {
-            add(&mut self.well, more, met);
+            self.pull_along::<I, FUSED>(2, p, &d, [&to_i, &to_j], met);
         }
     }
 
     /// Adds the forces in one direction.
     #[inline(always)]
-    fn pull_along<const FUSED: bool>(
+    fn pull_along<I: Isa, const FUSED: bool>(
         &mut self,
         c: usize,
         p: &mut Partners<D>,
@@ -168,8 +233,8 @@ impl<const D: usize> Bodies<D> {
         met: Option<&[u64; SIDE]>,
     ) {
         if FUSED {
-            add_products(&mut self.pull[c], &d[c], to[0], met);
-            add_products(&mut p.pull[c], &d[c], to[1], met);
+            fuse::<I>(&mut self.pull[c], &d[c], to[0], met);
+            fuse::<I>(&mut p.pull[c], &d[c], to[1], met);
             return;
         }
         let (mut of_i, mut of_j) = ([0.0; SIDE], [0.0; SIDE]);
@@ -196,17 +261,10 @@ fn add(sums: &mut Chunk, mut more: Chunk, met: Option<&[u64; SIDE]>) {
     }
 }
 
-/// Adds products to sums, each rounded once.
-#[inline(always)]
-fn add_products(sums: &mut Chunk, a: &Chunk, b: &Chunk, met: Option<&[u64; SIDE]>) {
-    for l in 0..SIDE {
-        let sum = Rounding::Once.plus(sums[l], a[l], b[l]);
-        sums[l] = met.map_or(sum, |met| f64::from_bits(sum.to_bits() & met[l] | sums[l].to_bits() & !met[l]));
-    }
-}
-
 /// The slices that the hot loop goes through, taken once.
-struct Hot<'a, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> {
+struct Hot<'a, I, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> {
+    level: PhantomData<I>,
+    law: Law,
     places: &'a [f64],
     partners: &'a [f64],
     bodies: &'a [f64],
@@ -216,7 +274,7 @@ struct Hot<'a, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: b
     wells: &'a mut [f64],
 }
 
-impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Hot<'_, D, LAW, ENERGY, FUSED> {
+impl<I: Isa, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Hot<'_, I, D, LAW, ENERGY, FUSED> {
     /// The chunks of bodies from `A` to `B`, of those that are held, meet the chunk of partners at `at`.
     #[inline(always)]
     fn partner<const A: usize, const B: usize, const U: usize>(
@@ -233,7 +291,7 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Hot<'
             p.pull[c] = load(self.before, c * stride + at);
         }
         for t in A..B {
-            held[t].meet::<LAW, ENERGY, FUSED>(&mut p, self.soft, if t == U - 1 { met } else { None });
+            held[t].meet::<I, LAW, ENERGY, FUSED>(&mut p, self.law, self.soft, if t == U - 1 { met } else { None });
         }
         for c in 0..D {
             store(self.before, c * stride + at, &p.pull[c]);
@@ -281,7 +339,8 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Hot<'
     /// The bodies from `start` to `end` meet their partners.
     #[inline(always)]
     fn sweep(&mut self, mut start: usize, end: usize, first: usize, many: usize) {
-        while start + 2 * SIDE <= end {
+        // Chunk by chunk where a fused multiply-add is a function: that takes all of the time.
+        while (I::FUSES || !FUSED) && start + 2 * SIDE <= end {
             self.hold::<2>(start, first, many, None);
             start += 2 * SIDE;
         }
@@ -295,14 +354,20 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Hot<'
     }
 }
 
-impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Along<'_, D, LAW, ENERGY, FUSED> {
+impl<'a, I: Isa, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Along<'a, I, D, LAW, ENERGY, FUSED> {
+    fn on(_: I, law: Law, meeting: Meeting<'a>) -> Self {
+        Along { level: PhantomData, law, meeting }
+    }
+
     #[inline(always)]
     fn meet(&mut self) {
-        let Meeting { n, groups, round, sums, more, stop, potential: potentials, out } = &mut self.0;
+        let Meeting { n, groups, round, sums, more, stop, potential: potentials, out } = &mut self.meeting;
         let (n, more) = (*n, *more);
         let (width, stride) = (round.bodies.len(), round.partners.len());
         let Sums { after, before, potential } = &mut **sums;
-        let mut hot = Hot::<D, LAW, ENERGY, FUSED> {
+        let mut hot = Hot::<I, D, LAW, ENERGY, FUSED> {
+            level: PhantomData,
+            law: self.law,
             places: &round.places,
             partners: &round.partners,
             bodies: &round.bodies,
@@ -349,7 +414,7 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Along
     }
 }
 
-impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Task for Along<'_, D, LAW, ENERGY, FUSED> {
+impl<I: Isa, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Task for Along<'_, I, D, LAW, ENERGY, FUSED> {
     #[inline(always)]
     fn run(mut self) {
         self.meet();
@@ -360,13 +425,11 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Task 
 pub(crate) const fn law(number: u8) -> Law {
     match number {
         LOGARITHMIC => Law::Logarithmic,
-        NEWTON => Law::Newton,
-        _ => Law::Printed,
+        _ => Law::Newton,
     }
 }
 pub(crate) const LOGARITHMIC: u8 = 0;
 pub(crate) const NEWTON: u8 = 1;
-const PRINTED: u8 = 2;
 
 /// Which kernel meets the bodies: chosen once, called for each force.
 #[derive(Clone, Copy, Debug)]
@@ -409,20 +472,22 @@ impl Kernel {
             (2, _, false) => self.by::<2, LOGARITHMIC, false>(meeting),
             (_, Law::Newton, false) => self.by::<3, NEWTON, false>(meeting),
             (_, _, false) => self.by::<3, LOGARITHMIC, false>(meeting),
-            (2, Law::Logarithmic, true) => self.by::<2, LOGARITHMIC, true>(meeting),
             (2, Law::Newton, true) => self.by::<2, NEWTON, true>(meeting),
-            (2, Law::Printed, true) => self.by::<2, PRINTED, true>(meeting),
-            (_, Law::Logarithmic, true) => self.by::<3, LOGARITHMIC, true>(meeting),
+            (2, _, true) => self.by::<2, LOGARITHMIC, true>(meeting),
             (_, Law::Newton, true) => self.by::<3, NEWTON, true>(meeting),
-            (_, Law::Printed, true) => self.by::<3, PRINTED, true>(meeting),
+            (_, _, true) => self.by::<3, LOGARITHMIC, true>(meeting),
         }
     }
 
-    fn by<const D: usize, const LAW: u8, const ENERGY: bool>(self, m: Meeting) {
+    fn by<const D: usize, const LAW: u8, const ENERGY: bool>(self, meeting: Meeting) {
         match self.rounding {
-            Rounding::Twice => with_isa!(self.level, |isa| isa.run(Along::<D, LAW, ENERGY, false>(m))),
+            Rounding::Twice => {
+                with_isa!(self.level, |isa| isa.run(Along::<_, D, LAW, ENERGY, false>::on(isa, self.law, meeting)))
+            }
             // Without the instruction a fused multiply-add takes a hundred times as long, so the best of the machine is taken.
-            Rounding::Once => with_isa!(self.level.of_loops(), |isa| isa.run(Along::<D, LAW, ENERGY, true>(m))),
+            Rounding::Once => {
+                with_isa!(self.level.of_loops(), |isa| isa.run(Along::<_, D, LAW, ENERGY, true>::on(isa, self.law, meeting)))
+            }
         }
     }
 }

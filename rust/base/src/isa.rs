@@ -118,6 +118,8 @@ impl Level {
 
 /// A level as a type, so that hot loops are compiled for it. A value is the proof that this machine has the level.
 pub trait Isa: Copy + Send + Sync + 'static {
+    /// Whether a fused multiply-add is an instruction.
+    const FUSES: bool;
     /// The proof, if this machine has the level.
     fn detect() -> Option<Self>;
     /// Runs the task with the instructions of this level.
@@ -129,6 +131,8 @@ pub trait Isa: Copy + Send + Sync + 'static {
 pub struct Baseline;
 
 impl Isa for Baseline {
+    const FUSES: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
+
     fn detect() -> Option<Self> {
         Some(Baseline)
     }
@@ -169,6 +173,8 @@ mod x86 {
     }
 
     impl Isa for Avx2 {
+        const FUSES: bool = true;
+
         #[inline]
         fn detect() -> Option<Self> {
             Level::Avx2.here().then_some(Avx2(()))
@@ -183,6 +189,8 @@ mod x86 {
     }
 
     impl Isa for Avx512 {
+        const FUSES: bool = true;
+
         #[inline]
         fn detect() -> Option<Self> {
             Level::Avx512.here().then_some(Avx512(()))

@@ -2,12 +2,15 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::{
+    marker::PhantomData,
+    sync::atomic::{AtomicBool, Ordering::Relaxed},
+};
 
 use crate::{
     bodies::{LANES as SIDE, Law, Rounding},
-    forces::{Kernel, LOGARITHMIC, NEWTON, law},
-    isa::{Level, Task, with_isa},
+    forces::{Kernel, LOGARITHMIC, NEWTON, fuse, pulls, softened},
+    isa::{Isa, Level, Task, with_isa},
 };
 
 /// Whether to stop is asked for after so many bodies.
@@ -46,19 +49,24 @@ impl Pulled<'_> {
 
     fn rounded<const D: usize, const LAW: u8>(self, rounding: Rounding, level: Level) {
         match rounding {
-            Rounding::Twice => with_isa!(level, |isa| isa.run(Of::<D, LAW, false>(self))),
-            Rounding::Once => with_isa!(level.of_loops(), |isa| isa.run(Of::<D, LAW, true>(self))), // as of forces
+            Rounding::Twice => with_isa!(level, |isa| isa.run(Of::<_, D, LAW, false>::on(isa, self))),
+            Rounding::Once => with_isa!(level.of_loops(), |isa| isa.run(Of::<_, D, LAW, true>::on(isa, self))), // as of forces
         }
     }
 }
 
-struct Of<'a, const D: usize, const LAW: u8, const FUSED: bool>(Pulled<'a>);
+struct Of<'a, I, const D: usize, const LAW: u8, const FUSED: bool>(PhantomData<I>, Pulled<'a>);
 
-impl<const D: usize, const LAW: u8, const FUSED: bool> Task for Of<'_, D, LAW, FUSED> {
+impl<'a, I: Isa, const D: usize, const LAW: u8, const FUSED: bool> Of<'a, I, D, LAW, FUSED> {
+    fn on(_: I, pulled: Pulled<'a>) -> Self {
+        Of(PhantomData, pulled)
+    }
+}
+
+impl<I: Isa, const D: usize, const LAW: u8, const FUSED: bool> Task for Of<'_, I, D, LAW, FUSED> {
     #[inline(always)]
     fn run(self) {
-        let rounding = const { Rounding::of(FUSED) };
-        let Pulled { bodies, y, places, strengths, soft, stop, out, first } = self.0;
+        let Pulled { bodies, y, places, strengths, soft, stop, out, first } = self.1;
         let ((y, _), (places, _), (out, _)) = (y.as_chunks::<D>(), places.as_chunks::<D>(), out.as_chunks_mut::<D>());
         for some in bodies.chunks(STOPPED_AFTER) {
             if stop.load(Relaxed) {
@@ -74,21 +82,24 @@ impl<const D: usize, const LAW: u8, const FUSED: bool> Task for Of<'_, D, LAW, F
                 }
                 let mut sums = [[-0.0; SIDE]; D];
                 for (from, strength) in places.iter().zip(strengths) {
-                    let (mut d, mut pull) = ([[0.0; SIDE]; D], [0.0; SIDE]);
-                    let mut r2 = if FUSED { [soft; SIDE] } else { [0.0; SIDE] };
+                    let mut d = [[0.0; SIDE]; D];
                     for c in 0..D {
                         for l in 0..SIDE {
                             d[c][l] = from[c] - place[c][l];
-                            r2[l] = if c == 0 && !FUSED { d[c][l] * d[c][l] } else { rounding.plus(r2[l], d[c][l], d[c][l]) };
                         }
                     }
+                    let r2 = softened::<I, D, FUSED>(&d, soft);
+                    let mut pull = pulls::<I, LAW, FUSED>(&r2);
                     for l in 0..SIDE {
-                        let r2 = if FUSED { r2[l] } else { r2[l] + soft };
-                        pull[l] = const { law(LAW) }.pull(rounding, r2) * strength;
+                        pull[l] *= strength;
                     }
                     for c in 0..D {
+                        if FUSED {
+                            fuse::<I>(&mut sums[c], &d[c], &pull, None);
+                            continue;
+                        }
                         for l in 0..SIDE {
-                            sums[c][l] = rounding.plus(sums[c][l], d[c][l], pull[l]);
+                            sums[c][l] += d[c][l] * pull[l];
                         }
                     }
                 }
