@@ -10,7 +10,7 @@ use super::{
     Op,
     real::Precision,
     series,
-    symbol::{bits, on_tape, write},
+    symbol::{bits, constant, on_tape, write},
 };
 
 impl Number for Symbol {
@@ -20,7 +20,7 @@ impl Number for Symbol {
         on_tape(|tape| tape.precision()) == Precision::Single
     }
     fn of(x: f64) -> Symbol {
-        Symbol(on_tape(|tape| tape.constant(x)))
+        Symbol(constant(x))
     }
     fn sqrt(self) -> Symbol {
         Symbol::new(Op::Sqrt(self.0))

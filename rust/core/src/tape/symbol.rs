@@ -34,6 +34,8 @@ impl Symbol {
     }
 }
 
+/// Never inlined: systems and methods are made of thousands of operations, which are written here one at a time.
+#[inline(never)]
 pub(super) fn write(op: Op) -> Id {
     TAPE.with_borrow_mut(|tape| tape.push(op))
 }
@@ -111,7 +113,14 @@ pub(super) fn operation(id: Id) -> Op {
     TAPE.with_borrow(|tape| tape.op(id))
 }
 
+/// A constant.
+#[inline(never)]
+pub(super) fn constant(x: f64) -> Id {
+    TAPE.with_borrow_mut(|tape| tape.constant(x))
+}
+
 /// A constant of bits, as [`super::real::Precision::pattern`] has it.
+#[inline(never)]
 pub(super) fn bits(bits: u64) -> Id {
     TAPE.with_borrow_mut(|tape| tape.bits_of(bits))
 }
