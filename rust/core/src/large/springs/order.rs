@@ -74,7 +74,7 @@ impl Order {
             let [i, j] = ends_of(pairs, *spring);
             (i64::from(j) - i64::from(i), i, *spring)
         };
-        springs.sort_unstable_by_key(key);
+        springs.sort_by_key(key);
         let follows = |a: &u32, b: &u32| ends_of(pairs, *b) == ends_of(pairs, *a).map(|end| end + 1);
         let (long, short): (Vec<&[u32]>, Vec<&[u32]>) = springs.chunk_by(follows).partition(|run| run.len() >= SIDE);
         let mut runs = Vec::new();
