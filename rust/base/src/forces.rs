@@ -156,8 +156,6 @@ impl Sums {
 /// The bodies meet at the distances of one slab.
 struct Along<'a, I, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> {
     level: PhantomData<I>,
-    /// That of the potential; the force is that of `LAW`.
-    law: Law,
     meeting: Meeting<'a>,
 }
 
@@ -183,7 +181,6 @@ impl<const D: usize> Bodies<D> {
     fn meet<I: Isa, const LAW: u8, const ENERGY: bool, const FUSED: bool>(
         &mut self,
         p: &mut Partners<D>,
-        potential: Law,
         soft: f64,
         met: Option<&[u64; SIDE]>,
     ) {
@@ -197,15 +194,8 @@ impl<const D: usize> Bodies<D> {
         let pull = pulls::<I, LAW, FUSED>(&r2);
         if ENERGY {
             let mut more = [0.0; SIDE];
-            // Two laws have the same force, so that one kernel serves both.
-            if LAW != NEWTON && potential == Law::Printed {
-                for l in 0..SIDE {
-                    more[l] = Law::Printed.potential(r2[l], pull[l], p.strength[l]);
-                }
-            } else {
-                for l in 0..SIDE {
-                    more[l] = const { law(LAW) }.potential(r2[l], pull[l], p.strength[l]);
-                }
+            for l in 0..SIDE {
+                more[l] = const { law(LAW) }.potential(r2[l], pull[l], p.strength[l]);
             }
             add(&mut self.well, more, met);
         }
@@ -264,7 +254,6 @@ fn add(sums: &mut Chunk, mut more: Chunk, met: Option<&[u64; SIDE]>) {
 /// The slices that the hot loop goes through, taken once.
 struct Hot<'a, I, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> {
     level: PhantomData<I>,
-    law: Law,
     places: &'a [f64],
     partners: &'a [f64],
     bodies: &'a [f64],
@@ -291,7 +280,7 @@ impl<I: Isa, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: boo
             p.pull[c] = load(self.before, c * stride + at);
         }
         for t in A..B {
-            held[t].meet::<I, LAW, ENERGY, FUSED>(&mut p, self.law, self.soft, if t == U - 1 { met } else { None });
+            held[t].meet::<I, LAW, ENERGY, FUSED>(&mut p, self.soft, if t == U - 1 { met } else { None });
         }
         for c in 0..D {
             store(self.before, c * stride + at, &p.pull[c]);
@@ -355,8 +344,8 @@ impl<I: Isa, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: boo
 }
 
 impl<'a, I: Isa, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: bool> Along<'a, I, D, LAW, ENERGY, FUSED> {
-    fn on(_: I, law: Law, meeting: Meeting<'a>) -> Self {
-        Along { level: PhantomData, law, meeting }
+    fn on(_: I, meeting: Meeting<'a>) -> Self {
+        Along { level: PhantomData, meeting }
     }
 
     #[inline(always)]
@@ -367,7 +356,6 @@ impl<'a, I: Isa, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED:
         let Sums { after, before, potential } = &mut **sums;
         let mut hot = Hot::<I, D, LAW, ENERGY, FUSED> {
             level: PhantomData,
-            law: self.law,
             places: &round.places,
             partners: &round.partners,
             bodies: &round.bodies,
@@ -425,11 +413,13 @@ impl<I: Isa, const D: usize, const LAW: u8, const ENERGY: bool, const FUSED: boo
 pub(crate) const fn law(number: u8) -> Law {
     match number {
         LOGARITHMIC => Law::Logarithmic,
-        _ => Law::Newton,
+        NEWTON => Law::Newton,
+        _ => Law::Printed,
     }
 }
 pub(crate) const LOGARITHMIC: u8 = 0;
 pub(crate) const NEWTON: u8 = 1;
+const PRINTED: u8 = 2;
 
 /// Which kernel meets the bodies: chosen once, called for each force.
 #[derive(Clone, Copy, Debug)]
@@ -472,21 +462,23 @@ impl Kernel {
             (2, _, false) => self.by::<2, LOGARITHMIC, false>(meeting),
             (_, Law::Newton, false) => self.by::<3, NEWTON, false>(meeting),
             (_, _, false) => self.by::<3, LOGARITHMIC, false>(meeting),
+            (2, Law::Logarithmic, true) => self.by::<2, LOGARITHMIC, true>(meeting),
             (2, Law::Newton, true) => self.by::<2, NEWTON, true>(meeting),
-            (2, _, true) => self.by::<2, LOGARITHMIC, true>(meeting),
+            (2, Law::Printed, true) => self.by::<2, PRINTED, true>(meeting),
+            (_, Law::Logarithmic, true) => self.by::<3, LOGARITHMIC, true>(meeting),
             (_, Law::Newton, true) => self.by::<3, NEWTON, true>(meeting),
-            (_, _, true) => self.by::<3, LOGARITHMIC, true>(meeting),
+            (_, Law::Printed, true) => self.by::<3, PRINTED, true>(meeting),
         }
     }
 
     fn by<const D: usize, const LAW: u8, const ENERGY: bool>(self, meeting: Meeting) {
         match self.rounding {
             Rounding::Twice => {
-                with_isa!(self.level, |isa| isa.run(Along::<_, D, LAW, ENERGY, false>::on(isa, self.law, meeting)))
+                with_isa!(self.level, |isa| isa.run(Along::<_, D, LAW, ENERGY, false>::on(isa, meeting)))
             }
             // Without the instruction a fused multiply-add takes a hundred times as long, so the best of the machine is taken.
             Rounding::Once => {
-                with_isa!(self.level.of_loops(), |isa| isa.run(Along::<_, D, LAW, ENERGY, true>::on(isa, self.law, meeting)))
+                with_isa!(self.level.of_loops(), |isa| isa.run(Along::<_, D, LAW, ENERGY, true>::on(isa, meeting)))
             }
         }
     }
