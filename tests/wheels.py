@@ -20,7 +20,7 @@ from build_wheels import WHEELS, Wheel  # noqa: E402
 
 VERSION = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]["version"]
 #: How long a wheel may be, in bytes: a tenth above the longest.
-LENGTH = 3_000_000
+LENGTH = 3_600_000
 #: The name of the compiled core. Where one serves several versions of Python, it says so, or nothing on Windows.
 CORES = {"linux": "_core.{}.so", "macos": "_core.abi3.so", "windows": "_core.pyd"}
 #: What a core may load: what every system has. musl is libc.so.
