@@ -37,6 +37,13 @@ FITS: dict[str, tuple[Callable[[Any], Any], Any, Any, int, int]] = {
         10,
         3,
     ),
+    "EXP_QUICK": (
+        lambda r: (mp.exp(r) - 1 - r) / r**2,
+        -mp.log(2) / 2,
+        mp.log(2) / 2,
+        10,
+        2,
+    ),
     "EXP2": (
         lambda r: (mp.mpf(2) ** r - 1 - r * mp.log(2)) / r**2,
         -mp.mpf(1) / 2,

@@ -47,15 +47,14 @@ impl Scaled {
             };
             for (inner, factor) in [(a, b), (b, a)] {
                 let once = |id: Id| uses[id as usize] == 1;
-                let Some(Product { x, n, shifted, low }) = product(body, inner, factor) else { continue };
+                let Some(Product { x, n, shifted }) = product(body, inner, factor) else { continue };
                 if ![inner, factor, shifted].into_iter().all(once) {
                     continue;
                 }
+                uses[n as usize] += 1;
                 for part in [factor, shifted] {
-                    made.replaced[part as usize] = true;
-                    uses[part as usize] = 0;
+                    made.remove(part, body, uses);
                 }
-                uses[low as usize] -= 1;
                 // In a sum the product is where the first of the two was.
                 let at = if sum.is_some() { inner as usize } else { id };
                 made.of[at] = Some([x, n]);
@@ -74,6 +73,19 @@ impl Scaled {
         }
         made
     }
+
+    /// Takes away a value that nothing uses, and what only it uses.
+    fn remove(&mut self, id: Id, body: &Body, uses: &mut [u32]) {
+        self.replaced[id as usize] = true;
+        uses[id as usize] = 0;
+        let (operands, n) = body.ops[id as usize].operands();
+        for of in &operands[..n] {
+            uses[*of as usize] -= 1;
+            if uses[*of as usize] == 0 && !body.ops[*of as usize].is_leaf() {
+                self.remove(*of, body, uses);
+            }
+        }
+    }
 }
 
 fn is_far(body: &Body, c: Id) -> bool {
@@ -88,7 +100,6 @@ struct Product {
     x: Id,
     n: Id,
     shifted: Id,
-    low: Id,
 }
 
 /// (x·2ⁿ⁺¹⁰⁰)·2⁻¹⁰⁰ where `low` is true, else (x·2ⁿ⁻¹)·2.
@@ -101,12 +112,16 @@ fn product(body: &Body, inner: Id, factor: Id) -> Option<Product> {
     }
     [(a, b), (b, a)].into_iter().find_map(|(x, shifted)| {
         let Op::ShiftUp(turn, 52) = op(shifted) else { return None };
-        // n is what is left of the sum in whose low bits the exponent stands.
-        let n = (turn..inner).find(|n| match op(*n) {
-            Op::Sub(a, magic) => a == turn && is_magic(body, magic, low),
-            _ => false,
-        })?;
-        Some(Product { x, n, shifted, low })
+        // n is what is left of the sum in whose low bits the exponent stands, or is itself added to what makes that.
+        let is_rounded = |n: Id| matches!(op(n), Op::Sub(_, magic) if is(magic, MAGIC));
+        let n = match op(turn) {
+            Op::Add(n, magic) | Op::Add(magic, n) if is_rounded(n) && is_magic(body, magic, low) => n,
+            _ => (turn..inner).find(|n| match op(*n) {
+                Op::Sub(a, magic) => a == turn && is_magic(body, magic, low),
+                _ => false,
+            })?,
+        };
+        Some(Product { x, n, shifted })
     })
 }
 
