@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import hypothesis
 import pytest
+
+# How long a case takes depends on what else the machine does.
+hypothesis.settings.register_profile("stepwell", deadline=None)
+hypothesis.settings.load_profile("stepwell")
 
 pytest_plugins = ["pytester", "support.browser", "support.complete", "support.families", "support.snapshots"]
 
