@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import stepwell as sw
 
-from ..own.equations import EQUATIONS, Equation
+from ..own.equations import EQUATIONS, Equation, pendulum
 from ..workloads import SINGLE_KIND, w2_pendulums
 from . import Contestant, Ready, Workload, threads
 
@@ -45,6 +45,11 @@ def cloth(data) -> sw.System:
 def own(equation: Equation, data) -> sw.System:
     """Own equations with the members' parameters."""
     return equation.system(**{name: data[name] for name in equation.own})
+
+
+def brief(data) -> sw.System:
+    """Own pendulums with a short sine, as the blocks of numba have one."""
+    return sw.system(quick_sines=True)(pendulum.function)(omega=data["omega"])
 
 
 def built_in(data) -> sw.System:
@@ -100,6 +105,10 @@ all_of_them = {"shared_cluster_leapfrog": kernels(threads=threads())["shared_clu
 CONTESTANTS = [
     Contestant("stepwell, 1 thread", kernels(threads=1)),
     Contestant("stepwell, fused, 1 thread", fused),
+    Contestant(
+        "stepwell, fused, quick sines, 1 thread",
+        {"own_pendulum": functools.partial(made, brief, "rk4", {"threads": 1, "fused": True})},
+    ),
     Contestant("built-in pendulum", {"own_pendulum": functools.partial(made, built_in, "rk4", {"threads": 1})}, alike=False),
     Contestant(f"stepwell, up to {threads()} threads", as_many_as_pay | all_of_them),
 ]
