@@ -143,9 +143,9 @@ class _Run:
             self.observer.take(reduced)
 
     def call(self, name: str, items: int, group: int, *arguments: Any) -> None:
-        """Start a kernel."""
+        """Start a kernel: drivers of CPUs compile it anew for each size of groups, others choose a good one for few items."""
         size = -(-items // group) * group
-        local = None if self.machine.is_cpu or group == 1 else group
+        local = group if self.machine.is_cpu or group > 1 else None
         self.machine.start(self.program.kernel(name), size, local, *arguments)
 
     def share(self, share: Share) -> None:

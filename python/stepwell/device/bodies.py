@@ -16,7 +16,7 @@ from ..model.parameters import rows
 from ..reference.systems.nbody import LANES, partners
 from . import blocks, forces, keeping, promise
 from .blocks import HERE
-from .opencl import Machine
+from .opencl import Machine, Programs
 from .stages import MOST_READ
 
 #: From so many operations of a step on, or so many bodies, it is made so, if all that the run asks for is there: one kernel of
@@ -97,7 +97,7 @@ class Bodies:
 
     Attributes:
         stages: the stages of the method, by name.
-        program: their kernels.
+        program: their kernels; those of a method, of a control and of the forces are built apart, for runs have other ones.
         control: what keeps the energy, or None.
         sizes: how many numbers of a member v and y have, the method keeps, a controller remembers.
         carries: whether the method has a carry instead of v.
@@ -129,9 +129,11 @@ class Bodies:
         self.carries = method.carry is not None
         self.count = self.members * self.of_member
         with_energies = self.control is not None or "energy" in plan.record
-        text = forces.text_of(self.dim, system.force, energies=with_energies, nearest="closest" in plan.record)
-        of_control = [] if self.control is None else [keeping.text_of(self.control, self.dim)]
-        self.program = machine.program("\n".join([text, *of_control, *(stage.text for stage in self.stages.values())]))
+        texts = forces.texts_of(self.dim, system.force, energies=with_energies, nearest="closest" in plan.record)
+        if self.control is not None:
+            texts.append(keeping.text_of(self.control, self.dim))
+        texts.append("\n".join(stage.text for stage in self.stages.values()))
+        self.program = Programs(machine, [f"{forces.BEFORE}{text}" for text in texts])
         self.massive = np.asarray(system.massive, np.int32)
         massless = np.asarray(system.massless, np.int32)
         self.n, self.alone = len(self.massive), len(massless)

@@ -124,7 +124,6 @@ class _Run:
         if self.observer is not None:
             self.every, self.reduced = self.observer.every, machine.room(8 * self.observer.size * members)
         self.group = 64 if members >= 64 else 1
-        self.size = -(-members // self.group) * self.group
         self.table = rooms.room("table", 0)
         entries = len(stages.texts["step"].entries)
         #: The steps of the next launch, and the most of any: their table must fit.
@@ -132,9 +131,8 @@ class _Run:
         self.most_steps = min(MOST_STEPS, max(1, MOST_TABLE // max(1, 8 * entries)))
 
     def call(self, name: str, size: int, *arguments: Any) -> None:
-        """Start a kernel."""
-        group = self.group if size % self.group == 0 and not self.machine.is_cpu else None
-        self.machine.start(self.program.kernel(name), size, group, *arguments)
+        """Start a kernel of so many work items, in whole groups: drivers of CPUs compile it anew for each size of groups."""
+        self.machine.start(self.program.kernel(name), -(-size // self.group) * self.group, self.group, *arguments)
 
     def make(self) -> bool:
         """Make it."""
@@ -143,7 +141,7 @@ class _Run:
             self.call("prepare", 1, self.numbers.sources, self.numbers.uniforms)
             self.numbers.is_prepared = True
         if not arrays.carried and "start" in self.stages.texts:
-            self.call("start", self.size, *self.numbers.arguments, np.int64(plan.first), *of_time, self.now)
+            self.call("start", self.members, *self.numbers.arguments, np.int64(plan.first), *of_time, self.now)
         at = 0
         if self.every is not None:
             self.steps(Launch(1, 0, True), 0)
@@ -192,7 +190,7 @@ class _Run:
         of_time = np.float64(plan.t0), np.float64(plan.dt)
         if entries and count:
             self.table = self.rooms.room("table", count * entries * max(self.bytes, 8))
-            self.call("table", count, *self.numbers.arguments, np.int64(first), *of_time, self.table)
+            self.call("table", count, *self.numbers.arguments, np.int64(count), np.int64(first), *of_time, self.table)
         if launch.saves:
             rows = (sizes["v"], sizes["y"], sizes["recorded"])
             self.saved = [
@@ -203,7 +201,7 @@ class _Run:
         counts = (np.int64(first), np.int64(launch.intervals), np.int64(launch.length), np.int32(launch.saves))
         since = np.int32(done > 0)
         self.call(
-            "steps", self.size, *self.numbers.arguments, *counts, *of_time, since, self.kind(most), self.table,
+            "steps", self.members, *self.numbers.arguments, *counts, *of_time, since, self.kind(most), self.table,
             self.now, self.next, *self.saved, self.bad, *self.of_observer(),
         )  # fmt: skip
         if launch.saves:
@@ -277,11 +275,18 @@ def _kernels(stages: Stages, observer: Observer | None) -> str:
     entries = len(step.entries)
     out = [stages.head]
     uniforms = [line for text in texts.values() for line in text.uniforms]
-    out += ["__kernel void prepare(__global const double *restrict sources, __global real *restrict uniforms) {", *uniforms, "}"]
+    out += [
+        "__kernel void prepare(__global const double *restrict sources, __global real *restrict uniforms) {",
+        "if (get_global_id(0) > 0) return;",
+        *uniforms,
+        "}",
+    ]
     if entries:
         out += [
-            f"__kernel void table({ARGUMENTS}, const long first, const double t0, const double h, __global bits *table) {{",
+            f"__kernel void table({ARGUMENTS}, const long count, const long first, const double t0, const double h, "
+            "__global bits *table) {",
             "const long g = get_global_id(0);",
+            "if (g >= count) return;",
             "const double t = t0 + (double)(first + g) * h;",
             *step.moment,
             *(

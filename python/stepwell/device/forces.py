@@ -20,15 +20,15 @@ from .printer import HEAD, TYPES, Printer
 SUMS = 3
 
 
-def text_of(dim: int, force: str, *, energies: bool, nearest: bool) -> str:
-    """The text of the kernels, with those of energies and of the nearest bodies or without."""
+def texts_of(dim: int, force: str, *, energies: bool, nearest: bool) -> list[str]:
+    """The texts of the kernels, with those of energies and of the nearest bodies or without: what they have in common is one."""
     law = NBody(1.0, force, dim, np.ones(1), np.ones(1), np.zeros(1))
-    texts = [HEAD + TYPES[False], PLACES, _pairs(dim, law, wells=False), _gather(dim), _pulled(dim, law), AROUND]
+    texts = ["\n".join([PLACED, _pairs(dim, law, wells=False), _gather(dim), _pulled(dim, law), AROUND])]
     if energies:
-        texts += [_pairs(dim, law, wells=True), _shares(dim), PARTS]
+        texts.append("\n".join([_pairs(dim, law, wells=True), _shares(dim), PARTS]))
     if nearest:
         texts.append(_nearest(dim))
-    return "\n".join(texts)
+    return texts
 
 
 def _meets(dim: int, law: Any, partner: str, sums: str, *, forward: bool, wells: bool = False) -> list[str]:
@@ -59,15 +59,18 @@ def _begun(dim: int, *names: str) -> list[str]:
     return [f"real {name}{c} = -0.0;" for name in names for c in range(dim)]
 
 
-#: Puts a number of a place where the forces read it; and all places of a block.
-PLACES = """
+#: What stands before each text: its numbers, and what puts one of a place where the forces read it.
+BEFORE = f"""{HEAD}{TYPES[False]}
 static inline void put_place(real x, long g, int all, int n, __global const int *ranks, __global real *places,
-                             __global real *round) {
+                             __global real *round) {{
 const long row = g / all;
 const int rank = ranks[g % all];
 places[g] = x;
-if (rank >= 0) { round[row * 2 * n + rank] = x; round[row * 2 * n + n + rank] = x; }
-}
+if (rank >= 0) {{ round[row * 2 * n + rank] = x; round[row * 2 * n + n + rank] = x; }}
+}}
+"""
+#: Puts all places of a block there.
+PLACED = """
 __kernel void placed(const long count, __global const real *y, const int all, const int n, __global const int *ranks,
 __global real *places, __global real *round) {
 const long g = get_global_id(0);

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 import warnings
 from collections import OrderedDict
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
@@ -25,6 +26,9 @@ MOST_PROGRAMS = 64
 ROUNDS_SINGLE = "-cl-fp32-correctly-rounded-divide-sqrt"
 #: The errors of OpenCL that a full device raises: drivers allocate when an array is made, or when it is used first.
 FULL = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY", "INVALID_BUFFER_SIZE")
+
+#: The name of a kernel in a text.
+KERNEL = re.compile(r"__kernel void (\w+)\(")
 
 #: Filters of warnings are those of the process: one thread at a time changes them.
 _SILENCE = threading.Lock()
@@ -237,6 +241,32 @@ class Machine:
                 f"({str(error).splitlines()[0]}); it has {in_bytes(self.described.memory)} in all; split the batch, or use "
                 f"device='cpu'"
             ) from None
+
+
+class Programs:
+    """Kernels of several texts: each text is built once, whatever others stand beside it in a run.
+
+    Attributes:
+        lock: what a run holds that starts kernels.
+    """
+
+    def __init__(self, machine: Machine, texts: list[str]) -> None:
+        built = [(text, machine.program(text)) for text in texts]
+        self._programs = {name: program for text, program in built for name in KERNEL.findall(text)}
+        self._locks = [program.lock for _, program in built]
+
+    def kernel(self, name: str) -> Any:
+        """A kernel, by its name."""
+        return self._programs[name].kernel(name)
+
+    @property
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """The locks of all of them, in their order, which is that of every run."""
+        with ExitStack() as held:
+            for each in self._locks:
+                held.enter_context(each)
+            yield
 
 
 class Program:
