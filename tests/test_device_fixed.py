@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 import warnings
@@ -13,6 +14,7 @@ import stepwell as sw
 from stepwell import _core
 from support import recorded
 from support.devices import assert_same, needs_device
+from support.families import family
 
 pytestmark = needs_device
 
@@ -51,11 +53,13 @@ def same(system: Any, method: str, **options: Any) -> Any:
     return got
 
 
-#: Of the recorded runs those whose kernels are compiled in a second; every so many of them here, all by `make test-long`.
+#: Of the recorded runs those whose kernels are compiled in a second; a few of them here, all by `make test-long`.
 SHORT = [
     name for name in recorded.written() if not any(word in name for word in ("large", "bodies", "tolerance", "power", "fused"))
 ]
-SOME = SHORT[::9]
+
+#: All kinds of batches, worlds, records and starts are among them; methods and systems are in ``test_device_proof.py``.
+SOME = (*SHORT[27::36], "pefrl, chain of five, direct, in pieces", "leapfrog, free, past some limits")
 
 
 def of_recorded(name: str, monkeypatch: Any) -> None:
@@ -63,14 +67,8 @@ def of_recorded(name: str, monkeypatch: Any) -> None:
     assert recorded.hashes(recorded.made(recorded.runs()[name])) == recorded.written()[name], name
 
 
-@pytest.mark.parametrize("name", SOME)
+@pytest.mark.parametrize("name", family(SHORT, SOME.__contains__))
 def test_recorded_runs(name: str, monkeypatch: Any) -> None:
-    of_recorded(name, monkeypatch)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", [name for name in SHORT if name not in SOME])
-def test_all_recorded_runs(name: str, monkeypatch: Any) -> None:
     of_recorded(name, monkeypatch)
 
 
@@ -79,20 +77,45 @@ def test_all_recorded_runs(name: str, monkeypatch: Any) -> None:
 def test_precisions(dtype: str, fused: bool) -> None:
     rho = np.linspace(20.0, 30.0, B)
     same(lorenz(rho=rho), "rk4", y=start(3), dt=0.01, steps=205, every=10, dtype=dtype, fused=fused)
-    same(
-        everything(k=np.linspace(0.5, 2.0, B)), "false_euler", v=start(), y=start(), dt=0.01, steps=100, dtype=dtype, fused=fused
-    )
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-def test_inputs(dtype: str) -> None:
-    """Sinusoids, samples that all have in common, and samples of each member."""
-    rng = np.random.default_rng(2)
-    for values in (rng.normal(size=40), rng.normal(size=(40, B))):
-        for interpolation in ("hold", "linear"):
-            u = sw.Sampled(values, 0.05, interpolation=interpolation)
-            for method in ("rk4", "leapfrog" if interpolation == "hold" else "false_heun"):
-                same(driven(u=u), method, v=start(), y=start(), dt=0.02, steps=90, every=7, dtype=dtype, start_step=3)
+#: Functions with each type of numbers, and with each kind of rounding.
+FUNCTIONS = family(itertools.product(("float64", "float32"), (False, True)), lambda dtype, fused: (dtype == "float32") == fused)
+
+
+@pytest.mark.parametrize(("dtype", "fused"), FUNCTIONS)
+def test_functions(dtype: str, fused: bool) -> None:
+    system = everything(k=np.linspace(0.5, 2.0, B))
+    same(system, "false_euler", v=start(), y=start(), dt=0.01, steps=100, dtype=dtype, fused=fused)
+
+
+#: Each kind of samples in each way, by a method that looks at the ends of a step and by one that looks between them.
+INPUTS = [
+    (kind, interpolation, method, dtype)
+    for kind in ("common", "own")
+    for interpolation, methods in (("hold", ("leapfrog", "rk4")), ("linear", ("false_heun", "rk4")))
+    for method in methods
+    for dtype in ("float64", "float32")
+]
+FEW_INPUTS = [
+    ("common", "hold", "leapfrog", "float64"),
+    ("common", "linear", "false_heun", "float32"),
+    ("own", "hold", "leapfrog", "float32"),
+    ("own", "linear", "rk4", "float64"),
+]
+
+
+@pytest.mark.parametrize(("kind", "interpolation", "method", "dtype"), family(INPUTS, lambda *each: each in FEW_INPUTS))
+def test_sampled_inputs(kind: str, interpolation: Any, method: str, dtype: str) -> None:
+    """Samples that all have in common, and samples of each member."""
+    values = np.random.default_rng(2).normal(size=(40, B))
+    u = sw.Sampled(values if kind == "own" else values[:, 0], 0.05, interpolation=interpolation)
+    same(driven(u=u), method, v=start(), y=start(), dt=0.02, steps=90, every=7, dtype=dtype, start_step=3)
+
+
+@pytest.mark.parametrize("dtype", family(["float64", "float32"], lambda dtype: dtype == "float64"))
+def test_sinusoids(dtype: str) -> None:
+    """Of each member; float32 has the same statements, in other types."""
     same(driven(u=sw.Sinusoid(0.2, np.linspace(1, 2, B))), "rk4", v=start(), y=start(), dt=0.02, steps=90, dtype=dtype)
 
 
@@ -101,8 +124,14 @@ def test_times_of_each_member() -> None:
     same(driven(u=u), "rk4", v=start(), y=start(), dt=0.02, steps=60, every=20, t0=np.linspace(-1.0, 1.0, B))
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-@pytest.mark.parametrize("method", ["rk4", "leapfrog", "verlet"])
+#: Velocities of a state, of one carry and of another; one of them in float32, where a larger number is doubted.
+DIVERGING = family(
+    itertools.product(("rk4", "leapfrog", "verlet"), ("float64", "float32")),
+    lambda method, dtype: dtype == "float64" or method == "verlet",
+)
+
+
+@pytest.mark.parametrize(("method", "dtype"), DIVERGING)
 def test_divergence_of_each_member(method: str, dtype: str) -> None:
     """The first step that was not finite, also of velocities that are computed from a carry, and across launches."""
     omega = np.geomspace(0.5, 3000.0, B)
@@ -147,6 +176,7 @@ def test_one_member_and_no_batch() -> None:
     same(driven(k=[2.0]), "rk4", v=0.1, y=1.0, dt=0.02, steps=80)
 
 
+@pytest.mark.long
 def test_a_step_of_five_thousand_operations() -> None:
     @sw.system
     def chain(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
@@ -261,6 +291,30 @@ def test_every_operation_of_a_tape_is_printed() -> None:
 
     known = {*printer.ARITHMETIC, *printer.COMPARISONS, *printer.OF_BITS, "choose", "shift up", "shift down"}
     assert {name for name, operands, *_ in _core.tape_operations() if operands} - known == {"sample", "copy", "gather"}
+
+
+@pytest.mark.parametrize("options", [{"dt": 0.02, "steps": 70}, {"tolerance": 1e-5, "at": [0.5]}], ids=["fixed", "adaptive"])
+def test_groups_have_one_size(options: dict[str, Any], monkeypatch: Any) -> None:
+    """Drivers of CPUs compile a kernel anew for each, which takes longer than many runs: not for other numbers of members."""
+    from stepwell.device import device_of, opencl
+
+    machine = device_of("opencl")
+    assert machine is not None
+    if not machine.is_cpu:
+        pytest.skip("others choose a size for few members")
+    sizes: set[Any] = set()
+    begin = opencl.Machine.start
+
+    def noted(self: Any, kernel: Any, size: int, group: int | None, *arguments: Any) -> None:
+        if kernel.function_name != "prepare":
+            sizes.add(group)
+        begin(self, kernel, size, group, *arguments)
+
+    monkeypatch.setattr(opencl.Machine, "start", noted)
+    for members, expected in ((70, 64), (257, 64), (3, 1), (5, 1)):
+        sizes.clear()
+        sw.integrate(driven(u=0.1), "merson", v=start()[:members], y=start()[:members], device="opencl", **options)
+        assert sizes == {expected}
 
 
 def test_progress_and_pieces(monkeypatch: Any) -> None:

@@ -1,9 +1,9 @@
 """Every method, system, control and record that the comparison of graphs covers has the bits of the core on a device of OpenCL.
 
 That comparison shows that core and reference are one graph; these runs show that what is printed of the graph and compiled
-computes it, among them with infinite, subnormal and missing numbers. Of thousands of runs, most of a second, some are made that
-show every method, every family of systems, every control and record, each with all kinds of numbers and steps; by
-``make test-long`` the others.
+computes it, among them with infinite, subnormal and missing numbers. Of thousands of runs, most of a second, few are made that
+show every method, every family of systems, every control and record; by ``make test-long`` those that show each of them with
+all kinds of numbers and steps, and the others.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from support.devices import assert_same, needs_device
 pytestmark = needs_device
 
 CHOSEN = device_proof.chosen()
+#: Each method, family, control, record and kind of numbers once; the long run has the pairs of them.
+FEW = device_proof.few(CHOSEN)
 
 
 def assert_proven(proof: Proof) -> None:
@@ -46,7 +48,7 @@ def assert_proven(proof: Proof) -> None:
         assert not wrong.any(), (str(proof), name, np.argwhere(wrong)[:3].tolist(), one[wrong][:3], other[wrong][:3])
 
 
-@pytest.mark.parametrize("proof", [] if families.LONG else sorted(CHOSEN, key=str), ids=str)
+@pytest.mark.parametrize("proof", families.family([(each,) for each in sorted(CHOSEN, key=str)], FEW.__contains__, ids=str))
 def test_some(proof: Proof) -> None:
     assert_proven(proof)
 
@@ -65,6 +67,7 @@ def test_every_method_family_control_and_record_is_among_the_chosen() -> None:
     shown = {each for proof in CHOSEN for each in proof.shows()}
     missing = {each for proof in device_proof.every() for each in proof.shows() if each not in shown}
     assert not missing
+    assert {each for proof in FEW for each in proof.parts()} == {each for proof in CHOSEN for each in proof.parts()}
 
 
 @pytest.mark.mutant

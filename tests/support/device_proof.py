@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -128,6 +128,14 @@ class Proof(NamedTuple):
         ways = ("numbers", self.single, self.fused), ("steps", self.adaptive)
         return {*itertools.product(words, ways), *((family, each) for each in system.quantities)}
 
+    def parts(self) -> set[Any]:
+        """The same by itself: methods and families with each kind of steps, controls with each precision."""
+        system = made(self.system)
+        family = type(system).__name__
+        words = {("method", self.method, self.start, self.adaptive), ("family", family, self.adaptive)}
+        words |= {("control", self.control, self.single), ("numbers", self.single, self.fused, self.adaptive)}
+        return words | {(family, each) for each in system.quantities}
+
 
 def _strange(rng: np.random.Generator, block: Any, kind: Any) -> Any:
     """A block of a state with strange numbers among those of most members."""
@@ -160,12 +168,21 @@ def _either(proof: Proof) -> Proof:
 
 def chosen() -> set[Proof]:
     """Some that show all of it, those whose steps are long left out: first those that show much that is new, then the rest."""
+    return _covering(sorted(every(), key=number), Proof.shows, lambda proof: not proof.refusal() and proof.operations() <= SHORT)
+
+
+def few(among: set[Proof]) -> set[Proof]:
+    """Those that show each method, family, control, record and kind of numbers, though not in each pair; short steps first."""
+    return _covering(sorted(among, key=lambda proof: (proof.operations(), str(proof))), Proof.parts, lambda _: True)
+
+
+def _covering(proofs: list[Proof], shows: Callable[[Proof], set[Any]], is_able: Callable[[Proof], bool]) -> set[Proof]:
+    """Those that are able that show what all show, first those that show much that is new."""
     shown: set[Any] = set()
-    few = set()
-    left = sorted(every(), key=number)
+    taken = set()
     for least in (7, 5, 3, 1):
-        for proof in left:
-            if len(proof.shows() - shown) >= least and not proof.refusal() and proof.operations() <= SHORT:
-                shown |= proof.shows()
-                few.add(proof)
-    return few
+        for proof in proofs:
+            if len(shows(proof) - shown) >= least and is_able(proof):
+                shown |= shows(proof)
+                taken.add(proof)
+    return taken
