@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import pickle
 import shutil
 import warnings
 from dataclasses import replace
@@ -18,7 +16,6 @@ import stepwell as sw
 from stepwell.views.explorer import sliders
 from stepwell.views.explorer.page import WEB
 
-from support import families
 from support.abroad import bits, executed
 from support.cases import number
 
@@ -63,16 +60,8 @@ CHANGED: dict[str, tuple[str, dict[str, float], Any]] = {
 
 @cache
 def page() -> sw.Explorer:
-    """The page with all scenes and methods, whose data one worker makes for all."""
-    shown = sw.explore()
-    if families.SHARED is not None:
-        kept = families.SHARED / "explorer.pickle"
-        if not kept.exists():
-            own = kept.with_suffix(f".{os.getpid()}")
-            own.write_bytes(pickle.dumps(shown.data))
-            own.replace(kept)
-        vars(shown)["data"] = pickle.loads(kept.read_bytes())
-    return shown
+    """The page with all scenes and methods."""
+    return sw.explore()
 
 
 def scene_of(name: str) -> sw.Scene:

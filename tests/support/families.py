@@ -7,16 +7,12 @@ mistake that is made on purpose, is marked ``mutant``: the long run makes them a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 #: Whether this is the long run. Read it when parameters are made, which is after pytest has read its options.
 LONG = False
-
-#: A folder that the workers of one run share, if there are several.
-SHARED: Path | None = None
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -25,10 +21,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
-    global LONG, SHARED
+    global LONG
     LONG = config.getoption("--long")
-    if hasattr(config, "workerinput"):
-        SHARED = Path(config.option.basetemp).parent
     config.option.markexpr = config.option.markexpr or ("long or mutant" if LONG else "not (long or mutant)")
 
 

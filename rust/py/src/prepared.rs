@@ -52,7 +52,8 @@ struct Run<T> {
     y: Vec<T>,
 }
 
-/// A prepared run of so many members, from starts whose blocks have these shapes, none for one number; None if it takes so long that preparation does not matter.
+/// A prepared run of so many members, from starts whose blocks have these shapes, none for one number; None if it takes so long
+/// that preparation does not matter.
 #[pyfunction]
 pub(crate) fn prepared(
     py: Python<'_>,
@@ -138,7 +139,8 @@ impl Prepared {
     }
 }
 
-/// Takes the numbers of a block, all finite, and whether it could: from one number for all, or an array of floats of 64 or 32 bits of this shape.
+/// Takes the numbers of a block, all finite, and whether it could: from one number for all, or an array of this shape, of floats
+/// of 64 or 32 bits.
 pub(crate) fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut [T]) -> bool {
     if let Ok(number) = block.cast_exact::<PyFloat>() {
         if !shape.is_empty() {
