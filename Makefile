@@ -48,7 +48,7 @@ docs: .venv/docs ## build the site into out/docs, without a network; a warning i
 
 test: ## set up, and run the tests: Rust, Python, examples, docs, formatting, lints, types, stubs
 	$(MAKE) --no-print-directory -j2 lint rust-test python-beside
-	$(PYTHON_TEST) tests/test_interrupt.py
+	$(PYTHON_TEST) tests/runs/test_interrupt.py
 
 wheel: .venv/wheel ## build the release wheel into dist/
 	@ls -l dist/*.whl
@@ -93,7 +93,7 @@ licences: ## write the licences of the crates in a wheel into THIRD-PARTY.txt
 # Recorded bits cover every method, system and form; of the tests of kernels those that start no program and measure no time. The
 # folder of its builds is its own, so that they wait for no other.
 RECORDED_ON_AARCH64 := recorded
-TESTS_ON_AARCH64 = tests/test_recorded_bits.py tests/test_kernels.py -k "$(RECORDED_ON_AARCH64) or threads or parent or border"
+TESTS_ON_AARCH64 = tests/reference/test_recorded_bits.py tests/reference/test_kernels.py -k "$(RECORDED_ON_AARCH64) or threads or parent or border"
 test-aarch64: .venv/maturin ## run the package's tests of bits, threads and processes on AArch64: a wheel under an emulator
 	@for tool in qemu-aarch64 aarch64-linux-gnu-gcc rustup; do command -v $$tool > /dev/null || \
 	  { echo "there is no $$tool here: Debian's packages are qemu-user and gcc-aarch64-linux-gnu; rustup is of https://rustup.rs"; exit 1; }; done
@@ -153,13 +153,13 @@ rust-test: rust-build
 
 # How soon Ctrl-C ends a run is timed when all others are done, and not from a shell's background, where Ctrl-C is ignored.
 python-test: python-beside
-	$(PYTHON_TEST) tests/test_interrupt.py
+	$(PYTHON_TEST) tests/runs/test_interrupt.py
 
 # One of the tests builds a core with one more method, which takes a minute: beside the others. It copies what was built of other
 # crates, and the checks of types leave what they know: both must be done.
 python-beside: .venv/test rust-build lint-python
-	$(PYTHON_TEST) tests/test_adding.py > .venv/adding.log 2>&1 & adding=$$!; \
-	$(PYTEST) --ignore=tests/test_adding.py --ignore=tests/test_interrupt.py; others=$$?; \
+	$(PYTHON_TEST) tests/outer/test_adding.py > .venv/adding.log 2>&1 & adding=$$!; \
+	$(PYTEST) --ignore=tests/outer/test_adding.py --ignore=tests/runs/test_interrupt.py; others=$$?; \
 	wait $$adding; added=$$?; cat .venv/adding.log; test $$others -eq 0 -a $$added -eq 0
 
 test-long: .venv/test ## run what `test` leaves out: every family of tests in full, and mistakes that the tests must notice

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import functools
-import sys
 import warnings
 from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,11 +13,8 @@ import stepwell as sw
 from stepwell.scenes import Scene
 from stepwell.studies.advice.costs import single_name
 
-from support import families
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
-
 from benches.advice import Brute
+from support import families
 
 #: What is advised may cost this many times the cheapest that brute force finds.
 WORTH = 1.5

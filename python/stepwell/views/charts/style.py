@@ -21,7 +21,7 @@ MARKERS: tuple[Any, ...] = (
     *((4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0), (3, 1, 180), (4, 1, 45), (3, 1, 90), (3, 1, 270), (5, 1, 180)),
 )
 #: A colour for each family of methods, the same in every chart. No two are alike in grey, in print, or to an eye without green
-#: cones: tests/test_looks.py measures them.
+#: cones: tests/views/test_looks.py measures them.
 FAMILIES = {
     "Euler": "#efb02e",
     "leapfrog": "#25a985",

@@ -1,0 +1,259 @@
+"""The comparison with other languages: it runs, and no speed stands without its error."""
+
+from __future__ import annotations
+
+import functools
+import json
+import re
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from support import ROOT
+from support.cases import number
+
+from benches import growth, roots
+from benches.compare import machine, peers, report, runner, workloads
+from benches.compare.chosen import solar
+from benches.compare.own import first_call, tolerance
+from benches.compare.own.equations import EQUATIONS, Equation
+from benches.compare.peers import (
+    c_peer,
+    heyoka_peer,
+    jax_peer,
+    numba_own,
+    numba_peer,
+    rebound_peer,
+    scipy_peer,
+    stepwell_peer,
+)
+
+WORKS = [work.quick().cut(members=200) for work in workloads.catalogue()]
+
+
+def named(each: workloads.Workload | peers.Contestant) -> str:
+    return each.name if isinstance(each, peers.Contestant) else f"{each.name}-{each.kind}-{each.size.split()[0]}"
+
+
+#: The first work of each kind; those that differ from it in their size alone are for the long run.
+FIRST = {work.kind: work for work in reversed(WORKS)}
+#: By default every contestant does so many works, and so many contestants every kind of work: most is for their compilers.
+SEVERAL = 2
+
+
+def able() -> Iterator[Any]:
+    """Every contestant with every work that it can do."""
+    pairs = [(each, work) for each in peers.catalogue() for work in WORKS if work.kind in each.kernels]
+    chosen, times = set(), Counter[str]()
+    for each, work in sorted(pairs, key=lambda pair: number(pair[0].name, pair[1].kind)):
+        if work is FIRST[work.kind] and min(times[each.name], times[work.kind]) < SEVERAL:
+            chosen.add((each.name, work.kind))
+            times.update((each.name, work.kind))
+    for each, work in pairs:
+        quick = work is FIRST[work.kind] and (each.name, work.kind) in chosen
+        yield pytest.param(each, work, marks=() if quick else pytest.mark.long)
+
+
+@pytest.mark.parametrize(("contestant", "work"), list(able()), ids=named)
+def test_every_contestant_is_as_right_as_its_method(contestant: peers.Contestant, work: workloads.Workload) -> None:
+    if contestant.slow == "steps":
+        work = work.cut(steps=200)
+    if contestant.slow == "members" and not contestant.alike:
+        work = work.cut(members=20)
+    try:
+        v, y = contestant.kernels[work.kind](work, True).call()
+    except peers.MissingPeerError as why:
+        pytest.skip(str(why))
+    assert work.error(v, y) <= work.bound()
+    if contestant.alike:
+        # Same method, same work: what is left is rounding, and another sine.
+        ours_v, ours_y = stepwell_peer.kernels()[work.kind](work, True).call()
+        off = [abs(a.ravel() - b.ravel()).max(initial=0.0) for a, b in ((v, ours_v), (y, ours_y))]
+        assert max(off) < work.rounding
+
+
+@pytest.mark.parametrize("work", WORKS, ids=named)
+def test_who_is_wrong_is_not_timed(work: workloads.Workload) -> None:
+    system, _ = stepwell_peer.SYSTEMS[work.kind]
+    another_method = functools.partial(stepwell_peer.made, system, "standard_euler", {})
+    row, ready = runner.prepare(peers.Contestant("wrong", {work.kind: another_method}), work, quick=True)
+    assert ready is None
+    assert row.missing.startswith("not timed: error")
+
+
+def test_a_missing_peer_is_a_row_that_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    monkeypatch.setitem(sys.modules, "numba", None)
+    c_peer.library.cache_clear()
+    numba_peer.compiled.cache_clear()
+    c_peer.vectors_of_512.cache_clear()
+    numba_own.compiled.cache_clear()
+    jax_peer.modules.cache_clear()
+    for name in ("rebound", "heyoka", "scipy", "scipy.integrate", "jax"):
+        monkeypatch.setitem(sys.modules, name, None)
+    absent = {
+        c_peer: "no C compiler",
+        numba_peer: "numba is not installed",
+        rebound_peer: "REBOUND is not installed",
+        numba_own: "numba is not installed",
+        heyoka_peer: "heyoka is not installed",
+        scipy_peer: "SciPy is not installed",
+        jax_peer: "jax is not installed",
+    }
+    for module, why in absent.items():
+        contestant = module.CONTESTANTS[0]
+        able = [work for work in WORKS if work.kind in contestant.kernels]
+        assert able
+        for work in able:
+            row, ready = runner.prepare(contestant, work, quick=True)
+            assert (row.missing, ready) == (why, None)
+    assert ("C", "no C compiler") in machine.describe()
+
+
+OWN = [*EQUATIONS, first_call.ring(5)]
+
+
+@pytest.mark.parametrize("equation", OWN, ids=[each.name for each in OWN])
+def test_own_equations_are_the_same_for_stepwell_as_for_all_others(equation: Equation) -> None:
+    rng = np.random.default_rng(3)
+    state = np.array([rng.uniform(*bounds, 50) for bounds in equation.start.values()])
+    own = [rng.uniform(*bounds, 50) for bounds in equation.own.values()]
+    ours, t = equation.system.function, 0.7
+    fixed = equation.system.parameters | dict(equation.shared)
+    expected = np.empty_like(state)
+    for k, s in enumerate(state.T):
+        parameters = fixed | {name: row[k] for name, row in zip(equation.own, own, strict=True)}
+        expected[:, k] = ours(t, s, **parameters) if equation.system.order == 1 else (ours(t, *s, **parameters), s[0])
+    rates = np.array(equation.function(np)(t, state, own))
+    # Up to 25 roundings of 1.1e-16 of terms up to 120·50 (the neuron's currents), otherwise of the size of the sums.
+    largest = 6000.0 if equation.name == "hodgkin_huxley" else 100.0
+    assert abs(rates - expected).max() <= 25 * 1.2e-16 * largest
+    assert all(equation.system.parameters[name] == value for name, value in equation.shared.items())
+
+
+def test_a_tolerance_is_the_coarsest_that_is_exact_enough() -> None:
+    work = next(work for work in WORKS if work.kind == "own_lorenz")
+    tolerances = []
+
+    def off_by_the_tolerance(part: workloads.Workload, wanted: float) -> Any:
+        tolerances.append(wanted)
+        v, y = (block.copy() for block in part.exact())
+        y[0] += wanted
+        return v, y
+
+    coarsest = tolerance.as_exact(work, off_by_the_tolerance)
+    assert coarsest <= min(work.expected, work.cut(members=tolerance.TRIAL).expected)
+    assert coarsest == next(each for each in tolerance.TOLERANCES if each <= work.cut(members=tolerance.TRIAL).expected)
+    assert tolerances == sorted(tolerances, reverse=True)
+    with pytest.raises(peers.WrongResultError):
+        tolerance.as_exact(work, lambda part, wanted: off_by_the_tolerance(part, 1.0))
+
+
+def test_tracing_and_compiling_has_a_line_for_each_system() -> None:
+    title, head, lines = first_call.table(2, quick=True)
+    assert "Own equations" in title
+    assert [(line[1], line[-1]) for line in lines] == [("3", "≤ 5"), ("10", "≤ 100")]
+    for line in lines:
+        assert len(line) == len(head)
+        python, trace, code, together = map(float, line[2:6])
+        assert together == pytest.approx(python + trace + code, rel=0.01)  # three digits of each
+        assert min(python, trace, code) > 0
+
+
+def test_own_equations_are_compared_with_every_way_of_numba() -> None:
+    work = next(work for work in WORKS if work.kind == "own_lorenz")
+    names = [contestant.name for contestant in numba_own.CONTESTANTS]
+    assert list(work.beside) == names
+    rows = [runner.Row(name, amount=1.0, seconds=[seconds]) for name, seconds in zip(names, (1.0, 2.0, 4.0), strict=True)]
+    _, head, lines = report.table(work, [*rows, runner.Row("other", amount=1.0, seconds=[0.5])])
+    assert head[4:-1] == [f"÷ {name}" for name in names]
+    assert lines[0][4:-1] == ["2.00", "4.00", "8.00"]
+
+
+def cells(line: str) -> list[str]:
+    return [cell.strip() for cell in line.strip().strip("|").split("|")]
+
+
+@pytest.mark.parametrize("only", [("W2", "chosen"), pytest.param(("",), marks=pytest.mark.long)], ids=["some", "all"])
+def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) -> None:
+    out = tmp_path / "report.md"
+    works = [work for work in workloads.catalogue() if work.name.startswith(only)]
+    command: list[Any] = [sys.executable, "-m", "benches.compare", "--quick", "--only", ",".join(only), "-o", out]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    report = out.read_text(encoding="utf-8")
+    lines = [cells(line) for line in report.splitlines() if line.startswith("|")]
+    first_chosen = next(i for i, line in enumerate(lines) if line[1] == "1e-03")
+    tables = [i for i, line in enumerate(lines[:first_chosen]) if line[0] == "contestant"]
+    assert len(tables) == len(works) > 0
+    units = {work.unit.name for work in works}
+    head: list[str] = []
+    for row in lines[first_chosen : next(i for i, line in enumerate(lines) if line[0] == "what")]:
+        head = row if row[0] == "contestant" else head
+        if row[0].startswith("stepwell") and head[1].startswith("error after"):
+            assert 0 < float(row[1]) < 1e-12  # a hundred years of the outer solar system, at rounding level
+            assert float(row[2]) > 0
+        elif row[0].startswith("stepwell"):
+            assert float(row[1]) > 0
+            assert float(row[-1]) >= 1
+    chosen = {row[0] for row in lines[first_chosen:]}
+    assert {f"stepwell {m.name}" for m in sw.methods() if m.error_order is not None} <= chosen
+    for row in lines[:first_chosen]:
+        if row[0] == "contestant":
+            assert row[1] in units
+            assert row[2:4] == ["min … max", "error"]
+        elif not row[0].startswith("---") and row[1] != "—":
+            assert float(row[1]) > 0
+            assert re.fullmatch(r"\d\.\de-\d\d", row[3]), row
+    rows = {row[0] for row in lines}
+    assert {c.name for c in peers.catalogue() if any(work.kind in c.kernels for work in works)} <= rows
+    assert {"wheel", "`import stepwell` after NumPy"} <= rows
+    assert sw.isa() in report
+
+
+def test_works_that_are_done_again_replace_their_own_part_of_a_report() -> None:
+    before = "# Title\n\n- date: 1999-01-01\n\n## How to read\n\nText.\n\n## W1: old\n\n| 1 |\n\n## W2: kept\n\n| 2 |\n"
+    now = "# Title\n\n- date: 2000-01-01\n\n## How to read\n\nText.\n\n## W1: old\n\n| 3 |\n\n## W3: new\n\n| 4 |\n"
+    text = report.renewed(before, now, "W1,W3")
+    assert text == (
+        "# Title\n\n- date: 1999-01-01\n- done again in a run of their own, 2000-01-01: W1,W3\n\n## How to read\n\nText.\n\n"
+        "## W1: old\n\n| 3 |\n\n## W2: kept\n\n| 2 |\n\n## W3: new\n\n| 4 |\n"
+    )
+    assert report.renewed(text, now, "W1,W3") == text
+
+
+def test_who_does_not_end_is_ended_and_told() -> None:
+    """A hundred million years take hours; a process of its own has some seconds, most of which its imports may need."""
+    begin = time.perf_counter()
+    measured = solar.measured("stepwell taylor", (10.0, 1e8), 3.0)
+    assert time.perf_counter() - begin < 20.0
+    assert measured is not None
+    assert len(measured) <= 1
+    _, head, lines = solar.table((1.0, 1e8), 3.0)
+    row = next(line for line in lines if line[0] == "stepwell taylor")
+    assert row[-2:] == ["—", "not in 3 s"]
+    assert len(row) == len(head)
+
+
+def test_who_is_not_installed_has_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what fails is no missing row."""
+    monkeypatch.setattr(solar, "contestants", lambda: {"heyoka": None, "nobody": None})
+    if find_spec("heyoka") is None:
+        assert solar.measured("heyoka", (1.0,), 60.0) is None
+    with pytest.raises(RuntimeError, match="nobody"):
+        solar.measured("nobody", (1.0,), 60.0)
+
+
+def test_pictures_are_drawn_of_what_was_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "IMAGES", tmp_path)
+    growth.draw(json.loads(growth.NUMBERS.read_text(encoding="utf-8")))
+    roots.draw(tmp_path / "inverse-cube.png")
+    assert {path.name for path in tmp_path.iterdir()} == {"inverse-cube.png", *(f"growth-{name}.png" for name in growth.AXES)}
