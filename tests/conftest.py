@@ -9,7 +9,7 @@ import pytest
 hypothesis.settings.register_profile("stepwell", deadline=None)
 hypothesis.settings.load_profile("stepwell")
 
-pytest_plugins = ["pytester", "support.browser", "support.complete", "support.families", "support.snapshots"]
+pytest_plugins = ["pytester", "support.browser", "support.complete", "support.covering", "support.families", "support.snapshots"]
 
 #: Files that take longest, the longest first: with one of them last, one core would run it while the others wait.
 LONGEST = (

@@ -17,6 +17,7 @@ from stepwell.runs import engine
 from support import families, own_systems
 from support.cases import ADAPTIVE, SYSTEMS, drawn, fits
 from support.graphs import MANY, assert_one_graph, methods, model
+from support.own_methods import adams_bashforth_2
 from support.tracing import ABLE, CONTROLS, METHODS, made
 
 #: Whether numbers are of float32, which does not work with series.
@@ -91,7 +92,12 @@ def test_an_attempt_under_a_control_of_an_invariant(control: Any) -> None:
 
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_what_a_method_carries(name: str) -> None:
+    """In place of v, or beside it, as an own method of two steps does."""
     system, _, _ = made(name)
+    if not any(surface.way != "spring" for surface in system.contacts):  # after a bounce nothing holds that was kept
+        tape = _core.Tape()
+        core = tape.trace(model(system, adams_bashforth_2), "start 0")
+        assert_one_graph(tape, core, Tracer(system, tape).slot(adams_bashforth_2, "start", 0))
     for method in methods(system):
         for choice in range(len(method.starts) or 1) if method.carry else ():
             for which in ("start", "finish"):

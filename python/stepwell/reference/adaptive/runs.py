@@ -55,8 +55,8 @@ class Jumps(NamedTuple):
 
     def begun(self, t0: Any) -> Any:
         """The time at which steps start: t0, or just after a jump at t0."""
-        there = (self.before <= t0) & (t0 <= self.after)
-        return np.where(there, self.after, t0).max(axis=0)
+        before, after = (each if each.ndim > 1 else each.reshape(-1, *(1 for _ in np.shape(t0))) for each in self)
+        return np.where((before <= t0) & (t0 <= after), after, t0).max(axis=0)
 
     def passed(self, t: Any) -> Any:
         """The number of jumps at or before t."""

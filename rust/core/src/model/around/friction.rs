@@ -34,7 +34,7 @@ pub(crate) fn part<N: Number>() -> Part<N> {
         check,
         velocity_term: |_, _| Some("friction"),
         attempts: Attempts::Other,
-        is_for_carry: false,
+        is_for_carry: true,
         is_only_fixed: |_| true,
         has_rows: false,
         wrap: |p, system, _| Box::new(Rubbing { system, limit: p.h * p.number(NAME) }),

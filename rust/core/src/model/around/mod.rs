@@ -101,7 +101,7 @@ pub(crate) fn wrap_in_forces<N: Number>(p: &Parameters<N>, rates: Box<dyn System
     wrap_in(p, rates, N::of(0.0), |part| part.attempts == Attempts::Added)
 }
 
-/// A system as a method's start and finish see it: with surfaces and forces.
+/// A system as a method's start and finish see it: with surfaces, forces and friction.
 pub(crate) fn wrap_for_carry<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn System<N>> {
     wrap_in(p, system, N::of(0.0), |part| part.is_for_carry)
 }
