@@ -12,8 +12,10 @@ PIP    := $(BIN)/pip install --quiet --disable-pip-version-check --constraint $(
 UV     := $(BIN)/uv pip install --quiet --python .venv/oldest
 # Tests run compilers, which would look for the jobs of this make.
 PYTHON_TEST := env -u MAKEFLAGS -u MFLAGS $(BIN)/python -m pytest -q
-# On every core; a file stays on one, for its tests share what takes time to make. The order of files is that of tests/conftest.py.
+# On every core; a file stays on one, for its tests share what takes time to make. The longest begin first: tests/support/durations.py.
 PYTEST := $(PYTHON_TEST) -n auto --dist loadfile --no-loadscope-reorder
+# How soon Ctrl-C ends a run is timed alone, when all others are done, and not from a shell's background, where Ctrl-C is ignored.
+ALONE := tests/runs/test_interrupt.py
 SOURCES := $(shell find rust python -type f \( -name "*.rs" -o -name "*.toml" -o -name "*.py" -o -name "*.pyi" -o -name py.typed \)) \
            Cargo.toml Cargo.lock pyproject.toml README.md LICENSE THIRD-PARTY.txt
 
@@ -33,8 +35,9 @@ IN_WINE := env -u STEPWELL_TESTS WINEPREFIX=$(CURDIR)/.venv/wine WINEDEBUG=-all 
 TESTS_ON_WINDOWS := windows recorded_bits kernels fixed saved_runs output cli interrupt package
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-long test-wheels test-oldest test-aarch64 test-windows campaign wheel wheels release deny licences dev bench format pins clean
-.PHONY: hooks lint lint-rust lint-python check-rust check-python check-workflows rust-build rust-test python-test python-beside
+.PHONY: help demo docs test test-outer test-all test-long test-wheels test-oldest test-aarch64 test-windows campaign wheel wheels release deny
+.PHONY: licences dev bench format pins clean hooks lint lint-rust lint-python lint-outer check-rust check-python check-budget check-workflows
+.PHONY: rust-build rust-test python-test python-outer durations
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -46,9 +49,18 @@ docs: .venv/docs ## build the site into out/docs, without a network; a warning i
 	$(BIN)/sphinx-build -n -W --keep-going -q docs $(OUT)/docs
 	@echo "open $(OUT)/docs/index.html"
 
-test: ## set up, and run the tests: Rust, Python, examples, docs, formatting, lints, types, stubs
-	$(MAKE) --no-print-directory -j2 lint rust-test python-beside
-	$(PYTHON_TEST) tests/runs/test_interrupt.py
+test: ## set up, and run the everyday tests: Rust, Python, examples, docs, formatting, lints, types
+	$(MAKE) --no-print-directory -j2 lint rust-test python-test
+	$(PYTHON_TEST) $(ALONE)
+	$(BIN)/python .ci/budget.py suite
+
+test-outer: ## run the tests that wait for other programs: site, browser, devices, other languages, benches, AArch64, Windows, a build of its own
+	$(MAKE) --no-print-directory -j2 lint-outer python-outer $(OUTER)
+
+# Both are left out where their tools are not there; CI has them.
+OUTER = $(if $(shell command -v qemu-aarch64),test-aarch64) $(if $(shell command -v wine),test-windows)
+
+test-all: test test-outer ## run both, as CI does
 
 wheel: .venv/wheel ## build the release wheel into dist/
 	@ls -l dist/*.whl
@@ -122,11 +134,16 @@ lint: lint-rust lint-python
 lint-rust: rust-build
 	@$(MAKE) --no-print-directory check-rust
 	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
 
 lint-python: .venv/test
-	@$(MAKE) --no-print-directory check-python check-workflows
+	@$(MAKE) --no-print-directory check-python check-budget
+	$(BIN)/python .ci/budget.py built
+
+# What hardly ever changes by a change of the code.
+lint-outer: .venv/test
+	@$(MAKE) --no-print-directory check-workflows
 	$(BIN)/python -m mypy.stubtest stepwell._core --concise
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
 
 # The part of `lint` that needs no build: it reads the sources, not what is installed. The hooks before a commit run it.
 check-rust:
@@ -138,6 +155,9 @@ check-python:
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy --no-error-summary
 	PYTHONPATH=python $(BIN)/lint-imports --no-cache > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
+
+check-budget:
+	$(BIN)/python .ci/budget.py lines
 
 check-workflows:
 	$(BIN)/zizmor --offline --quiet .github
@@ -151,16 +171,14 @@ rust-build: .venv/wheel
 rust-test: rust-build
 	cargo test --release --workspace --quiet
 
-# How soon Ctrl-C ends a run is timed when all others are done, and not from a shell's background, where Ctrl-C is ignored.
-python-test: python-beside
-	$(PYTHON_TEST) tests/runs/test_interrupt.py
+python-test: .venv/test
+	$(PYTEST) --ignore=tests/outer --ignore=$(ALONE) --durations-to=.venv/durations.json
 
-# One of the tests builds a core with one more method, which takes a minute: beside the others. It copies what was built of other
-# crates, and the checks of types leave what they know: both must be done.
-python-beside: .venv/test rust-build lint-python
-	$(PYTHON_TEST) tests/outer/test_adding.py > .venv/adding.log 2>&1 & adding=$$!; \
-	$(PYTEST) --ignore=tests/outer/test_adding.py --ignore=tests/runs/test_interrupt.py; others=$$?; \
-	wait $$adding; added=$$?; cat .venv/adding.log; test $$others -eq 0 -a $$added -eq 0
+python-outer: .venv/test
+	$(PYTEST) tests/outer
+
+durations: ## keep how long each file of the last `make test` took, by which the next one on a new machine is ordered
+	cp .venv/durations.json .ci/durations.json
 
 test-long: .venv/test ## run what `test` leaves out: every family of tests in full, and mistakes that the tests must notice
 	$(PYTEST) --long --durations=20
@@ -168,7 +186,7 @@ test-long: .venv/test ## run what `test` leaves out: every family of tests in fu
 
 test-windows: .venv/windows ## run the Rust tests, and the package's that concern the system, as Windows does: under Wine
 	$(IN_WINE) cargo test --release --workspace --quiet --target $(WINDOWS)
-	$(IN_WINE) $(BIN)/python tests/windows/piped.py .venv/for-windows/python.exe -m pytest -q -p no:cacheprovider -k "not in_time" $(TESTS_ON_WINDOWS:%=tests/test_%.py)
+	$(IN_WINE) $(BIN)/python tests/windows/piped.py .venv/for-windows/python.exe -m pytest -q -p no:cacheprovider -k "not in_time" $(TESTS_ON_WINDOWS:%=tests/*/test_%.py)
 
 # Each part is tried for a while, and says how often it was and what was found: docs/developing/reliability.md.
 CAMPAIGN_SECONDS ?= 600
