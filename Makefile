@@ -114,6 +114,7 @@ test-aarch64: .venv/maturin ## run the package's tests of bits, threads and proc
 	CARGO_TARGET_DIR=$(CURDIR)/target/aarch64 CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
 	  $(BIN)/maturin build --release --quiet --target aarch64-unknown-linux-gnu --compatibility off --out dist/aarch64
 	$(BIN)/python tests/aarch64.py .venv/aarch64 dist/aarch64/*.whl $(TESTS_ON_AARCH64)
+	STEPWELL_EMULATED=1000 cargo test --release -p stepwell-core --test aarch64 --quiet
 
 dev: .venv/test ## install in place, for work on the code; run again after a change in rust/
 	$(BIN)/maturin develop --release --quiet

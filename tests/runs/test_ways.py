@@ -81,6 +81,11 @@ def can_be_held(name: str) -> bool:
     return bool(system.constraint or "bodies" in name or (name.startswith("own") and "energy" in system.quantities))
 
 
+def is_long(system: Any) -> bool:
+    """Whether its step has so many operations that NumPy takes tenths of a second for one."""
+    return bool(system.constraint) or np.prod(system.v_shape) + np.prod(system.y_shape) > 12
+
+
 def goes(row: Row) -> bool:
     """Whether these options may go together: most of what docs/reference/options.md says of those that do not."""
     method = methods().get(row.get("method", ""))
@@ -109,6 +114,17 @@ def goes(row: Row) -> bool:
         or (system and back and (bounces(system) or system.has_stick_friction))
         or (system and energy and "energy" not in system.quantities)
         or (system and push == "force" and system.v_shape == (0,))
+        # A change of v that a rod does not allow has no meaning.
+        or (system and system.constraint == "length" and row.get("events") == "changes")
+        # These go, and take the reference minutes.
+        or (
+            system
+            and is_long(system)
+            and "fused" in numbers
+            and (events or (method and (method.is_implicit or method.has_series)))
+        )
+        or (system and is_long(system) and system.constraint and tolerance and events)
+        or (method and system and bounces(system) and events and (method.is_implicit or method.has_series))
         or (system and push in ("control", "projection") and not can_be_held(row["system"]))
         or (method and system and (not fits(system, method) or (method.is_exact and not system.linear)))
     )

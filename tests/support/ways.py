@@ -154,6 +154,8 @@ def in_company(asked: Asked) -> None:
 
 
 def _pieces(asked: Asked, between: Callable[[sw.Run], sw.Run]) -> None:
+    if asked.run.stopped_at is not None and np.isfinite(asked.run.stopped_at).any():
+        return  # who was stopped within a step does not go on, and each piece has max_steps of its own
     again = {name: each for name, each in asked.options.items() if name in OF_A_PIECE}
     again |= {"force": asked.options["force"]} if "force" in asked.options else {}
     first = between(asked.make(**asked.piece(0)))
