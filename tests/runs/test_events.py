@@ -1,134 +1,204 @@
-"""Runs with events: the steps are those of runs without, and what is found depends neither on backend, batch nor pieces."""
+"""Runs and worlds with events: steps are those of runs without, and what is found does not depend on how the run is made.
+
+That a run has the same events by both backends, in any company and on threads is in ``test_ways.py``, too; where events are is in
+``test_events_located.py``, and what changes the state in ``test_events_then.py``.
+"""
 
 from __future__ import annotations
 
 import copy
 import itertools
 import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell.errors import ArgumentError, DTypeError, TooLargeError, UnsupportedError
 from stepwell.runs import engine
-from stepwell.runs.events import collected, driver, trials
+from stepwell.runs.events import Occurrences, adaptive, attempts, collected, driver, trials
+from stepwell.runs.events import frames as frames_of_worlds
+from stepwell.runs.events.frames import Frames
 from stepwell.runs.events.members import Members
 from stepwell.runs.events.traced import Quantity
-from stepwell.runs.events.trials import Trials, one_step
-from support.cases import SYSTEMS, Case, assert_same, cases, number, representative, thinned
-from support.events import assert_same_events, check_a_state_at_zero_counts_once_and_not_at_the_start, crossing, first
+from stepwell.runs.events.trials import AdaptiveTrials, Trials, one_step
+from support.cases import ADAPTIVE, SYSTEMS, Case, assert_same, cases, fits, number, representative
+from support.events import ABLE, FEW, assert_same_events, crossing, passing
 from support.families import family
+from support.ways import assert_equal_ways, assert_same_run
 
-
-def nearly_first(case: Case) -> Any:
-    """An event of each system, of the number of arguments that it takes: the first coordinate is a tenth."""
-    if SYSTEMS[case.system](np.random.default_rng(0), 1).v_shape == (0,):
-        return sw.Event(lambda t, y: first(y) - 0.1, name="tenth")
-    return sw.Event(lambda t, v, y: first(v, y) - 0.1, name="tenth")
-
+# ---- of many methods and systems
 
 DIRECT = [case for case in cases() if case.form == "direct"]
-#: By default each system and each method once, in float64; half of them in float32 too, of which the next test has all.
-CHOSEN = set(representative(DIRECT, {"direct": 1}, "events"))
-DTYPES = pytest.mark.parametrize("dtype", ["float64", "float32"])
+#: Of a method of each structure the case with the lowest number.
+OF_FEW = {min((case for case in DIRECT if case.method == name), key=number) for name in FEW}
 
 
-@pytest.mark.parametrize(
-    ("case", "dtype"),
-    family(
-        itertools.product(DIRECT, ("float64", "float32")),
-        lambda case, dtype: case in CHOSEN and (dtype == "float64" or number(case, dtype) % 2 == 0),
-        lambda case, dtype: f"{case}, {dtype}",
-    ),
-)
+@pytest.mark.parametrize("case", family(DIRECT, lambda case: case in OF_FEW, str))
 @pytest.mark.filterwarnings("ignore")
-def test_steps_are_those_of_a_run_without_and_both_backends_agree(
-    case: Case, dtype: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    event = nearly_first(case)
-    if dtype == "float32" and case.refused_in_float32():
-        return
-    plain, run = case.run(5, dtype=dtype), case.run(5, events=event, dtype=dtype)
-    assert_same(plain, run)
-    reference = case.run(5, events=event, backend="numpy", dtype=dtype)
-    assert_same(reference, run)
+def test_fixed_steps_are_those_of_a_run_without(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    event = passing(SYSTEMS[case.system](np.random.default_rng(0), 1), 0.1)
+    for dtype in ("float64", "float32"):
+        if dtype == "float32" and case.refused_in_float32():
+            continue
+        plain, run = case.run(5, dtype=dtype), case.run(5, events=event, dtype=dtype)
+        assert_same(plain, run)
+        reference = case.run(5, events=event, backend="numpy", dtype=dtype)
+        assert_same(reference, run)
+        assert_same_events(reference, run)
+        # Where few states are saved the core notices changes of sign, and only the steps of such members are looked at.
+        with monkeypatch.context() as patch:
+            patch.setattr(driver, "FEW_MEMBERS", 1)
+            patch.setattr(driver, "WATCHED_STEPS", 8)
+            noticed = case.run(5, every=None, events=event, dtype=dtype)
+        assert_same_events(reference, noticed)
+        np.testing.assert_array_equal(noticed.y[-1], plain.y[-1])
+        np.testing.assert_array_equal(noticed.v[-1], plain.v[-1])
+
+
+def goes(name: str, method: str) -> bool:
+    """Whether a method takes adaptive steps of a system."""
+    system, record = SYSTEMS[name](np.random.default_rng(5), 1).uncontrolled, sw.method(method)
+    series = record.has_series and (system.chooses or system.contacts or np.isfinite(system.samples[0]))
+    return fits(system, record) and not series
+
+
+ADAPTED = [(name, method) for name, method in itertools.product(ADAPTIVE, ABLE) if goes(name, method)]
+ADAPTED_OF_FEW = {min((pair for pair in ADAPTED if pair[1] == name), key=number) for name in ABLE if name in FEW}
+
+
+@pytest.mark.parametrize(("name", "method"), family(ADAPTED, lambda *pair: pair in ADAPTED_OF_FEW))
+@pytest.mark.filterwarnings("ignore::stepwell.ToleranceWarning")
+def test_adaptive_steps_are_those_of_a_run_without(name: str, method: str) -> None:
+    rng, record = np.random.default_rng(5), sw.method(method)
+    system = SYSTEMS[name](rng, 3).uncontrolled
+    v, y = 0.3 * rng.normal(size=(*system.v_shape, 3)), rng.normal(size=(*system.y_shape, 3))
+    if record.has_series and system.constraint == "length":
+        v = 0.0 * v
+    start = float((y if y.size else v).ravel()[0])
+    event = passing(system, lambda t: start + 0.01 * t - 1e-4)
+    most = 10 if record.has_series else 20
+    ask: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-4, "at": [0.0, 0.05, 0.2], "max_steps": most}
+    run = sw.integrate(system, method, **ask, events=event)
+    assert_same_run(run, sw.integrate(system, method, **ask))
+    reference = sw.integrate(system, method, **ask, events=event, backend="numpy")
+    assert_same_run(reference, run)
     assert_same_events(reference, run)
-    # Where few states are saved the core notices changes of sign, and only the steps of such members are looked at.
-    monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
-    monkeypatch.setattr(driver, "WATCHED_STEPS", 8)
-    noticed = case.run(5, every=None, events=event, dtype=dtype)
-    assert_same_events(reference, noticed)
-    np.testing.assert_array_equal(noticed.y[-1], plain.y[-1])
-    np.testing.assert_array_equal(noticed.v[-1], plain.v[-1])
 
 
-@pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 1}, "events"))
+def test_steps_with_pushes_are_those_of_a_run_without() -> None:
+    """With what a control or a projection does, too."""
+    v, y = np.array([[0.0, 0.1], [0.0, 0.6]]), np.array([[0.0, 0.0], [1.5, 0.0]])
+    event = sw.Event(lambda t, v, y: y[1, 1] - 0.3, name="line")
+    fixed, adapted = {"dt": 0.02, "steps": 200}, {"tolerance": 1e-6, "at": [5.0]}
+    for method, options in (
+        ("rk4", fixed | {"fused": True}),
+        ("rk4", fixed | {"control": sw.Projection("nacozy")}),
+        ("rk4", fixed | {"force": 0.1}),
+        ("merson", adapted | {"control": sw.EnergyControl(gain=0.5)}),
+        ("merson", adapted | {"control": sw.Projection()}),
+    ):
+        bodies = sw.NBody([1.0, 0.5], force="newton" if "steps" in options else "logarithmic")
+        plain, run = (sw.integrate(bodies, method, v=v, y=y, **options, **more) for more in ({}, {"events": event}))
+        np.testing.assert_array_equal(run.y, plain.y, err_msg=str(options))
+        assert run.events["line"].count > 0, options
+        # Of steps of fixed length whose events are looked for nobody adds up the work.
+        np.testing.assert_array_equal(run.work, plain.work if "tolerance" in options else None)
+
+
+#: For trials each system and each method is taken once, and by default a fourth of these.
+TRIED = representative(DIRECT, {"direct": 1}, "events")
+
+
+@pytest.mark.parametrize("part", family(range(4), lambda part: part == 0))
 @pytest.mark.filterwarnings("ignore")
-def test_a_trial_of_float32_of_the_whole_length_is_the_step(case: Case) -> None:
-    if case.refused_in_float32():
-        return
-    system, arguments = case.make(5)
-    method, dt = sw.method(case.method), float(np.float32(0.1))
-    plan = engine.Plan(
-        system.stepped_by(method),
-        method,
-        (5,),
-        dt,
-        choice=method.start_choice(case.start),
-        single=True,
-        force=arguments.get("force"),
-    )
-    index = np.array([3, 0, 0, 4])
-    v, y = (arguments[name].astype(np.float32).astype(np.float64) for name in ("v", "y"))
-    trials = Trials(plan, Members(plan)).step(index, np.zeros(4), np.full(4, dt), v[..., index], y[..., index])
-    out = engine.advance(plan, v, y)
-    for trial, step in zip(trials, (out.v[-1], out.y[-1]), strict=True):
-        np.testing.assert_array_equal(trial, step[..., index])
+def test_a_trial_of_the_whole_length_is_the_step_whatever_members_are_taken(part: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    index, t = np.array([3, 0, 0, 4]), np.zeros(4)
+    for case, single in itertools.product((case for case in TRIED if number(str(case)) % 4 == part), (False, True)):
+        if single and case.refused_in_float32():
+            continue
+        system, arguments = case.make(5)
+        method, dt = sw.method(case.method), float(np.float32(0.1)) if single else 0.1
+        choice, stepped = method.start_choice(case.start), system.stepped_by(method)
+        plan = engine.Plan(stepped, method, (5,), dt, choice=choice, single=single)
+        members, h = Members(plan), np.full(4, dt)
+        whole = [arguments[name].astype(np.float32).astype(np.float64) if single else arguments[name] for name in ("v", "y")]
+        v, y = (each[..., index] for each in whole)
+        out = engine.advance(plan, *whole)
+        by_core = Trials(plan, members).step(index, t, h, v, y)
+        ways = [by_core] if single else [by_core, one_step(members.plan(index), t, h, v, y)]
+        # Of other lengths, too, by the core and by the reference.
+        shorter = h * np.array([3.0, 0.1, 9.0, 5.0]) / 10.0
+        with monkeypatch.context() as patch:
+            patch.setattr(trials, "MEMBERS_BY_CORE", 4)
+            shorter_by_core = Trials(plan, members).step(index, t, shorter, v, y)
+            patch.setattr(trials, "MEMBERS_BY_CORE", 0)
+            ways += [] if single else [Trials(plan, members).step(index, t, h, v, y)]
+            by_trial = Trials(plan, members).step(index, t, shorter, v, y)
+        for trial in ways:
+            for block, step in zip(trial, (out.v[-1], out.y[-1]), strict=True):
+                np.testing.assert_array_equal(block, step[..., index], err_msg=f"{case}, {single}")
+        for one, other in zip(shorter_by_core, by_trial, strict=True):
+            np.testing.assert_array_equal(one, other, err_msg=f"{case}, {single}")
 
 
-@pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 1}, "events"))
-@pytest.mark.filterwarnings("ignore")
-def test_a_trial_of_the_whole_length_is_the_step_whatever_members_are_taken(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    system, arguments = case.make(5)
-    method = sw.method(case.method)
-    plan = engine.Plan(system.stepped_by(method), method, (5,), 0.1, choice=method.start_choice(case.start))
-    members = Members(plan)
-    index = np.array([3, 0, 0, 4])
-    t, h = np.zeros(4), np.full(4, 0.1)
-    v, y = (arguments[name][..., index] for name in ("v", "y"))
-    by_reference = one_step(members.plan(index), t, h, v, y)
-    by_core = Trials(plan, members).step(index, t, h, v, y)
-    monkeypatch.setattr(trials, "MEMBERS_BY_CORE", 0)
-    by_trial = Trials(plan, members).step(index, t, h, v, y)
-    out = engine.advance(plan, arguments["v"], arguments["y"])
-    for a, b, c, step in zip(by_reference, by_trial, by_core, (out.v[-1], out.y[-1]), strict=True):
-        np.testing.assert_array_equal(a, step[..., index])
-        np.testing.assert_array_equal(b, step[..., index])
-        np.testing.assert_array_equal(c, step[..., index])
-    # Of other lengths, by the core and by the reference.
-    h = 0.1 * np.array([0.3, 0.01, 0.9, 0.5])
-    by_trial = Trials(plan, members).step(index, t, h, v, y)
-    monkeypatch.setattr(trials, "MEMBERS_BY_CORE", 4)
-    for a, b in zip(Trials(plan, members).step(index, t, h, v, y), by_trial, strict=True):
-        np.testing.assert_array_equal(a, b)
+def check_trials_within_a_step(method: str, name: str) -> None:
+    """A trial to any time within a step, and to its end, is the state that is saved there."""
+    rng, record = np.random.default_rng(1), sw.method(method)
+    system = SYSTEMS[name](rng, 4)
+    v, y = 0.3 * rng.normal(size=(*system.v_shape, 4)), rng.normal(size=(*system.y_shape, 4))
+    plan = engine.Plan(system, record, (4,), 1.0, order=10 if record.has_series else 0)
+    paces = engine.paces(plan, None, engine.Tolerances(np.array(1e-6), None))
+    out = attempts.attempted(plan, np.inf, 12, 1000, True, paces, v, y)
+    of_members, who = AdaptiveTrials(plan, Members(plan)), np.arange(4)
+    h = out.lengths(plan)[10]
+    for block, end in zip(of_members.step(who, out.t[10], h, out.v[10], out.y[10]), (out.v[11], out.y[11]), strict=True):
+        np.testing.assert_array_equal(block, end, err_msg=f"{method}, {name}")
+    for share in (0.1, 0.7):
+        at = out.t[10] + share * h
+        trial = of_members.step(who, out.t[10], at - out.t[10], out.v[10], out.y[10])
+        for i in who:
+            saved = engine.adapt(plan, engine.Pacing(at[i : i + 1], 1000, True), paces, v, y)
+            for block, states in zip(trial, (saved.v, saved.y), strict=True):
+                np.testing.assert_array_equal(block[..., i], states[0][..., i], err_msg=f"{method}, {name}")
 
 
-SWEEP: dict[str, Any] = {"v": np.linspace(-0.5, 0.5, 40), "y": 1.0, "dt": 0.1, "steps": 300}
-#: The second comes in steps of its own, the third stops about half of the members, at different times.
+def test_a_trial_of_an_adaptive_step_is_the_state_that_is_saved_within_it() -> None:
+    for method, name in itertools.product(ABLE, ("pendulum", "own: top")):
+        check_trials_within_a_step(method, name)
+
+
+# ---- a sweep that has something of everything
+
+OMEGA = np.linspace(0.5, 2.0, 40)
+#: The first comes often, the second in steps of its own and three are kept, the third stops about half of the members.
 THREE = [
     crossing,
     sw.Event(lambda t, v, y, omega: v - 0.2 * omega, direction=1, most=3, name="speed"),
     sw.Event(lambda t, v, y, omega: omega * t + 3.0 * y - 38.0, direction=1, terminal=True, name="end"),
 ]
+STEPS: dict[str, dict[str, Any]] = {
+    "fixed": {"method": "rk4", "dt": 0.1, "steps": 300, "every": 7},
+    "adaptive": {"method": "merson", "tolerance": 1e-6, "at": np.linspace(0.0, 30.0, 20)},
+}
+DRIVERS = pytest.mark.parametrize("steps", STEPS)
 
 
-def sweep(members: Any = slice(None), method: str = "rk4", **options: Any) -> sw.Run:
-    arguments = SWEEP | {"v": SWEEP["v"][members], "every": 7} | options
-    return sw.integrate(sw.Pendulum(np.linspace(0.5, 2.0, 40)[members]), method, events=THREE, **arguments)
+def asked(steps: str, members: Any = slice(None), **options: Any) -> dict[str, Any]:
+    """What ``integrate`` is asked for."""
+    v, omega = np.linspace(-0.5, 0.5, 40)[members], OMEGA[members]
+    return {"system": sw.Pendulum(omega), "v": v, "y": np.ones_like(v), "events": THREE} | STEPS[steps] | options
 
 
-def test_the_sweep_has_something_of_everything() -> None:
-    run = sweep()
+def sweep(steps: str, members: Any = slice(None), **options: Any) -> sw.Run:
+    ask = asked(steps, members, **options)
+    return sw.integrate(ask.pop("system"), ask.pop("method"), **ask)
+
+
+@DRIVERS
+def test_the_sweep_has_something_of_everything(steps: str) -> None:
+    run = sweep(steps)
     stopped = ~np.isnan(run.stopped_at)
     assert 5 < stopped.sum() < 35
     assert (run.events["speed"].count > 3).any()
@@ -137,46 +207,57 @@ def test_the_sweep_has_something_of_everything() -> None:
     np.testing.assert_array_equal(run.status == sw.Status.EVENT, stopped)
 
 
-@DTYPES
-@pytest.mark.parametrize("method", ["rk4", "verlet", "false_euler"])
-def test_a_member_alone_is_the_same_as_in_a_batch(method: str, dtype: str) -> None:
-    run = sweep(method=method, dtype=dtype)
-    for i in (0, 1, 17, 39):
-        alone = sweep(slice(i, i + 1), method=method, dtype=dtype)
-        np.testing.assert_array_equal(alone.y[:, 0], run.y[:, i])
-        assert alone.stopped_at is not None
-        np.testing.assert_array_equal(alone.stopped_at[0], run.stopped_at[i])
-        for name, mine in alone.events.items():
-            theirs = run.events[name].of(i)
-            assert mine.count[0] == theirs.count
-            for a, b in zip((mine.t, mine.v, mine.y, mine.step), (theirs.t, theirs.v, theirs.y, theirs.step), strict=True):
-                np.testing.assert_array_equal(a, b)
+@pytest.mark.parametrize(
+    ("steps", "options"),
+    [
+        ("fixed", {}),
+        ("fixed", {"method": "verlet"}),
+        ("fixed", {"dtype": "float32"}),
+        ("adaptive", {}),
+        ("adaptive", {"method": "taylor", "tolerance": 1e-4}),
+    ],
+)
+def test_the_sweep_is_the_same_in_all_ways(steps: str, options: dict[str, Any]) -> None:
+    ways = ["at each level", "alone", "in company", "saved more often", "prepared"]
+    if options.get("method") != "taylor":  # whose reference goes number by number
+        ways.append("by the reference")
+    assert_equal_ways(ways=ways, **asked(steps, slice(0, 40, 9), **options))
+    if not options:  # of a hundred members and more the core notices changes of sign itself, if no states are saved on the way
+        omega = np.linspace(0.5, 2.0, 131)
+        more = {"system": sw.Pendulum(omega), "v": np.full(131, 0.1), "y": np.ones(131), "every": None}
+        assert_equal_ways(ways=("alone", "in company"), **asked(steps, **options | more))
 
 
-@pytest.mark.parametrize(("method", "dtype"), [("rk4", "float32"), ("verlet", "float64")])
+@pytest.mark.parametrize(("method", "dtype"), [("rk4", "float32"), ("verlet", "float64"), ("merson", "float64")])
 def test_how_many_are_looked_at_together_does_not_matter(method: str, dtype: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    few = slice(0, 40, 5)
-    run = sweep(few, method=method, dtype=dtype)
-    assert 2 <= (~np.isnan(run.stopped_at)).sum() <= 6
-    for numbers, longest, located in ((1 << 6, 5, 1), (1 << 4, 1, 7), (1 << 20, 100_000, 1 << 20)):
-        monkeypatch.setattr(driver, "NUMBERS_AT_ONCE", numbers)
-        monkeypatch.setattr(driver, "MOST_STEPS", longest)
-        monkeypatch.setattr(collected, "LOCATED_AT_ONCE", located)
-        other = sweep(few, method=method, dtype=dtype)
-        assert_same(run, other)
+    steps = "adaptive" if method == "merson" else "fixed"
+    run = sweep(steps, slice(3, 40, 12), method=method, dtype=dtype)
+    assert 1 <= (~np.isnan(run.stopped_at)).sum() <= 3
+    for numbers, longest, located in ((1 << 6, 5, 1), (1 << 4, 1, 7)):
+        for module, name, most in (
+            (driver, "NUMBERS_AT_ONCE", numbers),
+            (driver, "MOST_STEPS", longest),
+            (adaptive, "NUMBERS_AT_ONCE", numbers),
+            (adaptive, "MOST_ATTEMPTS", longest),
+            (collected, "LOCATED_AT_ONCE", located),
+        ):
+            monkeypatch.setattr(module, name, most)
+        other = sweep(steps, slice(3, 40, 12), method=method, dtype=dtype)
+        assert_same_run(run, other)
         assert_same_events(run, other)
 
 
 @pytest.mark.parametrize("method", ["rk4", "verlet"])
-@pytest.mark.parametrize("every", [None, 50])
-def test_what_the_core_notices_is_all_that_there_is(method: str, every: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    every_state = sweep(method=method, every=every)  # 40 are few
-    monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
-    for steps in (64, 3, 1000):
-        monkeypatch.setattr(driver, "WATCHED_STEPS", steps)
-        noticed = sweep(method=method, every=every)
-        assert_same(every_state, noticed)
-        assert_same_events(every_state, noticed)
+def test_what_the_core_notices_is_all_that_there_is(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for every in (None, 50):
+        every_state = sweep("fixed", method=method, every=every)  # 40 are few
+        with monkeypatch.context() as patch:
+            patch.setattr(driver, "FEW_MEMBERS", 1)
+            for watched in (64, 3, 1000):
+                patch.setattr(driver, "WATCHED_STEPS", watched)
+                noticed = sweep("fixed", method=method, every=every)
+                assert_same(every_state, noticed)
+                assert_same_events(every_state, noticed)
 
 
 @pytest.mark.mutant
@@ -184,7 +265,7 @@ def test_mistake_the_core_notices_another_quantity_is_noticed(monkeypatch: pytes
     """So the core's part is not idle: of a quantity that never changes its sign it notices nothing within some steps. At their
     end the quantity itself is looked at, which finds more; here it does not.
     """
-    run = sweep(every=None)
+    run = sweep("fixed", every=None)
     monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
     right = driver.watched
     never = sw.Event(lambda t, v, y: y * y + 1.0)
@@ -194,7 +275,7 @@ def test_mistake_the_core_notices_another_quantity_is_noticed(monkeypatch: pytes
         return right([Quantity(never, plan.system, {}) for _ in quantities], plan)
 
     monkeypatch.setattr(driver, "watched", wrong)
-    assert sweep(every=None).events["crossing"].count.sum() < run.events["crossing"].count.sum()
+    assert sweep("fixed", every=None).events["crossing"].count.sum() < run.events["crossing"].count.sum()
 
 
 def test_a_system_whose_step_is_too_long_for_one_tape(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -203,126 +284,231 @@ def test_a_system_whose_step_is_too_long_for_one_tape(monkeypatch: pytest.Monkey
     y = np.zeros((600, 3))
     y[0] = 1.0, 1.1, 1.2
     event = sw.Event(lambda t, v, y: y[0] - 0.5, name="half")
-    runs = [
-        sw.integrate(sw.Chain(600), "rk4", v=0.0, y=y, dt=0.1, steps=40, events=event, backend=backend)
-        for backend in ("rust", "numpy")
-    ]
-    assert runs[0].events["half"].count.all()
-    assert_same_events(*runs)
-
-
-@DTYPES
-def test_threads_do_not_matter(dtype: str) -> None:
-    one, two = sweep(threads=1, dtype=dtype), sweep(threads=2, dtype=dtype)
-    assert_same(one, two)
-    assert_same_events(one, two)
-
-
-def test_neither_threads_nor_the_batch_matter_where_the_core_notices() -> None:
-    """A hundred members are enough for that; one alone is not, and all of its states are looked at."""
-    omega, arguments = np.linspace(0.5, 2.0, 100), {"v": 0.1, "y": 1.0, "dt": 0.1, "steps": 300}
-    one, two = (sw.integrate(sw.Pendulum(omega), "rk4", **arguments, events=THREE, threads=threads) for threads in (1, 2))
-    assert_same(one, two)
-    assert_same_events(one, two)
-    for i in (0, 63, 99):
-        alone = sw.integrate(sw.Pendulum(omega[i]), "rk4", **arguments, events=THREE)
-        for name, mine in alone.events.items():
-            np.testing.assert_array_equal(mine.t, one.events[name].of(i).t)
-            np.testing.assert_array_equal(mine.y, one.events[name].of(i).y)
+    ask: dict[str, Any] = {"v": 0.0, "y": y, "dt": 0.1, "steps": 40, "events": event}
+    rust, numpy = (sw.integrate(sw.Chain(600), "rk4", **ask, backend=backend) for backend in ("rust", "numpy"))
+    assert rust.events["half"].count.all()
+    assert_same_events(rust, numpy)
 
 
 def test_batch_axes_and_parameters_of_all_shapes() -> None:
-    omega, damping = np.linspace(0.5, 2.0, 6).reshape(3, 2), np.array([0.0, 0.2])
+    omega, damping, tolerance = np.linspace(0.5, 2.0, 6).reshape(3, 2), np.array([0.0, 0.2]), np.array([1e-5, 1e-8])
     event = sw.Event(lambda t, v, y, omega, damping: y - 0.1 * omega - damping, name="zero")
-    run = sw.integrate(sw.Pendulum(omega, damping), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, events=event)
-    zeros = run.events["zero"]
-    assert zeros.count.shape == (3, 2)
-    for i, j in np.ndindex(3, 2):
-        alone = sw.integrate(sw.Pendulum(omega[i, j], damping[j]), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, events=event)
-        np.testing.assert_array_equal(alone.events["zero"].t, zeros.of((i, j)).t)
-        np.testing.assert_array_equal(alone.events["zero"].y, zeros.of((i, j)).y)
-    assert len(zeros.of((-1, -1)).t) == zeros.count[-1, -1]
-    with pytest.raises(sw.errors.ArgumentError, match="index: expected 2 whole"):
-        zeros.of(1)
-    with pytest.raises(sw.errors.ArgumentError, match="index: expected -2"):
-        zeros.of((0, 2))
+
+    def zeros(method: str, i: Any = ..., j: Any = ...) -> Any:
+        steps = {"dt": 0.1, "steps": 100} if method == "rk4" else {"tolerance": tolerance[j], "at": [3.0, 9.0]}
+        system = sw.Pendulum(omega[i, j] if i is not ... else omega, damping[j])
+        return sw.integrate(system, method, v=0.0, y=1.0, events=event, **steps).events["zero"]
+
+    for method in ("rk4", "fehlberg_5"):
+        of_all = zeros(method)
+        assert of_all.count.shape == (3, 2)
+        for i, j in np.ndindex(3, 2):
+            np.testing.assert_array_equal(zeros(method, i, j).t, of_all.of((i, j)).t)
+            np.testing.assert_array_equal(zeros(method, i, j).y, of_all.of((i, j)).y)
+    assert len(of_all.of((-1, -1)).t) == of_all.count[-1, -1]
+    with pytest.raises(ArgumentError, match="index: expected 2 whole"):
+        of_all.of(1)
+    with pytest.raises(ArgumentError, match="index: expected -2"):
+        of_all.of((0, 2))
 
 
-@DTYPES
-@pytest.mark.parametrize("method", ["rk4", "verlet", "leapfrog"])
-def test_pieces_find_what_the_whole_finds(method: str, dtype: str) -> None:
-    arguments: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1}
-    whole = sw.integrate(sw.Oscillator(), method, **arguments, steps=200, events=crossing, dtype=dtype)
-    head = sw.integrate(sw.Oscillator(), method, **arguments, steps=77, events=crossing, dtype=dtype)
-    tail = sw.integrate(sw.Oscillator(), method, resume=head, steps=123, events=crossing)
+# ---- pieces
+
+
+def test_pieces_of_fixed_steps_find_what_the_whole_finds() -> None:
+    for method, dtype in itertools.product(("rk4", "verlet", "leapfrog"), ("float64", "float32")):
+        ask: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "events": crossing, "dtype": dtype}
+        whole, head = (sw.integrate(sw.Oscillator(), method, **ask, steps=steps) for steps in (200, 77))
+        tail = sw.integrate(sw.Oscillator(), method, resume=head, steps=123, events=crossing)
+        np.testing.assert_array_equal(tail.y[-1], whole.y[-1])
+        for name in ("t", "v", "y", "step"):
+            pieces = [getattr(each.events["crossing"], name) for each in (head, tail)]
+            np.testing.assert_array_equal(np.concatenate(pieces), getattr(whole.events["crossing"], name))
+
+
+def check_pieces_of_adaptive_steps(method: str, fused: bool) -> None:
+    """Wherever the cut is: many of them, some within steps that have an event before or after the cut."""
+    ask: dict[str, Any] = {"method": method, "members": slice(0, 5), "events": THREE[:2], "fused": fused}
+    whole = sweep("adaptive", **ask, at=[12.0])
+    assert_same_events(whole, sweep("adaptive", **ask, at=np.linspace(0.0, 12.0, 200)))
+    times = np.append(whole.events["crossing"].of(0).t[[0, 1, 1]], 12.0)
+    times[:3] += [0.02, -0.02, 0.02]
+    ask["events"] = [crossing, sw.Event(THREE[1].function, direction=1, name="speed")]  # all of which are kept
+    whole = sweep("adaptive", **ask, at=[12.0])
+    run = sweep("adaptive", **ask, at=times[:1])
+    pieces = [run]
+    for end in times[1:]:
+        run = sw.integrate(run.system, method, resume=run, at=[end], events=ask["events"])
+        pieces.append(run)
+    np.testing.assert_array_equal(run.y[-1], whole.y[-1])
+    for name, theirs in whole.events.items():
+        for i, what in itertools.product(range(5), ("t", "v", "y", "step")):
+            mine = np.concatenate([getattr(piece.events[name].of(i), what) for piece in pieces])
+            np.testing.assert_array_equal(mine, getattr(theirs.of(i), what))
+        np.testing.assert_array_equal(sum(piece.events[name].count for piece in pieces), theirs.count)
+
+
+@pytest.mark.parametrize(
+    ("method", "fused"),
+    family(
+        itertools.product(ABLE, (False, True)), lambda *pair: pair in {("merson", False), ("rodas4", True), ("taylor", False)}
+    ),
+)
+def test_pieces_of_adaptive_steps_find_what_the_whole_finds(method: str, fused: bool) -> None:
+    check_pieces_of_adaptive_steps(method, fused)
+
+
+def test_a_run_that_was_out_of_attempts_goes_on() -> None:
+    whole = sweep("adaptive", slice(0, 5), events=crossing, at=[12.0])
+    assert whole.paces is not None
+    with pytest.warns(sw.ToleranceWarning):
+        head = sweep("adaptive", slice(0, 5), events=crossing, at=[12.0], max_steps=int(whole.paces.accepted.max()) // 2)
+    tail = sw.integrate(head.system, "merson", resume=head, at=[12.0], events=crossing)
     np.testing.assert_array_equal(tail.y[-1], whole.y[-1])
-    for name in ("t", "v", "y", "step"):
-        pieces = [getattr(each.events["crossing"], name) for each in (head, tail)]
-        np.testing.assert_array_equal(np.concatenate(pieces), getattr(whole.events["crossing"], name))
+    counts = [each.events["crossing"].count for each in (head, tail, whole)]
+    assert counts[0].any()
+    assert counts[1].any()
+    np.testing.assert_array_equal(counts[0] + counts[1], counts[2])
 
 
-def test_a_member_that_stopped_stays_where_it_was_and_cannot_go_on() -> None:
-    run = sweep(every=1)
+# ---- ends
+
+
+@DRIVERS
+def test_a_member_that_stopped_stays_where_it_was_and_cannot_go_on(steps: str) -> None:
+    every = {"every": 1} if steps == "fixed" else {}
+    run, free = sweep(steps, **every), sweep(steps, events=THREE[:2], **every)
     ends = run.events["end"]
     assert run.stopped_at is not None
-    for i in np.flatnonzero(run.status == sw.Status.EVENT).tolist():
+    for i in range(40):
         end = ends.of(i)
+        before = run.t < (run.stopped_at[i] if len(end.t) else np.inf)
+        np.testing.assert_array_equal(run.y[before, i], free.y[before, i])  # to there it is the motion without an end
+        if not len(end.t):
+            continue
         assert end.count == len(end.t) == 1
         assert run.stopped_at[i] == end.t[0]
-        k = int(end.step[0])
-        assert run.t[k] < end.t[0] <= run.t[k + 1] + 1e-12
-        np.testing.assert_array_equal(run.y[k + 1 :, i], end.y[0])
-        np.testing.assert_array_equal(run.v[k + 1 :, i], end.v[0])
+        if run.paces is None:
+            assert run.t[end.step[0]] < end.t[0] <= run.t[end.step[0] + 1] + 1e-12
+        else:
+            assert (end.t[0], end.step[0]) == (run.paces.t[i], run.paces.accepted[i] - 1)
+        for states, state in ((run.v, end.v), (run.y, end.y)):
+            np.testing.assert_array_equal(states[~before, i], np.broadcast_to(state[0], (~before).sum()))
         for other in ("crossing", "speed"):
-            assert (run.events[other].of(i).t <= end.t[0]).all()
-    with pytest.raises(sw.errors.UnsupportedError, match="stopped at an event"):
-        sw.integrate(run.system, run.method, resume=run, steps=1)
+            times = free.events[other].of(i).t
+            np.testing.assert_array_equal(run.events[other].of(i).t, times[times <= end.t[0]])
+    more: dict[str, Any] = {"steps": 1} if steps == "fixed" else {"at": [99.0]}
+    with pytest.raises(UnsupportedError, match="stopped at an event"):
+        sw.integrate(run.system, run.method, resume=run, **more)
     assert "stopped at an event" in repr(run)
 
 
 def test_what_comes_after_a_terminal_event_in_its_step_is_not_there() -> None:
-    """Falling from 1 under gravity 1: y passes 0.5 at t = 1, and 0.48 at 1.02, in the same step of 0.25."""
-
-    @sw.system
-    def falling(t: Any, v: Any, y: Any, *, g: float = 1.0) -> Any:
-        return -g
-
+    """Falling from 1 under gravity 1: y passes 0.5 at t = 1, and 0.48 at 1.02, in the same step of 0.3."""
+    falling = sw.system(lambda t, v, y, *, g=1.0: -g)
     half = sw.Event(lambda t, v, y: y - 0.5, terminal=True, name="half")
     later = sw.Event(lambda t, v, y: y - 0.48, name="later")
     earlier = sw.Event(lambda t, v, y: y - 0.52, name="earlier")
-    run = sw.integrate(falling(), "rk4", v=0.0, y=1.0, dt=0.3, steps=10, events=[later, half, earlier])
-    assert [run.events[name].count.item() for name in ("later", "half", "earlier")] == [0, 1, 1]
-    assert run.stopped_at is not None
-    # A parabola is exact by RK4 but for roundings, a few units of 1.
-    assert abs(run.stopped_at - 1.0) < 1e-14
     # Of two terminal events the first counts, in whatever order they are given.
     both = [sw.Event(each.function, terminal=True, name=each.name) for each in (later, half, earlier)]
-    run = sw.integrate(falling(), "rk4", v=0.0, y=1.0, dt=0.3, steps=10, events=both)
-    assert [run.events[name].count.item() for name in ("later", "half", "earlier")] == [0, 0, 1]
+    for events, counts in (([later, half, earlier], [0, 1, 1]), (both, [0, 0, 1])):
+        run = sw.integrate(falling(), "rk4", v=0.0, y=1.0, dt=0.3, steps=10, events=events)
+        assert [each.count.item() for each in run.events.values()] == counts
+        assert run.stopped_at is not None
+        # A parabola is exact by RK4 but for roundings, a few units of 1.
+        assert events is both or abs(run.stopped_at - 1.0) < 1e-14
 
 
-def test_directions() -> None:
-    def zeros(direction: int) -> Any:
-        event = sw.Event(lambda t, v, y: y, direction=direction, name="zero")
-        return sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=200, events=event).events["zero"]
+@sw.system(order=1)
+def growing(t: Any, y: Any, *, rate: float = 1.0) -> Any:
+    return rate * y * y
 
-    assert (zeros(-1).v < 0).all()
-    assert (zeros(1).v > 0).all()
-    np.testing.assert_array_equal(np.sort(np.concatenate([zeros(-1).t, zeros(1).t])), zeros(0).t)
-    assert len(zeros(0).t) == 6  # zeros of the cosine up to t = 20
+
+def check_what_comes_after_a_terminal_event_is_not_computed(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """ẏ = y² from 1 is 1/(1 − t): infinite at 1, where steps become too short; without a word if it stops at y = 10, t = 0.9."""
+    results: list[Any] = []
+    adapt = engine.adapt
+    ten = sw.Event(lambda t, y: y - 10.0, terminal=True, name="ten")
+    with monkeypatch.context() as patch:
+        patch.setattr(engine, "adapt", lambda *arguments: results.append(adapt(*arguments)) or results[-1])
+        run = sw.integrate(growing(), method, y=1.0, tolerance=1e-8, at=[0.5, 2.0], events=ten)
+    # The relative error of y is within some 100 tolerances, and y passes 10 at a speed of 100: δt = 0.1·δy/y.
+    assert run.stopped_at is not None
+    assert abs(run.stopped_at - 0.9) < (1e-5 if sw.method(method).order == 2 else 1e-7)
+    assert abs(run.y[-1] - 10.0) < 1e-9
+    assert run.first_bad_step == -1
+    assert len(results) == 1
+    assert run.paces is not None
+    assert results[0].paces[engine.COUNTS.start] == run.paces.accepted
+    # A run to that time alone has one more state to save, and does not take its last step.
+    near = sw.integrate(growing(), method, y=1.0, tolerance=1e-8, at=[0.5, float(run.stopped_at)])
+    assert near.paces is not None
+    assert run.paces.accepted - 1 == near.paces.accepted
+    assert run.paces.rejected == near.paces.rejected
+    assert run.paces.evaluations <= near.paces.evaluations
+
+
+@pytest.mark.parametrize("method", ABLE)
+def test_what_comes_after_a_terminal_event_is_not_computed(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And runs that end early, out of attempts or as steps become too short, end as without events: what was passed is found."""
+    check_what_comes_after_a_terminal_event_is_not_computed(method, monkeypatch)
+    two = sw.Event(lambda t, y: y - 2.0, name="two")
+    for options in ({"max_steps": 40}, {}):
+        ask: dict[str, Any] = {"y": 1.0, "tolerance": 1e-8, "at": [0.1, 2.0], **options}
+        with pytest.warns(sw.ToleranceWarning):
+            plain, run = (sw.integrate(growing(), method, **ask, **more) for more in ({}, {"events": two}))
+        assert_same(plain, run)
+        assert (run.paces, run.status) == (plain.paces, plain.status)
+        assert run.events["two"].count == int(plain.paces is not None and plain.paces.t > 0.5)
+
+
+@sw.system(order=1)
+def ascending(t: Any, y: Any) -> Any:
+    return 1.0 + 0.0 * y
 
 
 def test_a_state_at_zero_counts_once_and_not_at_the_start() -> None:
-    check_a_state_at_zero_counts_once_and_not_at_the_start()
+    """y = k exactly: at step 3 y − 3 is 0, at step 0 y is."""
+    events = [sw.Event(lambda t, y: y - 3.0, name="three"), sw.Event(lambda t, y: y, name="start")]
+    run = sw.integrate(ascending(), "standard_euler", y=0.0, dt=1.0, steps=8, events=events)
+    assert run.events["three"].t.tolist() == [3.0]
+    assert run.events["start"].count == 0
+
+
+def test_the_ends_of_an_adaptive_run() -> None:
+    """An event at the start does not count, one just before the end does, and one just after it does not.
+
+    The last step is no longer than five times the way so far; a place is past its event by 2⁻⁴⁸ of that at most.
+    """
+    places = {"start": 0.0, "before": 2.0 - 2.0**-43, "after": 2.0 + 2.0**-43}
+    events = [sw.Event(lambda t, y, at=at: t - at, name=name) for name, at in places.items()]
+    run = sw.integrate(ascending(), "merson", y=0.0, tolerance=1e-6, at=[1.0, 2.0], events=events)
+    assert [each.count.item() for each in run.events.values()] == [0, 1, 0]
+    assert 0.0 <= run.events["before"].t[0] - places["before"] <= 10.0 * 2.0**-48
+
+
+@DRIVERS
+def test_directions_and_how_many_are_kept(steps: str) -> None:
+    def zeros(**options: Any) -> Any:
+        event = sw.Event(lambda t, v, y: y, name="zero", **options)
+        more = {"dt": 0.1, "steps": 200} if steps == "fixed" else {"tolerance": 1e-9, "at": [20.0]}
+        return sw.integrate(sw.Oscillator(), "dop853", v=0.0, y=1.0, events=event, **more).events["zero"]
+
+    assert (zeros(direction=-1).v < 0).all()
+    assert (zeros(direction=1).v > 0).all()
+    np.testing.assert_array_equal(np.sort(np.concatenate([zeros(direction=-1).t, zeros(direction=1).t])), zeros().t)
+    assert len(zeros().t) == 6  # zeros of the cosine up to t = 20
+    assert zeros(most=2).count == 6
+    np.testing.assert_array_equal(zeros(most=2).t, zeros().t[:2])
 
 
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
 def test_a_member_that_diverges_has_no_events_after_that() -> None:
     """Standard Euler of ω·h = 30 grows by a factor of 30 a step, its sign changing, until it overflows; its neighbour goes on."""
-    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 400}
+    ask: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 400}
     event = sw.Event(lambda t, v, y: y, name="zero")
-    run = sw.integrate(sw.Oscillator([300.0, 1.0]), "standard_euler", **arguments, events=event)
-    plain = sw.integrate(sw.Oscillator([300.0, 1.0]), "standard_euler", **arguments, every=1)
+    run = sw.integrate(sw.Oscillator([300.0, 1.0]), "standard_euler", **ask, events=event)
+    plain = sw.integrate(sw.Oscillator([300.0, 1.0]), "standard_euler", **ask, every=1)
     np.testing.assert_array_equal(run.first_bad_step, plain.first_bad_step)
     bad = int(run.first_bad_step[0])
     assert bad > 0 > run.first_bad_step[1]
@@ -332,47 +518,160 @@ def test_a_member_that_diverges_has_no_events_after_that() -> None:
     assert (run.events["zero"].of(0).step < bad - 1).all()
     # A member that stopped before it would have diverged did not diverge.
     stopping = sw.Event(lambda t, v, y: y, terminal=True, name="zero")
-    run = sw.integrate(sw.Oscillator([300.0, 1.0]), "standard_euler", **arguments, events=stopping)
+    run = sw.integrate(sw.Oscillator([300.0, 1.0]), "standard_euler", **ask, events=stopping)
     assert (run.first_bad_step < 0).all()
     assert (run.status == sw.Status.EVENT).all()
 
 
-def test_recorded_quantities_are_those_of_the_saved_states() -> None:
-    run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=50, every=5, events=crossing, record="energy")
-    plain = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=50, every=5, record="energy")
-    np.testing.assert_array_equal(run.recorded["energy"], plain.recorded["energy"])
+# ---- worlds
+
+TWO = [crossing, THREE[1]]
+FIELDS = ("member", "step", "t", "v", "y")
 
 
-@pytest.mark.parametrize("options", [{"fused": True}, {"control": sw.Projection("nacozy")}, {"force": 0.1}])
-def test_with_other_options(options: dict[str, Any]) -> None:
-    bodies = sw.NBody([1.0, 2.0], force="newton")
-    y, v = np.array([[1.0, 0.0], [-0.5, 0.0]]), np.array([[0.0, 0.8], [0.0, -0.4]])
-    event = sw.Event(lambda t, v, y: y[0, 1] - y[1, 1], name="line")
-    arguments: dict[str, Any] = {"v": v, "y": y, "dt": 0.02, "steps": 200, **options}
-    plain = sw.integrate(bodies, "rk4", **arguments)
-    run, reference = (sw.integrate(bodies, "rk4", **arguments, events=event, backend=which) for which in ("rust", "numpy"))
-    np.testing.assert_array_equal(run.y, plain.y)
-    assert_same_events(run, reference)
-    assert run.events["line"].count > 0
-    assert run.work is None
+def together(pieces: list[dict[str, Occurrences]], name: str) -> list[Any]:
+    """What several calls found of an event, by member and then by time."""
+    order = np.argsort(np.concatenate([each[name].member for each in pieces]), kind="stable")
+    return [np.concatenate([getattr(each[name], field) for each in pieces])[order] for field in FIELDS]
+
+
+def frames(world: sw.World, *steps: int) -> list[dict[str, Occurrences]]:
+    """What each of these calls of ``step`` found."""
+    occurrences = []
+    for n in steps:
+        world.step(n)
+        occurrences.append(world.events)
+    return occurrences
+
+
+def start(batch: tuple[int, ...] = (6,), dtype: str = "float64") -> dict[str, Any]:
+    return {"v": np.linspace(-0.5, 0.5, int(np.prod(batch))).reshape(batch).astype(dtype), "y": np.ones(batch, dtype)}
+
+
+def drawn(method: str, batch: tuple[int, ...], dtype: str) -> bool:
+    return (method in FEW and (batch, dtype) == ((3, 2), "float64")) or (method in ("rk4", "verlet") and batch != (3, 2))
+
+
+@pytest.mark.parametrize(
+    ("method", "batch", "dtype"),
+    family(itertools.product([m.name for m in sw.methods()], [(), (6,), (3, 2)], ["float64", "float32"]), drawn),
+)
+def test_a_world_finds_what_a_run_finds(method: str, batch: tuple[int, ...], dtype: str) -> None:
+    if dtype == "float32" and sw.method(method).has_series:
+        return
+    system = sw.Pendulum(np.linspace(0.5, 2.0, int(np.prod(batch))).reshape(batch))
+    options = {"dt": 0.1, "t0": 0.4, "dtype": dtype}
+    run = sw.integrate(system, method, **start(batch), **options, steps=60, events=TWO)
+    plain = sw.World(system, method, **start(batch, dtype), **options)
+    world = sw.World(system, method, **start(batch, dtype), **options, events=TWO)
+    pieces = frames(world, 20, 1, 0, 1, 18, 20)
+    plain.step(60)
+    assert (world.t, world.step_number) == (plain.t, 60)
+    np.testing.assert_array_equal(world.y, plain.y)
+    np.testing.assert_array_equal(world.v, plain.v)
+    assert pieces[2]["crossing"].count.sum() == 0
+    for name, occurrences in run.events.items():
+        np.testing.assert_array_equal(sum(each[name].count for each in pieces), occurrences.count)
+        for mine, field in zip(together(pieces, name), FIELDS, strict=True):
+            np.testing.assert_array_equal(mine, getattr(occurrences, field))
+    assert len(run.events["crossing"].t) > 0
+
+
+def test_so_many_of_a_call_are_kept() -> None:
+    world = sw.World(sw.Pendulum(3.0), "rk4", **start(()), dt=0.1, events=sw.Event(crossing, most=2))
+    world.step(100)
+    assert world.events["crossing"].count > len(world.events["crossing"].t) == 2
+
+
+@pytest.mark.parametrize("method", ["rk4", "verlet"])
+def test_what_is_written_between_calls_is_no_event_and_counts(method: str) -> None:
+    """A kick that changes the sign of g is none of the motion; what comes after it is that of a run from there."""
+    world = sw.World(sw.Pendulum(), method, **start(()), dt=0.1, events=crossing)
+    world.step(3)
+    assert world.events["crossing"].count == 0
+    world.y[...] = -world.y
+    run = sw.integrate(sw.Pendulum(), method, v=world.v, y=world.y, dt=0.1, start_step=3, steps=30, events=crossing)
+    pieces = frames(world, 1, 29)
+    assert pieces[0]["crossing"].count == 0
+    np.testing.assert_array_equal(world.y, run.y[-1])
+    assert run.events["crossing"].count > 0
+    np.testing.assert_array_equal(pieces[1]["crossing"].t, run.events["crossing"].t)
+
+
+@pytest.mark.parametrize("method", ["rk4", "pefrl"])
+def test_a_force_that_changes(method: str) -> None:
+    """Each call is a run with the force of that call."""
+    force = np.zeros(6)
+    world = sw.World(sw.Pendulum(), method, **start(), dt=0.1, force=force, events=crossing)
+    total = 0
+    for k in range(4):
+        force[:] = 0.5 * (-1) ** k
+        run = sw.integrate(sw.Pendulum(), method, dt=0.1, resume=world, steps=10, events=crossing)
+        world.step(10)
+        np.testing.assert_array_equal(world.y, run.y[-1])
+        assert world.events["crossing"] == run.events["crossing"]
+        total += len(world.events["crossing"].t)
+    assert total > 0
+
+
+def test_a_world_of_own_equations_of_first_order() -> None:
+    falling = sw.system(order=1)(lambda t, y, *, rate=1.0: -rate * y)
+    half, rate = sw.Event(lambda t, y: y - 0.5, name="half"), np.array([1.0, 2.0, 0.1])
+    run = sw.integrate(falling(rate=rate), "rk4", y=np.ones(3), dt=0.01, steps=100, events=half)
+    world = sw.World(falling(rate=rate), "rk4", y=np.ones(3), dt=0.01, events=half)
+    who, _, times, *_ = together(frames(world, 50, 50), "half")
+    np.testing.assert_array_equal(times, run.events["half"].t)
+    assert who.tolist() == [0, 1]
+    # 1/2 is passed at ln 2/rate. With z = rate·h a step multiplies y by e⁻ᶻ + z⁵/120 − z⁶/720 + …, so ln y changes by −z times
+    # 1 − z⁴/120·(1 + 5z/6 + …), and times are longer by at most z⁴/120·(1 + z).
+    np.testing.assert_allclose(times, np.log(2.0) / rate[:2], rtol=0.02**4 / 120 * 1.02 + 1e-14)
+
+
+def test_a_member_of_a_world_that_diverged_has_none() -> None:
+    world = sw.World(sw.Oscillator([300.0, 1.0]), "standard_euler", **start((2,)), dt=0.1, events=lambda t, v, y: y)
+    world.step(400)
+    assert not np.isfinite(world.y[0])
+    name = next(iter(world.events))
+    world.step(40)
+    assert world.events[name].count[0] == 0
+    assert world.events[name].count[1] > 0
+
+
+def test_copies_of_a_world_have_the_same_events() -> None:
+    world = sw.World(sw.Pendulum(), "verlet", **start(), dt=0.1, events=TWO)
+    world.step(7)
+    others = [copy.copy(world), copy.deepcopy(world)]
+    world.step(40)
+    for other in others:
+        other.step(40)
+        assert other.events == world.events
+
+
+# ---- values, progress, wrong calls
 
 
 def test_progress_is_told_up_to_the_end() -> None:
-    shares: list[float] = []
-    plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=1000, progress=shares.append)
-    run = driver.Run([sw.Event(crossing)], np.array(0.0), np.array(1.0), None, False)
-    run.advance(plan)
-    assert shares == sorted(shares)
-    assert shares[-1] == 1.0
+    start, of_each = (np.array(0.0), np.array(1.0)), {"fixed": [], "adaptive": []}
+    plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=1000, progress=of_each["fixed"].append)
+    driver.Run([sw.Event(crossing)], *start, None, False).advance(plan)
+    plan = engine.Plan(sw.Pendulum(), sw.method("merson"), (), 1.0, progress=of_each["adaptive"].append)
+    paces = engine.paces(plan, None, engine.Tolerances(np.array(1e-9), None))
+    adaptive.AdaptiveRun([sw.Event(crossing)]).adapt(plan, engine.Pacing(np.array([100.0]), 10**6, True), paces, *start)
+    for name, shares in of_each.items():
+        assert shares == sorted(shares), name
+        assert shares[-1] == 1.0, name
+    assert len(of_each["adaptive"]) > 3
 
 
-def test_results_are_values() -> None:
-    run = sweep()
-    again = pickle.loads(pickle.dumps(run.events))
-    assert again == run.events
-    assert copy.deepcopy(run.events["end"]) == run.events["end"]
+@DRIVERS
+def test_results_are_values(steps: str, tmp_path: Path) -> None:
+    run = sweep(steps)
+    assert pickle.loads(pickle.dumps(run.events)) == run.events == copy.deepcopy(run.events)
     assert repr(run.events["end"]).startswith("<")
     assert run.events["end"] != run.events["speed"]
+    run.save(tmp_path / "run.npz")
+    assert sw.load(tmp_path / "run.npz") == run
+    assert_same_events(sw.load(tmp_path / "run.npz"), run)
     assert sw.Event(crossing) == sw.Event(crossing) != sw.Event(crossing, direction=1)
     assert repr(sw.Event(crossing, terminal=True)) == "Event(crossing, terminal=True)"
 
@@ -385,35 +684,130 @@ def asks(t: Any, v: Any, y: Any) -> Any:
     return y if y > 0 else v
 
 
-WRONG: dict[str, tuple[Any, str]] = {
-    "a number": (3.0, "events: expected a list of events"),
-    "a list of numbers": ([3.0], "events: expected functions"),
-    "a class": (float, "events: expected functions"),
-    "too few arguments": (lambda t, y: y, r"expected a function \(t, v, y"),
-    "no such parameter": (lambda t, v, y, stiffness: y, "got stiffness. Known: omega"),
-    "the same name twice": ([crossing, crossing], "got 'crossing' twice"),
-    "two numbers": (two, "expected one number"),
-    "no number": (lambda t, v, y: None, "expected one number"),
-    "a branch": (asks, "asks"),
-}
-
-
-@pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
-def test_wrong_events(wrong: tuple[Any, str]) -> None:
-    with pytest.raises(sw.errors.ArgumentError, match=wrong[1]):
-        sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5, events=wrong[0])
-
-
-def test_what_does_not_go_with_events() -> None:
-    start: dict[str, Any] = {"v": 0.0, "y": 1.0, "events": crossing}
-    with pytest.raises(sw.errors.UnsupportedError, match="events: works with form='direct' only"):
-        sw.integrate(sw.Oscillator(), "rk4", **start, dt=0.1, steps=5, form="power")
-    many, system = sw.Event(crossing, most=10**6), sw.Oscillator(np.ones(10**6))
-    with pytest.raises(sw.errors.TooLargeError, match="the events of 1000000 members need"):
-        sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=10**6, events=many)
-
-
-def test_an_event_of_chance_is_refused() -> None:
+def test_wrong_events() -> None:
     chance = np.random.default_rng(0)
-    with pytest.raises(sw.errors.ArgumentError, match="same operations at every call"):
-        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5, events=lambda t, v, y: y - chance.random())
+    many = sw.Event(crossing, most=10**6)
+    of_many: dict[str, Any] = {"y": np.ones(10**6)}
+    fixed, adapted = {"dt": 0.1, "steps": 5}, {"tolerance": 1e-6, "at": [1.0]}
+    for events, error, message, steps in (
+        (3.0, ArgumentError, "events: expected a list of events", fixed),
+        (3.0, ArgumentError, "events: expected a list of events", adapted),
+        ([3.0], ArgumentError, "events: expected functions", fixed),
+        (float, ArgumentError, "events: expected functions", fixed),
+        (lambda t, y: y, ArgumentError, r"expected a function \(t, v, y", fixed),
+        (lambda t, y: y, ArgumentError, r"expected a function \(t, v, y", adapted),
+        (lambda t, v, y, stiffness: y, ArgumentError, "got stiffness. Known: omega", fixed),
+        ([crossing, crossing], ArgumentError, "got 'crossing' twice", fixed),
+        (two, ArgumentError, "expected one number", fixed),
+        (lambda t, v, y: None, ArgumentError, "expected one number", fixed),
+        (asks, ArgumentError, "asks", fixed),
+        (lambda t, v, y: y - chance.random(), ArgumentError, "same operations at every call", fixed),
+        (many, TooLargeError, "the events of 1000000 members need", fixed | of_many | {"steps": 10**6}),
+        (many, TooLargeError, "the events of 1000000 members need", adapted | of_many),
+    ):
+        with pytest.raises(error, match=message):
+            sw.integrate(sw.Pendulum(), "merson", **{"v": 0.0, "y": 1.0} | steps, events=events)
+    with pytest.raises(UnsupportedError, match="events: works with form='direct' only"):
+        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5, form="power", events=crossing)
+
+
+def test_wrong_events_of_worlds() -> None:
+    stops = r"events: no event stops a member of a world, got Event\(crossing, terminal=True\)"
+    single = start(dtype="float32") | {"dtype": "float32"}
+    for method, events, error, message, options in (
+        ("rk4", [TWO[1], sw.Event(crossing, terminal=True)], UnsupportedError, stops, start()),
+        ("taylor", crossing, UnsupportedError, "float32", single),
+        ("rk4", [3.0], DTypeError, "events: expected functions", start()),
+        ("rk4", lambda t, y: y, ArgumentError, r"expected a function \(t, v, y", start()),
+    ):
+        with pytest.raises(error, match=message):
+            sw.World(sw.Pendulum(), method, **options, dt=0.1, events=events)
+    world = sw.World(sw.Pendulum(), "rk4", **start(), dt=0.1, events=crossing)
+    with pytest.raises(ArgumentError, match="n: expected"):
+        world.step(-1)
+    assert sw.World(sw.Pendulum(), "rk4", **start(), dt=0.1).events == {}
+
+
+# ---- mistakes
+
+
+@pytest.mark.mutant
+def test_mistake_the_quantity_of_the_last_call_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    right, quantities = Frames._quantities, {}
+
+    def wrong(self: Frames, step: int) -> Any:
+        return quantities.setdefault((id(self), step), right(self, step))
+
+    monkeypatch.setattr(Frames, "_quantities", wrong)
+    with pytest.raises(AssertionError):
+        test_what_is_written_between_calls_is_no_event_and_counts("rk4")
+
+
+@pytest.mark.mutant
+def test_mistake_the_force_of_the_first_call_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    first: list[Any] = []
+
+    def wrong(plan: Any) -> Any:
+        first.append(plan._replace(force=np.zeros(6)))
+        return right(first[0])
+
+    right = frames_of_worlds.Members
+    monkeypatch.setattr(frames_of_worlds, "Members", wrong)
+    with pytest.raises(AssertionError):
+        test_a_force_that_changes("rk4")
+
+
+@pytest.mark.mutant
+@pytest.mark.parametrize("method", ["merson", "taylor"])
+def test_mistake_the_length_of_another_step_is_noticed(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The step to try next is not the one that was made; of a series the one before is not."""
+    series = sw.method(method).has_series
+    monkeypatch.setattr(attempts.Attempts, "lengths", lambda self, plan: self.h[:-1] if series else self.h[1:])
+    with pytest.raises(AssertionError):
+        check_trials_within_a_step(method, "pendulum")
+
+
+@pytest.mark.mutant
+def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Wrong(adaptive._Driver):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments)
+            self.far = self.end
+
+        def _look(self, *arguments: Any) -> Any:
+            self.end = np.full_like(self.far, np.inf)
+            try:
+                return super()._look(*arguments)
+            finally:
+                self.end = self.far
+
+    monkeypatch.setattr(adaptive, "_Driver", Wrong)
+    with pytest.raises(AssertionError):
+        test_the_ends_of_an_adaptive_run()
+
+
+@pytest.mark.mutant
+def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    look = adaptive._Driver._look
+    monkeypatch.setattr(adaptive._Driver, "_look", lambda self, *arguments: look(self, *arguments[:-1], False))
+    with pytest.raises(AssertionError):
+        check_pieces_of_adaptive_steps("merson", False)
+
+
+@pytest.mark.mutant
+def test_mistake_attempts_after_the_end_or_one_too_few_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = adaptive._Driver.stepped
+
+    def other_by(attempts: float) -> Any:
+        def wrong(self: Any, *arguments: Any) -> Any:
+            self.attempts += attempts
+            return right(self, *arguments)
+
+        return wrong
+
+    monkeypatch.setattr(adaptive._Driver, "stepped", other_by(1e6))
+    with pytest.raises(AssertionError):
+        check_what_comes_after_a_terminal_event_is_not_computed("merson", monkeypatch)
+    monkeypatch.setattr(adaptive._Driver, "stepped", other_by(-1.0))
+    with pytest.raises(AssertionError):
+        test_a_member_that_stopped_stays_where_it_was_and_cannot_go_on("adaptive")

@@ -7,15 +7,40 @@ from typing import Any
 import numpy as np
 import stepwell as sw
 
+from support.cases import number
 
-def first(*state: Any) -> Any:
-    """Of the coordinates the first, or else of the velocities."""
-    y = state[-1] if np.shape(state[-1]) != (0,) else state[0]
-    return y.ravel()[0] if np.ndim(y) else y
+U = 2.0**-53
+GRAVITY = 9.81
+
+#: Methods that choose their steps.
+ABLE = [method.name for method in sw.methods() if method.error_order is not None]
+
+
+def structure(method: sw.Method) -> tuple[bool, ...]:
+    """In what a step of a method differs, for what is done with steps."""
+    flags = method.has_series, method.is_implicit, method.needs_acceleration, method.splits
+    return *flags, bool(method.kept), method.error_order is not None
+
+
+#: A method of each structure, drawn by their names.
+FEW = list({structure(m): m.name for m in sorted(sw.methods(), key=lambda m: number(m.name, "events"))}.values())
 
 
 def crossing(t: Any, v: Any, y: Any) -> Any:
     return y - 0.1 * v - 0.05 * t
+
+
+def passing(system: sw.System, level: Any) -> sw.Event:
+    """An event of as many arguments as the system has: its first number is at the level, a number or a function of the time."""
+
+    def above(t: Any, *state: Any) -> Any:
+        # Of the coordinates the first, or else of the velocities.
+        y = state[-1] if np.shape(state[-1]) != (0,) else state[0]
+        return (y.ravel()[0] if np.ndim(y) else y) - (level(t) if callable(level) else level)
+
+    if system.v_shape == (0,):
+        return sw.Event(lambda t, y: above(t, y), name="passage")
+    return sw.Event(lambda t, v, y: above(t, v, y), name="passage")
 
 
 def assert_same_events(a: sw.Run, b: sw.Run) -> None:
@@ -28,16 +53,3 @@ def assert_same_events(a: sw.Run, b: sw.Run) -> None:
     else:
         np.testing.assert_array_equal(a.stopped_at, b.stopped_at)
     np.testing.assert_array_equal(a.status, b.status)
-
-
-def check_a_state_at_zero_counts_once_and_not_at_the_start() -> None:
-    """y = k exactly: at step 3 y − 3 is 0, at step 0 y is."""
-
-    @sw.system(order=1)
-    def ascending(t: Any, y: Any) -> Any:
-        return 1.0 + 0.0 * y
-
-    events = [sw.Event(lambda t, y: y - 3.0, name="three"), sw.Event(lambda t, y: y, name="start")]
-    run = sw.integrate(ascending(), "standard_euler", y=0.0, dt=1.0, steps=8, events=events)
-    assert run.events["three"].t.tolist() == [3.0]
-    assert run.events["start"].count == 0
