@@ -142,7 +142,7 @@ def test_memory_that_somebody_uses_is_not_lent() -> None:
         run = many(dt=0.01 * (1 + len(views)))
         views.append((keep(run.y), np.array(keep(run.y))))
         del run
-        gc.collect()
+    gc.collect()
     for _ in range(3):
         many(dt=0.3)
     for view, copy in views:
