@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import warnings
-from math import prod
+from math import factorial, prod
 from types import SimpleNamespace
 from typing import Any
 
@@ -36,14 +37,16 @@ def told(**arguments: Any) -> tuple[sw.Run, list[str]]:
 # ---- what is stiff says so
 
 
-@pytest.mark.parametrize("tolerance", TOLERANCES)
-@pytest.mark.parametrize("method", EXPLICIT)
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_stiff_problems_say_so(name: str, method: str, tolerance: Any) -> None:
+def test_stiff_problems_say_so(name: str) -> None:
     """With the ratio, and with the limit that ``stability_limit`` has for the fastest rate at the state."""
-    if name == "net":
-        tolerance = (1e-3, 1e-4)  # below, its springs have something to do
+    for method, tolerance in itertools.product(EXPLICIT, TOLERANCES if name != "net" else [(1e-3, 1e-4)]):
+        says_so(name, method, tolerance)  # the net's springs have something to do below that tolerance
+
+
+def says_so(name: str, method: str, tolerance: Any) -> None:
     run, texts = told(method=method, tolerance=tolerance, **{"max_steps": 60_000} | PROBLEMS[name])
+    assert len(texts) == 1, (method, tolerance)
     (text,) = texts
     match, ratio = LIMIT.search(text), RATIO.search(text)
     assert match is not None
@@ -66,8 +69,9 @@ def test_stiff_problems_say_so(name: str, method: str, tolerance: Any) -> None:
         assert match[2] == f"{1.0 / abs(fastest):.3g}"
 
 
-@pytest.mark.parametrize("method", ["merson", "dop853"])
-@pytest.mark.parametrize("name", ["ROBER", "OREGO", "HIRES", "linear", "driven"])
+@pytest.mark.parametrize(
+    ("name", "method"), [("ROBER", "merson"), ("HIRES", "merson"), ("OREGO", "dop853"), ("linear", "dop853")]
+)
 def test_the_limit_is_that_of_stability_limit_at_the_state(name: str, method: str) -> None:
     run, (text,) = told(method=method, tolerance=(1e-5, 1e-9), **{"max_steps": 60_000} | PROBLEMS[name])
     where, match = run.controller_state, LIMIT.search(text)
@@ -85,34 +89,28 @@ def test_the_limit_of_a_series_is_that_of_its_order() -> None:
     match = LIMIT.search(text)
     assert match is not None
     z = -float(match[3]) / float(match[2])
-    terms, total = 1.0, 1.0
-    for k in range(1, 11):
-        terms *= z / k
-        total += terms
-    assert abs(total) == pytest.approx(1.0, abs=0.05)
+    assert abs(sum(z**k / factorial(k) for k in range(11))) == pytest.approx(1.0, abs=0.05)
     exact = stiffness.limit_of(run.method, 10, -1.0)
     assert -z == pytest.approx(exact, rel=0.01)
     assert exact != pytest.approx(float(sw.stability_limit(sw.LinearSystem([[-1.0]]), "taylor")), rel=0.1)
 
 
-@pytest.mark.parametrize("name", ["HIRES", "linear", "driven"])
-def test_a_method_that_is_stable_takes_fewer_steps(name: str) -> None:
+def test_a_method_that_is_stable_takes_fewer_steps() -> None:
     """SciPy's Radau does, with the same tolerances."""
     from scipy.integrate import solve_ivp
 
-    problem = PROBLEMS[name]
-    for tolerance in TOLERANCES:
+    for name, tolerance in itertools.product(("HIRES", "driven"), TOLERANCES):
+        problem = PROBLEMS[name]
         run, (_,) = told(method="dop853", tolerance=tolerance, **problem)
         assert run.paces is not None
-
         reference = run.system.reference_at_step(1.0, ())
 
-        def rates(t: float, y: Any, reference: Any = reference) -> Any:
-            return np.atleast_1d(reference.dy(t, np.empty(0), y if np.ndim(problem["y"]) else y[0]))
+        def rates(t: float, y: Any, reference: Any = reference, scalar: bool = np.ndim(problem["y"]) == 0) -> Any:
+            return np.atleast_1d(reference.dy(t, np.empty(0), y[0] if scalar else y))
 
         start = np.atleast_1d(np.asarray(problem["y"], dtype=float))
         implicit = solve_ivp(rates, (0.0, problem["at"][0]), start, method="Radau", rtol=tolerance[0], atol=tolerance[1])
-        assert 3 * len(implicit.t) < int(run.paces.accepted)
+        assert 3 * len(implicit.t) < int(run.paces.accepted), (name, tolerance)
 
 
 def test_members_that_are_stiff_are_counted_and_the_first_is_named() -> None:
@@ -187,20 +185,17 @@ def test_states_of_many_numbers_are_seen_by_powers() -> None:
 TAME = list(tame())
 
 
-def test_there_are_a_hundred_tame_runs() -> None:
+def test_tame_runs_say_nothing() -> None:
+    """More than a hundred, most of them long enough to be looked at."""
     assert len(TAME) >= 100
-
-
-@pytest.mark.parametrize(("name", "arguments"), TAME, ids=[name for name, _ in TAME])
-def test_tame_runs_say_nothing(name: str, arguments: dict[str, Any]) -> None:
-    assert told(**arguments)[1] == []
-
-
-def test_most_tame_runs_are_long_enough_to_be_looked_at() -> None:
-    """Those of a few systems; each of the others was counted when these numbers were chosen."""
-    some = TAME[:: len(TAME) // 20]
-    steps = [int(quietly(a.pop("system"), a.pop("method"), **a).paces.accepted.max()) for a in (dict(each) for _, each in some)]  # type: ignore[union-attr]
-    assert np.count_nonzero(np.array(steps) >= 2048) >= 0.6 * len(steps)
+    talk, long_enough = {}, 0
+    for name, arguments in TAME:
+        run, texts = told(**arguments)
+        assert run.paces is not None
+        long_enough += int(run.paces.accepted.max()) >= 2048
+        talk |= {name: texts} if texts else {}
+    assert talk == {}
+    assert long_enough >= 0.6 * len(TAME)
 
 
 def test_steps_that_the_user_bounds_are_not_held_down_by_stability() -> None:
@@ -255,11 +250,12 @@ def test_broken_criteria_are_noticed(monkeypatch: pytest.MonkeyPatch, broken: di
     assert len(told(**dict(falsely))[1]) == ("NEAR" in broken)
 
 
-@pytest.mark.parametrize("broken", [{"MOVED": 0.0, "PART_OF_A_STEP": 0.0}, {"STIFF": 1e9}, {"BEYOND": 0.5}, {"SETTLED": 3.0}])
-def test_broken_criteria_silence_what_is_stiff(monkeypatch: pytest.MonkeyPatch, broken: dict[str, Any]) -> None:
-    for name, value in broken.items():
-        monkeypatch.setattr(stiffness, name, value)
-    assert told(method="merson", tolerance=(1e-6, 1e-9), **PROBLEMS["HIRES"])[1] == []
+def test_broken_criteria_silence_what_is_stiff(monkeypatch: pytest.MonkeyPatch) -> None:
+    for broken in ({"MOVED": 0.0, "PART_OF_A_STEP": 0.0}, {"STIFF": 1e9}, {"BEYOND": 0.5}, {"SETTLED": 3.0}):
+        with monkeypatch.context() as patch:
+            for name, value in broken.items():
+                patch.setattr(stiffness, name, value)
+            assert told(method="merson", tolerance=(1e-6, 1e-9), **PROBLEMS["HIRES"])[1] == [], broken
 
 
 # ---- which method to take
@@ -272,14 +268,8 @@ def test_the_method_to_take_is_one_that_is_stable(monkeypatch: pytest.MonkeyPatc
     assert all_methods.for_stiff(1e-6) is None
     (text,) = told(method="merson", tolerance=1e-4, **PROBLEMS["driven"])[1]
     assert text.endswith("(stiff equations); SciPy's Radau and LSODA are for them")
-    common = {
-        "error_order": 3,
-        "is_always_stable": True,
-        "needs_acceleration": False,
-        "has_series": False,
-        "is_exact": False,
-        "kept": (),
-    }
+    common = {"error_order": 3, "is_always_stable": True} | dict.fromkeys(("needs_acceleration", "has_series", "is_exact"), False)
+    common |= {"kept": ()}
     loose, tight = (SimpleNamespace(name=f"implicit_{order}", order=order, **common) for order in (2, 5))
     fixed = SimpleNamespace(**{**vars(tight), "error_order": None, "order": 6})
     monkeypatch.setattr(all_methods, "methods", lambda: (*explicit, loose, tight, fixed))
@@ -300,25 +290,24 @@ def passed(system: Any, method: str, **options: Any) -> tuple[sw.Run, Any]:
     return run, np.where(rows[:, [2 * n + engine.COUNTS.start]] > 0.0, rows, 0.0)  # those that were reached
 
 
-@pytest.mark.parametrize("method", EXPLICIT)
-@pytest.mark.parametrize("options", [{}, {"at": 37}, {"dtype": "float32", "tolerance": 1e-4}], ids=["", "at", "float32"])
+@pytest.mark.parametrize(
+    ("method", "options"),
+    [
+        ("merson", {"at": [60.0]}),
+        ("merson", {"at": np.linspace(0.5, 60.0, 37)}),
+        ("merson", {"at": [400.0], "dtype": "float32", "tolerance": 1e-4}),
+        ("taylor", {"at": [300.0]}),
+    ],
+)
 def test_waypoints_have_the_same_bits_by_both_backends(method: str, options: dict[str, Any]) -> None:
-    if method == "taylor" and "dtype" in options:
-        pytest.skip("taylor has no float32")
-    end = {"merson": 60.0, "dop853": 260.0, "taylor": 300.0}.get(method, 60.0)
-    arguments: dict[str, Any] = {"v": 0.0, "y": np.array([0.5, 1.0, 2.5]), "tolerance": 1e-8, "at": [end]} | options
-    if arguments["at"] == 37:
-        arguments["at"] = np.linspace(0.5, end, 37)
-    if "dtype" in options:
-        arguments["at"] = [400.0]
-    results = [passed(sw.Pendulum(), method, backend=backend, **arguments)[1] for backend in ("rust", "numpy")]
+    arguments: dict[str, Any] = {"v": 0.0, "y": np.array([0.5, 1.0, 2.5]), "tolerance": 1e-8} | options
+    rust, numpy = (passed(sw.Pendulum(), method, backend=backend, **arguments)[1] for backend in ("rust", "numpy"))
     n = 2
-    counts = results[0][:, 2 * n + engine.COUNTS.start]
-    assert counts.max() >= 256.0
-    for rows in results:
+    assert rust[:, 2 * n + engine.COUNTS.start].max() >= 256.0
+    for rows in (rust, numpy):
         # What is asked of a run next is not where a member stands.
         rows[:, [2 * n + place for place in (engine.TARGET, engine.EXTRA, engine.HELD)]] = 0.0
-    np.testing.assert_array_equal(*results)
+    np.testing.assert_array_equal(rust, numpy)
 
 
 def test_a_waypoint_is_where_the_steps_were() -> None:
@@ -336,16 +325,15 @@ def test_a_waypoint_is_where_the_steps_were() -> None:
         assert each[6 + engine.TIME] == every.t[count]
 
 
-@pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("method", ["merson", "taylor"])
-def test_waypoints_of_a_batch_are_those_of_its_members(method: str, threads: int) -> None:
+def test_waypoints_of_a_batch_are_those_of_its_members(method: str) -> None:
     y = np.random.default_rng(3).normal(size=(3, 600))
-    _, rows = passed(lorenz(), method, y=y, tolerance=1e-6, at=[30.0], threads=threads)
-    for member in (0, 17, 599):
-        _, alone = passed(lorenz(), method, y=y[:, member], tolerance=1e-6, at=[30.0])
-        np.testing.assert_array_equal(
-            np.delete(rows[..., member], 6 + engine.TARGET, 1), np.delete(alone[..., 0], 6 + engine.TARGET, 1)
-        )
+    other = 6 + engine.TARGET
+    for threads in (1, 3):
+        _, rows = passed(lorenz(), method, y=y, tolerance=1e-6, at=[30.0], threads=threads)
+        for member in (0, 17, 599):
+            _, alone = passed(lorenz(), method, y=y[:, member], tolerance=1e-6, at=[30.0])
+            np.testing.assert_array_equal(np.delete(rows[..., member], other, 1), np.delete(alone[..., 0], other, 1))
 
 
 def test_states_do_not_depend_on_waypoints() -> None:
@@ -366,12 +354,12 @@ def test_large_batches_have_none() -> None:
     assert waypoints == []
 
 
-@pytest.mark.parametrize("method", ["merson", "taylor"])
-def test_both_backends_say_the_same(method: str) -> None:
+@pytest.mark.long
+def test_both_backends_say_the_same() -> None:
     arguments: dict[str, Any] = {"y": 1.0, "tolerance": (1e-2, 1e-3), "at": [9.0]}
-    texts = [told(system=follows(), method=method, backend=backend, **arguments)[1] for backend in ("rust", "numpy")]
-    assert texts[0] == texts[1]
-    assert len(texts[0]) == 1
+    rust, numpy = (told(system=follows(), method="merson", backend=each, **arguments)[1] for each in ("rust", "numpy"))
+    assert rust == numpy
+    assert len(rust) == 1
 
 
 def test_it_is_said_with_saved_steps_and_in_pieces_too() -> None:
