@@ -13,21 +13,11 @@ from stepwell.analysis import growth
 from stepwell.analysis.stability import limit
 from support.cases import Case
 
+spring = sw.system(lambda t, v, y, *, k=1e4, damping=0.1, push=1.0: -k * y - damping * v + push * np.sin(t))
 
-@sw.system
-def spring(t, v, y, *, k=1e4, damping=0.1, push=1.0):
-    return -k * y - damping * v + push * np.sin(t)
+inverted = sw.system(lambda t, v, y, *, rate=1.0: rate**2 * y)
 
-
-@sw.system
-def inverted(t, v, y, *, rate=1.0):
-    return rate**2 * y
-
-
-@sw.system(order=1)
-def lag(t, y, *, rate=50.0):
-    return 1.0 - rate * y
-
+lag = sw.system(order=1)(lambda t, y, *, rate=50.0: 1.0 - rate * y)
 
 PAST = [
     (sw.Oscillator(3.0), "false_euler", {"v": 0.0, "y": 1.0, "dt": 0.7, "steps": 200}, "its stability limit is 0.666667"),
@@ -73,7 +63,7 @@ def frames(world: sw.World, number: int, steps: int) -> None:
 
 
 def test_a_world_tells_it_once() -> None:
-    """1.877ⁿ is a million in 22 steps, and looked for after 8, 24, 56 and 120 steps; it is 10²⁷⁴ in 1000. Of few large calls it is
+    """1.877ⁿ is a million in 22 steps, looked for after 8, 24, 56 and 120 steps, and 10²⁷⁴ in 1000. Of few large calls it is
     told after the first.
     """
     system = sw.Oscillator(np.array([1.0, 2.0, 3.0]))
@@ -133,9 +123,7 @@ def test_a_sweep_passes_over_members_that_grow_by_themselves() -> None:
     assert len(caught) == 1
 
 
-@sw.system
-def pushed_off(t, v, y, *, square=1.0):
-    return square * y
+pushed_off = sw.system(lambda t, v, y, *, square=1.0: square * y)
 
 
 def test_a_small_member_beside_large_ones_is_told() -> None:

@@ -31,9 +31,7 @@ def predators(t: Any, y: Any) -> Any:
     return [y[0] * (1.0 - y[1]), y[1] * (y[0] - 1.0)]
 
 
-@sw.system(order=1)
-def swing(t: Any, y: Any) -> Any:
-    return [y[1], -y[0]]
+swing = sw.system(order=1)(lambda t, y: [y[1], -y[0]])
 
 
 def run_of(system: Any, method: str, start: Any, end: float, tolerance: Any, **options: Any) -> tuple[sw.Run, list[str]]:
@@ -113,7 +111,7 @@ def test_members_are_looked_at_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -
     """Which ones are told does not depend on how many are looked at together."""
 
     @sw.system(order=1)
-    def species(t, y, *, a=0.8, b=1.3):  # type: ignore[no-untyped-def]
+    def species(t, y, *, a=0.8, b=1.3):
         p, q, r = y
         return [p * (1.0 - p - a * q - b * r), q * (1.0 - q - b * p - a * r), r * (1.0 - r - a * p - b * q)]
 

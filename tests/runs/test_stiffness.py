@@ -49,11 +49,8 @@ def says_so(name: str, method: str, tolerance: Any) -> None:
     assert len(texts) == 1, (method, tolerance)
     (text,) = texts
     match, ratio = LIMIT.search(text), RATIO.search(text)
-    assert match is not None
-    assert ratio is not None
     assert ratio[1] is None or int(ratio[1]) >= 5
     assert "(stiff equations" in text
-    assert run.paces is not None
     stopped = bool(run.status == sw.Status.BUDGET)
     assert text.startswith(
         "the run stopped before" if stopped else "stability, and not the tolerance, held down the steps of the"
@@ -62,7 +59,6 @@ def says_so(name: str, method: str, tolerance: Any) -> None:
         assert f"60000 attempts, {int(run.paces.rejected)} of them rejected, steps of" in text
         assert f"at t = {float(run.paces.t):g}; out of max_steps" in text
     where = run.controller_state
-    assert where is not None
     if match[1] in (None, f"{float(run.paces.t):g}"):
         values = sw.jacobian(run.system, v=where.v, y=where.y, t=float(run.paces.t)).eigenvalues
         fastest = values[np.abs(values).argmax()]
@@ -75,9 +71,6 @@ def says_so(name: str, method: str, tolerance: Any) -> None:
 def test_the_limit_is_that_of_stability_limit_at_the_state(name: str, method: str) -> None:
     run, (text,) = told(method=method, tolerance=(1e-5, 1e-9), **{"max_steps": 60_000} | PROBLEMS[name])
     where, match = run.controller_state, LIMIT.search(text)
-    assert where is not None
-    assert run.paces is not None
-    assert match is not None
     assert match[1] in (None, f"{float(run.paces.t):g}")
     limit = float(sw.stability_limit(run.system, method, v=where.v, y=where.y, t=float(run.paces.t)))
     assert float(match[3]) == pytest.approx(limit, rel=0.005)  # it is told with three digits
@@ -87,7 +80,6 @@ def test_the_limit_of_a_series_is_that_of_its_order() -> None:
     """The first terms of exp(z) up to the order that the tolerance takes, 10, are 1 at the limit of a rate that decays."""
     run, (text,) = told(method="taylor", tolerance=1e-6, **PROBLEMS["linear"])
     match = LIMIT.search(text)
-    assert match is not None
     z = -float(match[3]) / float(match[2])
     assert abs(sum(z**k / factorial(k) for k in range(11))) == pytest.approx(1.0, abs=0.05)
     exact = stiffness.limit_of(run.method, 10, -1.0)
@@ -102,7 +94,6 @@ def test_a_method_that_is_stable_takes_fewer_steps() -> None:
     for name, tolerance in itertools.product(("HIRES", "driven"), TOLERANCES):
         problem = PROBLEMS[name]
         run, (_,) = told(method="dop853", tolerance=tolerance, **problem)
-        assert run.paces is not None
         reference = run.system.reference_at_step(1.0, ())
 
         def rates(t: float, y: Any, reference: Any = reference, scalar: bool = np.ndim(problem["y"]) == 0) -> Any:
@@ -120,7 +111,7 @@ def test_members_that_are_stiff_are_counted_and_the_first_is_named() -> None:
     (finding,) = (each for each in run.findings if each.category is sw.StiffnessWarning)
     assert finding.members.tolist() == [False, True, False, True]
     _, (same,) = told(system=follows(k=2000.0), method="merson", y=1.0, tolerance=1e-4, at=[20.0])
-    assert LIMIT.search(text)[0] == LIMIT.search(same)[0]  # type: ignore[index]
+    assert LIMIT.search(text)[0] == LIMIT.search(same)[0]
     one, (text,) = told(system=follows(k=k[:3].reshape(1, 3)), method="merson", y=np.ones((1, 3)), tolerance=1e-4, at=[20.0])
     assert "of 1 of 3 members: member (0, 1); the fastest" in text
     assert one.findings[-1].members.tolist() == [[False, True, False]]
@@ -176,7 +167,6 @@ def test_states_of_many_numbers_are_seen_by_powers() -> None:
 
     _, (text,) = told(system=heat(), method="merson", y=np.zeros(300), tolerance=(1e-4, 1e-7), at=[0.03])
     match = LIMIT.search(text)
-    assert match is not None
     assert 1.0 / float(match[2]) == pytest.approx(4.0 * 301.0**2, rel=0.1)
 
 
@@ -191,7 +181,6 @@ def test_tame_runs_say_nothing() -> None:
     talk, long_enough = {}, 0
     for name, arguments in TAME:
         run, texts = told(**arguments)
-        assert run.paces is not None
         long_enough += int(run.paces.accepted.max()) >= 2048
         talk |= {name: texts} if texts else {}
     assert talk == {}
@@ -209,7 +198,6 @@ def test_steps_that_the_user_bounds_are_not_held_down_by_stability() -> None:
 def test_steps_that_accuracy_asks_for_are_not_held_down_by_stability() -> None:
     """At a tolerance of 1e-9 they are a sixth of the limit."""
     run, texts = told(system=follows(), method="merson", y=1.0, tolerance=1e-9, at=[20.0])
-    assert run.paces is not None
     assert int(run.paces.accepted) > 5 * 20.0 / 0.00355
     assert texts == []
 
@@ -315,7 +303,6 @@ def test_a_waypoint_is_where_the_steps_were() -> None:
     arguments: dict[str, Any] = {"y": np.ones(3), "tolerance": 1e-6, "at": [60.0]}
     run, rows = passed(lorenz(), "merson", **arguments)
     every = quietly(lorenz(), "merson", every=1, **arguments)
-    assert run.paces is not None
     last = 1 << (int(run.paces.accepted).bit_length() - 1)
     counts = rows[:, 6 + engine.COUNTS.start, 0]
     assert sorted(counts) == [last // 2, last]
@@ -342,8 +329,6 @@ def test_states_do_not_depend_on_waypoints() -> None:
         run, _ = told(system=hires(), method=method, **arguments)
         other = quietly(hires(), method, **arguments)
         np.testing.assert_array_equal(run.y, other.y)
-        assert run.controller_state is not None
-        assert other.controller_state is not None
         np.testing.assert_array_equal(run.controller_state.pace, other.controller_state.pace)
 
 

@@ -9,31 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from support.stiff import robertson, van_der_pol
 
 CHOOSE = [m.name for m in sw.methods() if m.error_order is not None]
 #: Those whose steps stability can hold down.
 BOUND = [name for name in CHOOSE if not sw.method(name).is_always_stable]
 
 
-@sw.system(order=1)
-def robertson(t: Any, y: Any, *, fast: Any = 3e7) -> Any:
-    a, c = -0.04 * y[0] + 1e4 * y[1] * y[2], fast * y[1] ** 2
-    return np.array([a, -a - c, c])
+pole = sw.system(order=1)(lambda t, y, *, k=1.0: np.array([0.1 * y[0], k * y[1] * y[1]]))
 
-
-@sw.system
-def van_der_pol(t: Any, v: Any, y: Any, *, mu: Any = 1000.0) -> Any:
-    return mu * (1.0 - y * y) * v - y
-
-
-@sw.system(order=1)
-def pole(t: Any, y: Any, *, k: Any = 1.0) -> Any:
-    return np.array([0.1 * y[0], k * y[1] * y[1]])
-
-
-@sw.system(order=1)
-def root(t: Any, y: Any, *, below: Any = 0.0) -> Any:
-    return np.array([y[0], np.sqrt(y[1] - below)])
+root = sw.system(order=1)(lambda t, y, *, below=0.0: np.array([y[0], np.sqrt(y[1] - below)]))
 
 
 def stopped(system: Any, method: str, **options: Any) -> tuple[sw.Run, str]:
@@ -49,7 +34,6 @@ def test_out_of_steps_tells_how_many_and_how_long() -> None:
     for method in BOUND:
         run, text = stopped(sw.Oscillator(), method, v=0.0, y=1.0, tolerance=1e-8, at=[1e6], max_steps=3000)
         paces = run.paces
-        assert paces is not None
         mean = float(paces.t) / int(paces.accepted)
         words = f"out of max_steps: 3000 attempts, {int(paces.rejected)} of them rejected, steps of {mean:.2g} on average"
         assert f"{words}, not held down by stability; max_steps=" in text, method
@@ -62,10 +46,8 @@ def test_stiffness_is_named_by_its_rate(method: str) -> None:
     members = (2,) if method == "merson" else ()
     y = np.array([1.0, 0.0, 0.0]).reshape(3, *(1,) * len(members)) * np.ones(members)
     run, text = stopped(robertson(), method, y=y, tolerance=(1e-6, 1e-9), at=[1e4], max_steps=20_000)
-    assert run.controller_state is not None
     state = run.controller_state.y[:, 0] if members else run.controller_state.y
     match = re.search(r"the fastest rate there, 1/([\d.e-]+), lets no steps beyond ([\d.e-]+) be stable \(stiff", text)
-    assert match is not None
     # Both are told with three digits.
     assert float(match[1]) == pytest.approx(1.0 / (1e4 * state[2] + 6e7 * state[1]), rel=0.006)
     if method != "taylor":  # its order goes by the tolerance: see tests/runs/test_stiffness.py
@@ -90,7 +72,6 @@ def test_the_stop_of_a_batch_is_told_by_member() -> None:
     for method in CHOOSE:
         run, text = stopped(pole(k=k), method, y=np.ones((2, 3)), tolerance=1e-9, at=[2.0])
         assert text.startswith("2 of 3 members stopped before t = 2; the first was member 1 at t = 0.5; "), method
-        assert run.stopped_at is not None
         # A pole is passed or met where the relative error of 1/y, a tolerance a step over some hundred steps, allows.
         np.testing.assert_allclose(run.stopped_at[:2], [1.0, 0.5], rtol=1e-6)
         assert np.isnan(run.stopped_at[2])
@@ -118,7 +99,6 @@ def test_a_rate_that_becomes_nan_is_named() -> None:
     """√(1 − t) with the time."""
     late = sw.system(lambda t, v, y: -y + np.sqrt(1.0 - t))
     run, text = stopped(late(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[4.0])
-    assert run.stopped_at is not None
     assert float(run.stopped_at) == pytest.approx(1.0, abs=1e-6)
     assert "no step, however small, gives finite numbers" in text
 
@@ -129,16 +109,11 @@ def test_an_event_and_a_stop_are_told_side_by_side() -> None:
     k = np.array([1.0, 4.0])
     run, _ = stopped(pole(k=k), "dop853", y=np.ones((2, 2)), tolerance=1e-9, at=[2.0], events=event)
     assert run.status.tolist() == [sw.Status.EVENT, sw.Status.UNDERFLOW]
-    assert run.stopped_at is not None
     np.testing.assert_allclose(run.stopped_at, [np.log(1.04) / 0.1, 0.25], rtol=1e-6)
 
 
-def message_of(system: Any, method: str = "merson", **options: Any) -> str:
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        sw.integrate(system, method, **{"tolerance": 1e-6, **options})
-    (message,) = (str(each.message) for each in caught)
-    return message
+def message_of(system: Any, **options: Any) -> str:
+    return stopped(system, "merson", **{"tolerance": 1e-6} | options)[1]
 
 
 def test_what_positive_keeps_is_told_first() -> None:
