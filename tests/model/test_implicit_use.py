@@ -1,19 +1,18 @@
-"""Implicit methods go where the others go: events, worlds, sweeps, resumed and saved runs, controls, surfaces, large systems."""
+"""Implicit methods go where the others go: events, sweeps, controls, surfaces, large systems."""
 
 from __future__ import annotations
 
-import copy
-import pickle
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
+from support.for_each import for_each
+from support.ways import assert_equal_ways
 
 IMPLICIT = [m.name for m in sw.methods() if m.is_implicit]
 ABLE = [name for name in IMPLICIT if sw.method(name).error_order is not None]
 WAYS = [*((name, "fixed") for name in IMPLICIT), *((name, "adaptive") for name in ABLE)]
-ways = pytest.mark.parametrize(("method", "way"), WAYS, ids=[f"{name}-{way}" for name, way in WAYS])
 
 
 @sw.system
@@ -26,32 +25,7 @@ def until(way: str, end: float) -> dict[str, Any]:
     return {"dt": 0.02, "steps": round(end / 0.02)} if way == "fixed" else {"tolerance": 1e-5, "at": [end]}
 
 
-def same(a: sw.Run, b: sw.Run) -> bool:
-    return np.array_equal(a.y[-1], b.y[-1]) and np.array_equal(a.v[-1], b.v[-1])
-
-
-@ways
-def test_a_run_goes_on_to_the_bit(method: str, way: str, tmp_path: Any) -> None:
-    """From a run, from one that was saved and loaded, and in a world."""
-    system, start = van_der_pol(), {"v": 0.0, "y": 2.0}
-    first = sw.integrate(system, method, **start, **until(way, 0.4))
-    if way == "adaptive":
-        whole = sw.integrate(system, method, **start, tolerance=1e-5, at=[0.4, 1.0])
-        more: dict[str, Any] = {"at": [1.0]}
-    else:
-        whole, more = sw.integrate(system, method, **start, **until(way, 1.0)), {"steps": 30}
-    assert same(sw.integrate(system, method, resume=first, **more), whole)
-    first.save(tmp_path / "first.npz")
-    assert same(sw.integrate(system, method, resume=sw.load(tmp_path / "first.npz"), **more), whole)
-    if way == "fixed":
-        world = sw.World(system, method, resume=first)
-        world.step(10)
-        for other in (copy.deepcopy(world), pickle.loads(pickle.dumps(world))):
-            other.step(20)
-            assert np.array_equal(other.y, whole.y[-1])
-
-
-@ways
+@for_each("method, way", WAYS)
 def test_events_act_and_stop(method: str, way: str) -> None:
     """Of the true motion: the first time at which y falls to 1, and again from where an event puts it."""
     fall = sw.Event(lambda t, v, y: y - 1.0, name="fall", then=lambda t, v, y: (v, y + 1.0))
@@ -65,31 +39,21 @@ def test_events_act_and_stop(method: str, way: str) -> None:
     stopped = sw.integrate(system, method, **start, events=stop, **until(way, 9.0))
     assert stopped.status == sw.Status.EVENT
     assert float(stopped.stopped_at) == run.events["fall"].t[0]  # type: ignore[arg-type]
-    if way == "fixed":
-        v, y = np.zeros(1), np.full(1, 2.0)
-        world = sw.World(system, method, v=v, y=y, dt=0.02, events=fall)
-        world.step(450)
-        assert np.array_equal(y, run.y[-1].reshape(1))
 
 
-@ways
+@pytest.mark.parametrize(("method", "way"), [("backward_euler", "fixed"), ("rodas4", "adaptive")])
 def test_a_sweep_has_the_bits_of_a_run(method: str, way: str, tmp_path: Any) -> None:
     """In chunks, too; and with a store, which is complete at the second call."""
     mu = np.linspace(1.0, 100.0, 10)
     run = sw.integrate(van_der_pol(mu=mu), method, v=0.0, y=np.full(10, 2.0), **until(way, 0.5))
-    arguments: dict[str, Any] = {"v": 0.0, "y": 2.0, "outcomes": "last"} | until(way, 0.5)
     stored = {"chunk": 5, "store": tmp_path / "a.zarr"}
-    for options in ({}, {"chunk": 3}, *([stored, stored] if (method, way) in STORED else [])):
-        with sw.sweep(van_der_pol, {"mu": mu}, method, **arguments, **options) as found:
-            assert np.array_equal(found.y_last, run.y[-1])
-            assert np.array_equal(found.v_last, run.v[-1])
+    for options in ({}, {"chunk": 3}, stored, stored):
+        with sw.sweep(van_der_pol, {"mu": mu}, method, v=0.0, y=2.0, outcomes="last", **until(way, 0.5), **options) as swept:
+            assert np.array_equal(swept.y_last, run.y[-1])
+            assert np.array_equal(swept.v_last, run.v[-1])
 
 
-#: Disks take their time.
-STORED = (("backward_euler", "fixed"), ("rodas4", "adaptive"))
-
-
-@pytest.mark.parametrize("method", IMPLICIT)
+@for_each("method", IMPLICIT)
 def test_what_is_around_a_system_is_in_its_jacobian(method: str) -> None:
     """A strong drag, a force and a spring to a floor: steps that no explicit method bears stay near the true motion."""
     drag = sw.system(lambda t, v, y: -1e4 * v)()
@@ -113,7 +77,7 @@ def test_what_is_around_a_system_is_in_its_jacobian(method: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::stepwell.AccuracyWarning")  # without a control Euler's methods change it
-@pytest.mark.parametrize("method", IMPLICIT)
+@for_each("method", IMPLICIT)
 def test_controls_keep_the_energy(method: str) -> None:
     bodies = {"v": np.array([[0.0, -1e-3], [0.0, 1.0]]), "y": np.array([[0.0, 0.0], [1.0, 0.0]]), "dt": 0.05, "steps": 200}
     system = sw.NBody(np.array([1.0, 1e-3]))
@@ -130,30 +94,14 @@ N = 600
 CHAIN: dict[str, Any] = {"v": np.zeros(N), "y": np.linspace(0.0, 1.0, N)}
 
 
-LARGE = [("linearly_implicit_euler", "fixed"), ("trapezoidal", "fixed"), ("rodas4", "fixed"), ("rosenbrock23", "adaptive")]
-
-
-@pytest.mark.parametrize(("method", "way"), LARGE, ids=[name for name, _ in LARGE])
-def test_a_large_system_goes_the_same_ways(method: str, way: str, tmp_path: Any) -> None:
-    """Resumed and saved runs, a world, and batches, whose members have steps of their own."""
-    chain = sw.Chain(N)
-    ends: list[dict[str, Any]] = [{"tolerance": 1e-3, "at": [0.1]}, {"at": [0.2]}]
-    if way == "fixed":
-        ends = [{"dt": 0.05, "steps": 2}, {"steps": 2}]
-    first = sw.integrate(chain, method, **CHAIN, **ends[0])
-    first.save(tmp_path / "first.npz")
-    last = [sw.integrate(chain, method, resume=each, **ends[1]) for each in (first, sw.load(tmp_path / "first.npz"))]
-    assert same(*last)
-    if way == "fixed":
-        assert same(last[0], sw.integrate(chain, method, **CHAIN, dt=0.05, steps=4))
-        world = sw.World(chain, method, resume=first)
-        world.step(2)
-        assert np.array_equal(world.y, last[0].y[-1])
-    stiffness = np.ones((N + 1, 1)) * np.array([1.0, 1e4])
+def test_a_large_system_goes_the_same_ways() -> None:
+    """Its members, of which one is much stiffer, have steps of their own."""
+    chain = sw.Chain(N, stiffness=np.ones((N + 1, 1)) * np.array([1.0, 1e4]))
     batch = {name: block[:, np.newaxis] * np.ones(2) for name, block in CHAIN.items()}
-    both = sw.integrate(sw.Chain(N, stiffness=stiffness), method, **batch, **ends[0])
-    alone = sw.integrate(sw.Chain(N, stiffness=stiffness[:, 1]), method, **CHAIN, **ends[0])
-    assert np.array_equal(both.y[-1][:, 1], alone.y[-1])
+    ways = ("in pieces", "from a file", "alone")
+    for method in ("linearly_implicit_euler", "trapezoidal", "rodas4"):
+        assert_equal_ways(chain, method, **batch, dt=0.05, steps=4, ways=(*ways, "in a world"))
+    assert_equal_ways(chain, "rosenbrock23", **batch, tolerance=1e-3, at=[0.1, 0.2], ways=ways)
 
 
 def test_events_of_a_large_system() -> None:

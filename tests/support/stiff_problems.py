@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from decimal import Decimal, localcontext
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -125,41 +124,6 @@ def end(system: Any, method: str, start: dict[str, float], **options: Any) -> li
     """Both blocks at the end of a run."""
     run = sw.integrate(system, method, **start, **options)
     return [run.v[-1], run.y[-1]]
-
-
-def random_stiff(rng: np.random.Generator, n: int) -> Any:
-    """A matrix with real eigenvalues from −1e8 to −0.01, whose eigenvectors are far from orthogonal."""
-    vectors = np.eye(n) + np.triu(rng.normal(size=(n, n)), 1) * 5.0
-    turned = np.linalg.qr(rng.normal(size=(n, n)))[0] @ vectors
-    rates = -(10.0 ** rng.uniform(-2, 8, n))
-    return turned @ np.diag(rates) @ np.linalg.inv(turned)
-
-
-def rational_of(function: Any, h: float, matrix: Any, s: Any) -> Any:
-    """R(h·A)·s by fractions."""
-    n = len(s)
-    z = [[Fraction(h) * Fraction(float(a)) for a in row] for row in matrix]
-    powers = [[Fraction(float(x)) for x in s]]
-    columns = [[Fraction(int(i == j)) for i in range(n)] for j in range(n)]
-    below = [[Fraction(0)] * n for _ in range(n)]
-    for c in function.below.coefficients:  # its matrix, column by column
-        for j, column in enumerate(columns):
-            for i in range(n):
-                below[i][j] += c * column[i]
-        columns = [[sum((a * x for a, x in zip(row, column, strict=True)), Fraction(0)) for row in z] for column in columns]
-    right = [Fraction(0)] * n
-    for c in function.above.coefficients:
-        right = [r + c * x for r, x in zip(right, powers[-1], strict=True)]
-        powers.append([sum((a * x for a, x in zip(row, powers[-1], strict=True)), Fraction(0)) for row in z])
-    for k in range(n):
-        pivot = next(i for i in range(k, n) if below[i][k])
-        below[k], below[pivot], right[k], right[pivot] = below[pivot], below[k], right[pivot], right[k]
-        for i in range(n):
-            if i != k and below[i][k]:
-                factor = below[i][k] / below[k][k]
-                below[i] = [a - factor * b for a, b in zip(below[i], below[k], strict=True)]
-                right[i] -= factor * right[k]
-    return np.array([float(r / below[k][k]) for k, r in enumerate(right)])
 
 
 def exponential(matrix: Any, t: float) -> Any:
