@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import stepwell as sw
 from support.cases import Case, cases
+from support.for_each import for_each
 
 MATRIX = [c for c in cases() if c.form == "matrix"]
 EPS = np.finfo(float).eps
 
 
-@pytest.mark.parametrize("case", MATRIX, ids=str)
+@for_each("case", MATRIX)
 def test_direct_and_matrix_agree(case: Case) -> None:
     n = 200
     # Small steps, so that no method grows by more than 10 in 200 of them and errors are not amplified by more.

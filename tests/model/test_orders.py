@@ -6,6 +6,7 @@ import decimal
 import itertools
 from collections.abc import Callable, Iterator
 from decimal import Decimal
+from functools import cache
 from types import ModuleType
 from typing import Any
 
@@ -15,6 +16,7 @@ import stepwell as sw
 from stepwell.errors import UnsupportedError
 from stepwell.reference import tableau
 from support import dop853
+from support.for_each import for_each
 
 #: Sixteen digits show orders up to 5: of higher ones the error is rounding before its first power rules.
 METHODS = [m for m in sw.methods() if m.order <= 5]
@@ -107,6 +109,7 @@ PROBLEMS: dict[str, tuple[sw.System, Any, Any, float]] = {
 }
 
 
+@cache
 def ends(name: str, method: str, steps: int) -> tuple[Any, Any]:
     system, v, y, end = PROBLEMS[name]
     run = sw.integrate(system, method, v=v, y=y, dt=end / steps, steps=steps)
@@ -115,7 +118,7 @@ def ends(name: str, method: str, steps: int) -> tuple[Any, Any]:
 
 @pytest.mark.filterwarnings("ignore:the run has another energy")
 @pytest.mark.parametrize("name", PROBLEMS)
-@pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
+@for_each("method", METHODS)
 def test_the_order_is_the_declared_one(name: str, method: sw.Method) -> None:
     """Halving the step divides the error of v and that of y by 2ᵖ.
 
@@ -160,7 +163,7 @@ def test_bodies_that_lose_mass_move_as_derived() -> None:
         assert np.abs(run.y[-1] - y).max() > 0.01
 
 
-@pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
+@for_each("method", METHODS)
 def test_the_order_on_bodies_that_lose_mass_by_the_formula(method: sw.Method) -> None:
     """Halving the step divides the error by 2ᵖ: a force at a time that is wrong by a share of a step makes it 1."""
     v, y = fading_orbit(2.3)
@@ -262,8 +265,8 @@ def high_end(method: ModuleType, rate: Any, steps: int) -> tuple[Any, Any]:
 
 
 @pytest.mark.usefixtures("fifty_digits")
-@pytest.mark.parametrize("rate", [spring, pushed, pendulum, ellipse, losing_mass])
-@pytest.mark.parametrize("name", HIGH)
+@for_each("rate", [spring, pushed, pendulum, ellipse, losing_mass])
+@for_each("name", HIGH)
 def test_a_high_order_is_the_declared_one(name: str, rate: Any) -> None:
     """Halving the step divides what a halving still changes by 2ᵖ, in both blocks; the next power leaves half each time."""
     ends = [high_end(HIGH[name], rate, steps) for steps in (8, 16, 32, 64, 128)]

@@ -8,14 +8,15 @@ import stepwell as sw
 from stepwell.analysis.stability.counted import operations
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference import trig
+from support.for_each import for_each
 
 METHODS = [m.name for m in sw.methods()]
-ADAPTIVE = [m.name for m in sw.methods() if m.error_order is not None and not m.has_series]  # it refuses samples
+ADAPTIVE = [m.name for m in sw.methods() if m.error_order is not None and not m.has_series]
 ARENSTORF = {"v": np.array([0.0, -2.00158510637908252240537862224]), "y": np.array([0.994, 0.0])}
 PERIOD = 17.0652165601579625588917206249
 
 
-@pytest.mark.parametrize("method", METHODS)
+@for_each("method", METHODS)
 def test_below_the_pendulum_is_the_oscillator(method):
     bottom, spring = sw.Pendulum(1.3), sw.Oscillator(1.3, form="physical")
     analysis, wanted = sw.analyse(bottom, method, dt=0.4, at=(0.0, 0.0)), sw.analyse(spring, method, dt=0.4)
@@ -68,29 +69,7 @@ def test_the_sine_of_numbers_that_only_the_analysis_knows():
     assert swing.additions - plain.additions == 4 * 12
 
 
-@pytest.mark.parametrize("method", ADAPTIVE)
-def test_chosen_steps_are_the_reference_s(method):
-    rng = np.random.default_rng(4)
-    omega, v, y = rng.uniform(0.5, 2.0, 37), rng.normal(size=37), rng.normal(size=37)
-    moons = sw.RestrictedThreeBody(np.linspace(0.01, 0.3, 21))
-    runs = [
-        (sw.Pendulum(omega), {"v": v, "y": y}),
-        (sw.Pendulum(omega, 0.1, a=rng.normal(size=37)), {"v": v, "y": y}),
-        (sw.Pendulum(omega, 0.1, a=sw.Sinusoid(v, 2.0, 0.1)), {"v": v, "y": y}),
-        (sw.Pendulum(omega, a=sw.Sinusoid(v, omega, y)), {"v": v, "y": y}),
-        (sw.Pendulum(omega, a=sw.Sampled(rng.normal(size=(5, 37)), 0.7)), {"v": v, "y": y}),
-        (moons, {"v": np.array([[0.0], [-0.5]]), "y": np.array([[0.5], [0.0]])}),
-        (sw.RestrictedThreeBody(), ARENSTORF),
-    ]
-    for system, state in runs:
-        # By a method of order 2 a tolerance of 1e-7 takes steps by the thousand.
-        arguments = {"tolerance": 1e-4 if sw.method(method).order == 2 else 1e-7, "at": [0.5, 1.0, 4.0]}
-        rust, other = (sw.integrate(system, method, **state, **arguments, backend=b) for b in ("rust", "numpy"))
-        np.testing.assert_array_equal(rust.v, other.v)
-        np.testing.assert_array_equal(rust.y, other.y)
-
-
-@pytest.mark.parametrize("method", ADAPTIVE)
+@for_each("method", ADAPTIVE)
 def test_chosen_steps_close_arenstorfs_orbit(method):
     run = sw.integrate(sw.RestrictedThreeBody(), method, **ARENSTORF, tolerance=1e-13, at=[PERIOD])
     np.testing.assert_allclose(run.y[-1], ARENSTORF["y"], rtol=0, atol=1e-6)
@@ -127,7 +106,7 @@ def test_forces_of_the_velocity_are_refused_by_verlet():
             sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, form=form)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("make", "message"),
     [
         (lambda: sw.Pendulum(0.0), "omega: expected numbers above zero"),

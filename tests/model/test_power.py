@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.reference import trig
+from support.for_each import for_each
 
 U = np.finfo(float).eps / 2
 METHODS = list(sw.methods())
@@ -47,10 +48,9 @@ def forced(method: sw.Method) -> list[sw.System]:
     ]
 
 
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize("driven", [False, True])
-@pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
-def test_power_and_direct_agree(method: sw.Method, driven: bool, backend: str) -> None:
+@for_each("driven", [False, True])
+@for_each("method", METHODS)
+def test_power_and_direct_agree(method: sw.Method, driven: bool) -> None:
     """Free, damped, pushed by constants and by sinusoids, at saved states and at an odd end."""
     # Φ = 0.5 or less where the method is stable: κ < 1.3, Verlet's 2/Φ = 8 over ω₀ = 0.5; 0.05 where it grows, then by e^(NΦ²/2)
     # < 3.5 at most. Inputs add the response to one of size 1, which is below 6 off resonance.
@@ -58,7 +58,7 @@ def test_power_and_direct_agree(method: sw.Method, driven: bool, backend: str) -
     options: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": dt, "steps": 1003, "every": 10, "t0": 0.7, "start_step": 5}
     for system in forced(method) if driven else unforced(method):
         direct = sw.integrate(system, method, **options)
-        power = sw.integrate(system, method, **options, form="power", backend=backend)
+        power = sw.integrate(system, method, **options, form="power")
         apart = max(np.abs(power.v - direct.v).max(), np.abs(power.y - direct.y).max())
         size = max(np.abs(direct.v).max(), np.abs(direct.y).max(), 1.0)
         kappa = 8.0 if driven or method.carry else 3.5
@@ -112,7 +112,7 @@ def test_a_million_million_steps_at_once() -> None:
 SUITED = [m for m in METHODS if not (m.needs_acceleration or m.takes_derivatives_by_time)]
 
 
-@pytest.mark.parametrize("method", SUITED, ids=lambda m: m.name)
+@for_each("method", SUITED)
 def test_a_thousand_million_driven_steps(method: sw.Method) -> None:
     """Damped, so that only the last steps count: stepping the last few thousand ends in the same state."""
     system = sw.Oscillator(1.0, 0.5, x=sw.Sinusoid(1.0, 0.7, 0.3), a=0.2)
@@ -127,21 +127,7 @@ def test_a_thousand_million_driven_steps(method: sw.Method) -> None:
     assert abs(power.y[-1] - direct.y[-1]) < limit
 
 
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize("method", ["false_euler", "verlet", "rk4"])
-def test_going_on_where_states_are_kept(method: str, backend: str) -> None:
-    """The same leaps from the same states: in pieces as in one piece, to the bit."""
-    system = sw.Oscillator(np.linspace(0.5, 1.5, 7), x=sw.Sinusoid(1.0, 0.7) if method != "verlet" else None, a=0.3)
-    options: dict[str, Any] = {"dt": 0.1, "form": "power", "backend": backend, "every": 1000}
-    whole = sw.integrate(system, method, v=0.0, y=1.0, steps=5000, **options)
-    run = sw.integrate(system, method, v=0.0, y=1.0, steps=2000, **options)
-    run = sw.integrate(system, method, steps=3000, **options, resume=run)
-    np.testing.assert_array_equal(run.v, whole.v[2:])
-    np.testing.assert_array_equal(run.y, whole.y[2:])
-    np.testing.assert_array_equal(run.t, whole.t[2:])
-
-
-@pytest.mark.parametrize("every", [None, 1, 7, 1000])
+@for_each("every", [None, 1, 7, 1000])
 def test_who_diverged_and_when(every: int | None) -> None:
     """Found by halving, and right but for the rounding of numbers near the end of the range; neighbours do not notice."""
     phi = np.array([[0.5, 2.5, 1.9], [3.0, 1.0, 2.01]])
@@ -163,7 +149,7 @@ def test_who_diverged_and_when(every: int | None) -> None:
     np.testing.assert_array_equal(alone.y, power.y[:, 0, 2])
 
 
-@pytest.mark.parametrize("every", [None, 1, 7, 1000, 5000])
+@for_each("every", [None, 1, 7, 1000, 5000])
 def test_the_first_bad_step_is_exact_where_nothing_rounds(every: int | None) -> None:
     """ṡ = s by Standard Euler with dt = 1 doubles s: 2¹⁰²⁴ is the first that is no number."""
     start = np.array([[1.0, 2.0**10, 2.0**1023, 0.75]])

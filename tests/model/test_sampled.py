@@ -9,6 +9,8 @@ import pytest
 import stepwell as sw
 from stepwell.errors import UnknownNameError
 from stepwell.reference import signal
+from support.for_each import for_each
+from support.ways import assert_equal_ways
 
 METHODS = sw.methods()
 #: At the shortest steps here DOP853 and the series are at rounding; these show their order before.
@@ -41,15 +43,15 @@ def error(method: str, steps: int, start: float = 0.0, omega: float = OMEGA, **o
     return float(max(abs(run.v[-1] - v), abs(run.y[-1] - y)))
 
 
-@pytest.mark.parametrize("name", ORDERS)
+@for_each("name", ORDERS)
 def test_a_method_has_its_order_where_samples_begin_with_steps(name: str) -> None:
     """Halving the step divides the error by 2^p up to the next order, a tenth of it here; one order less would halve that."""
     coarse, fine = error(name, 80), error(name, 160)
     assert fine < max(coarse / 2.0 ** (ORDERS[name] - 0.3), 1e-11)
 
 
-@pytest.mark.parametrize("steps", [20, 40, 100])
-@pytest.mark.parametrize("name", ORDERS)
+@for_each("steps", [20, 40, 100])
+@for_each("name", ORDERS)
 def test_without_a_spring_the_velocity_is_the_sum_of_the_samples(name: str, steps: int) -> None:
     """Every method adds h times the mean of its rates, so nothing but rounding of some hundred additions is left."""
     system = sw.Oscillator(0.0, a=sw.Sampled(VALUES, INTERVAL), form="physical")
@@ -57,8 +59,8 @@ def test_without_a_spring_the_velocity_is_the_sum_of_the_samples(name: str, step
     assert abs(run.v[-1] - (V + INTERVAL * VALUES.sum())) < 1000 * EPS
 
 
-@pytest.mark.parametrize("share", [1e-9, 1e-7, 1e-6, 1e-5, -1e-6])
-@pytest.mark.parametrize("name", ["rk4", "merson", "fehlberg_5", "dop853", "pefrl", "leapfrog"])
+@for_each("share", [1e-9, 1e-7, 1e-6, 1e-5, -1e-6])
+@for_each("name", ["rk4", "merson", "fehlberg_5", "dop853", "pefrl", "leapfrog"])
 def test_samples_that_begin_a_little_off_a_step(name: str, share: float) -> None:
     """The mean over a step is that of the true input, so v is right at its end; the place errs by (h/2)·δ·|a₂ − a₁| a sample.
 
@@ -70,7 +72,7 @@ def test_samples_that_begin_a_little_off_a_step(name: str, share: float) -> None
     assert error(name, steps, shift) < own * (1.0 + 100 * abs(share)) + bound + 1e-12
 
 
-@pytest.mark.parametrize("name", [name for name, order in ORDERS.items() if order >= 2])
+@for_each("name", [name for name, order in ORDERS.items() if order >= 2])
 def test_elsewhere_the_error_is_of_second_order(name: str) -> None:
     """An error of each of 20 samples of at most (h²/8)·|a₂ − a₁|, the most that a mean leaves of a place, times ω for v."""
     for steps in (90, 170, 310, 610):
@@ -79,7 +81,7 @@ def test_elsewhere_the_error_is_of_second_order(name: str) -> None:
         assert error(name, steps, 0.0137) < own + OMEGA * h * h / 8.0 * abs(np.diff(VALUES)).sum()
 
 
-@pytest.mark.parametrize("name", ["rk4", "leapfrog", "verlet", "false_euler"])
+@for_each("name", ["rk4", "leapfrog", "verlet", "false_euler"])
 def test_a_step_over_several_samples_sees_their_mean(name: str) -> None:
     """Without a spring v is then the integral of the samples, but for what begins and ends with half a step."""
     values = np.random.default_rng(2).normal(size=(200, 3))
@@ -92,12 +94,6 @@ def test_a_step_over_several_samples_sees_their_mean(name: str) -> None:
     # What carries something in place of v sees, at either end, the mean of a step for that of half a one.
     slack = 0.07 * np.abs(values).max() if sw.method(name).carry else 1000 * EPS
     assert np.abs(run.v[-1] - true).max() < slack
-    other = sw.integrate(system, name, v=V, y=Y, dt=0.07, steps=20, backend="numpy")
-    np.testing.assert_array_equal(run.v, other.v)
-    v, y = np.full(3, V), np.full(3, Y)
-    world = sw.World(system, name, v=v, y=y, dt=0.07)
-    world.step(20)
-    np.testing.assert_array_equal(world.y, run.y[-1])
 
 
 KINDS: dict[str, Any] = {
@@ -114,33 +110,24 @@ def pushed(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
     return push - y - 0.1 * y**3
 
 
-def systems(kind: str) -> dict[str, tuple[sw.System, Any, Any]]:
-    """Small and large ones, of each way in which inputs are looked up."""
-    r = np.random.default_rng(5)
-    options = KINDS[kind]
-    common, own = sw.Sampled(r.normal(size=31), **options), sw.Sampled(r.normal(size=(31, 3)), **options)
-    large = -np.eye(140, k=0) + 0.1 * r.normal(size=(140, 140)) / 140
-    return {
-        "oscillator": (sw.Oscillator([1.0, 2.0, 3.0], a=common, x=own), 0.1, 1.0),
-        "own": (pushed(push=own), 0.1, np.ones(3)),
-        "linear": (sw.LinearSystem(large, r.normal(size=(140, 2)), x=[common, own]), np.ones((70, 3)), np.ones((70, 3))),
-    }
-
-
-@pytest.mark.parametrize("method", ["rk4", "leapfrog", "verlet", "pefrl", "taylor", "dop853", "semi_false_heun"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_core_and_reference_agree_to_the_bit(kind: str, method: str) -> None:
-    for name, (system, v, y) in systems(kind).items():
-        if name == "linear" and (sw.method(method).needs_acceleration or method == "taylor"):
-            continue
-        start: dict[str, Any] = {"v": v, "y": y, "dt": 0.05, "steps": 37, "every": 5, "t0": -0.2}
-        run, other = (sw.integrate(system, method, **start, backend=backend) for backend in ("rust", "numpy"))
-        np.testing.assert_array_equal(run.y, other.y, err_msg=name)
-        np.testing.assert_array_equal(run.v, other.v, err_msg=name)
-        if system.linear and kind != "hold, within steps" and method != "taylor":
-            runs = [sw.integrate(system, method, **start, backend=backend, form="matrix") for backend in ("rust", "numpy")]
-            np.testing.assert_array_equal(runs[0].y, runs[1].y, err_msg=name)
-            assert runs[0].y == pytest.approx(run.y, abs=1e-11)
+def test_every_kind_goes_every_way(kind: str) -> None:
+    """Small systems and a large one, by what looks inputs up: at stages, as a mean, as a series."""
+    r = np.random.default_rng(5)
+    common, own = sw.Sampled(r.normal(size=31), **KINDS[kind]), sw.Sampled(r.normal(size=(31, 3)), **KINDS[kind])
+    options: dict[str, Any] = {"dt": 0.05, "steps": 19, "every": 5, "t0": -0.2}
+    small = {"v": np.full(3, 0.1), "y": np.ones(3)}
+    ways = ("by the reference", "in pieces", "in a world", "alone")
+    oscillator = sw.Oscillator([1.0, 2.0, 3.0], a=common, x=own)
+    for method in ("rk4", "verlet", "taylor", "semi_false_heun"):
+        direct = assert_equal_ways(oscillator, method, **small, **options, ways=ways)
+        assert_equal_ways(pushed(push=own), method, **small, **options, ways=ways)
+        if kind != "hold, within steps" and method != "taylor":
+            matrix = assert_equal_ways(oscillator, method, **small, **options, form="matrix", ways=ways[:1])
+            assert matrix.y == pytest.approx(direct.y, abs=1e-11)
+    large = sw.LinearSystem(-np.eye(140) + 0.1 * r.normal(size=(140, 140)) / 140, r.normal(size=(140, 2)), x=[common, own])
+    start = np.ones((70, 3))
+    assert_equal_ways(large, "rk4", v=start, y=start, dt=0.05, steps=7, ways=("by the reference", "in pieces"))
 
 
 def test_large_own_equations() -> None:
@@ -151,14 +138,10 @@ def test_large_own_equations() -> None:
         return push * np.cos(y) - (2.0 * y - np.roll(y, 1) - np.roll(y, -1)) ** 3
 
     r = np.random.default_rng(3)
-    for values in (r.normal(size=30), r.normal(size=(30, 2))):
-        system = ring(push=sw.Sampled(values, 0.035))
-        for method in ("dop853", "leapfrog", "verlet"):
-            # Past three samples: NumPy computes each of the 60 rates on its own.
-            start: dict[str, Any] = {"v": 0.0, "y": r.normal(size=(60, 2)), "dt": 0.01, "steps": 12, "every": 4}
-            run, other = (sw.integrate(system, method, **start, backend=backend) for backend in ("rust", "numpy"))
-            np.testing.assert_array_equal(run.y, other.y)
-            np.testing.assert_array_equal(run.v, other.v)
+    for method, values in (("dop853", r.normal(size=30)), ("verlet", r.normal(size=(30, 2)))):
+        # Past three samples: NumPy computes each of the 60 rates on its own.
+        start = {"v": np.zeros((60, 2)), "y": r.normal(size=(60, 2))}
+        assert_equal_ways(ring(push=sw.Sampled(values, 0.035)), method, **start, dt=0.01, steps=9, ways=("by the reference",))
 
 
 def test_a_line_is_what_numpy_interpolates() -> None:
@@ -186,7 +169,7 @@ def test_cubics_go_through_the_samples_and_are_exact_for_polynomials_of_third_de
         assert abs(of_cubic.at(t) - cubic(t)) < 1e-13  # derivatives are differences of values over an interval of 0.1
 
 
-@pytest.mark.parametrize(("interpolation", "order"), [("linear", 2), ("cubic", 4)])
+@for_each(("interpolation", "order"), [("linear", 2), ("cubic", 4)])
 def test_errors_of_curves_by_the_interval(interpolation: Any, order: int) -> None:
     """Of sin 3t: halving the interval divides the largest error by 2^p, up to a tenth for higher orders."""
     errors = []
@@ -197,8 +180,8 @@ def test_errors_of_curves_by_the_interval(interpolation: Any, order: int) -> Non
     assert errors[1] < errors[0] / 2.0 ** (order - 0.2)
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 4])
-@pytest.mark.parametrize("interpolation", ["hold", "linear", "cubic"])
+@for_each("n", [1, 2, 3, 4])
+@for_each("interpolation", ["hold", "linear", "cubic"])
 def test_few_samples(interpolation: Any, n: int) -> None:
     """Cubics of few samples are the polynomial through them, of as low a degree."""
     at = 0.25 * np.arange(n)

@@ -12,32 +12,36 @@ import math
 import numpy as np
 import pytest
 import stepwell as sw
+from support.for_each import for_each
 from support.truths import CLOSED_FORMS, PROGRAMS, WEIGHTS, forced_error, matrix_of, quadrature_error, slope
 
 METHODS = [m.name for m in sw.methods()]
 PHIS = (1e-3, 0.1, 0.7, 1.2, 1.9)
+C = np.sqrt(0.75)
+CLOVER = {
+    "v": np.array([[-0.5, C], [-0.5, -C], [1.0, 0.0]]),
+    "y": np.array([[-C, -0.5], [C, -0.5], [0.0, 1.0]]),
+}
 
 
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize("form", ["canonical", "physical"])
-@pytest.mark.parametrize("method", CLOSED_FORMS)
-def test_transition_matrix_is_the_closed_form(method: str, form: str, backend: str) -> None:
+@for_each("form", ["canonical", "physical"])
+@for_each("method", CLOSED_FORMS)
+def test_transition_matrix_is_the_closed_form(method: str, form: str) -> None:
     for phi in PHIS:
         # A few dozen roundings of numbers that are at most Φ⁴ in size, here 13: 50 ulp of it.
         # Verlet's v is a difference of two y divided by Φ, and so is its rounding.
         bound = 50 * np.finfo(float).eps * max(1.0, phi**4, 1 / phi if sw.method(method).carry else 0.0)
-        np.testing.assert_allclose(matrix_of(method, phi, form, backend), CLOSED_FORMS[method](phi), rtol=0, atol=bound)
+        np.testing.assert_allclose(matrix_of(method, phi, form), CLOSED_FORMS[method](phi), rtol=0, atol=bound)
 
 
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize("method", WEIGHTS)
-def test_stage_times_and_weights(method: str, backend: str) -> None:
+@for_each("method", WEIGHTS)
+def test_stage_times_and_weights(method: str) -> None:
     """Where only a(t) acts, a method is a rule of quadrature: a wrong stage time or weight shows at once."""
-    assert quadrature_error(method, backend) < 1e-12
+    assert quadrature_error(method) < 1e-12
     assert set(WEIGHTS[method]) <= {*sw.method(method).nodes, 1.0}
 
 
-@pytest.mark.parametrize("method", sorted(PROGRAMS))
+@for_each("method", sorted(PROGRAMS))
 def test_the_documents_own_program(method: str) -> None:
     """Appendix B, transcribed line by line: same y after 200 steps up to rounding, at three angles per step."""
     for phi in (0.05, 0.5, 1.0):
@@ -51,49 +55,42 @@ def test_the_documents_own_program(method: str) -> None:
 
 
 # The error of a series in v all but vanishes at some of these steps: test_taylor.py measures its order on the same system.
-@pytest.mark.parametrize("method", [m for m in METHODS if not sw.method(m).has_series])
-@pytest.mark.parametrize("block", ["v", "y"])
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-def test_order_on_a_forced_system(method: str, block: str, backend: str) -> None:
+@for_each("method", [m for m in METHODS if not sw.method(m).has_series])
+@for_each("block", ["v", "y"])
+def test_order_on_a_forced_system(method: str, block: str) -> None:
     """A damped oscillator (undamped for Verlet) driven by a sinusoid: a wrong stage time costs the order here."""
-    measured = slope(lambda dt: forced_error(method, dt, block, backend))
+    measured = slope(lambda dt: forced_error(method, dt, block))
     assert measured == pytest.approx(sw.method(method).order, abs=0.2 if method == "rodas5p" else 0.1)
 
 
-@pytest.mark.parametrize("start", sw.method("verlet").starts)
+@for_each("start", sw.method("verlet").starts)
 def test_order_of_each_start_of_verlet(start: str) -> None:
     expected = {"second_order": 2, "first_order": 1}[start]
     for block in ("v", "y"):
         assert slope(lambda dt: forced_error("verlet", dt, block, start=start)) == pytest.approx(expected, abs=0.1)  # noqa: B023
 
 
-@pytest.mark.parametrize("method", [m for m in METHODS if sw.method(m).order <= 5])  # test_orders has the others
+@for_each("method", [m for m in METHODS if sw.method(m).order <= 5])  # test_orders has the others
 def test_order_in_the_clover(method: str) -> None:
     """Three bodies on the unit circle, angular speed 1: a nonlinear system with an exact solution."""
-    c = np.sqrt(0.75)
-    y0 = np.array([[-c, -0.5], [c, -0.5], [0.0, 1.0]])
-    v0 = np.array([[-0.5, c], [-0.5, -c], [1.0, 0.0]])
 
     def error(dt: float) -> float:
-        run = sw.integrate(sw.NBody(), method, v=v0, y=y0, dt=dt, steps=round(1.0 / dt))
+        run = sw.integrate(sw.NBody(), method, **CLOVER, dt=dt, steps=round(1.0 / dt))
         turn = np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])  # clockwise: rows times it
-        return float(np.abs(run.y[-1] - y0 @ turn).max())
+        return float(np.abs(run.y[-1] - CLOVER["y"] @ turn).max())
 
     assert slope(error) == pytest.approx(sw.method(method).order, abs=0.2 if method == "rodas5p" else 0.1)
 
 
 def test_clover_stays_bounded_by_false_euler() -> None:
     """The document's figure: T = 0.3, stable ad infinitum; the radius stays within [0.914, 1.127] for 100 000 steps."""
-    c = np.sqrt(0.75)
-    y0 = np.array([[-c, -0.5], [c, -0.5], [0.0, 1.0]])
-    v0 = np.array([[-0.5, c], [-0.5, -c], [1.0, 0.0]])
-    run = sw.integrate(sw.NBody(), "false_euler", v=v0, y=y0, dt=0.3, steps=100_000, every=1)
+    run = sw.integrate(sw.NBody(), "false_euler", **CLOVER, dt=0.3, steps=100_000, every=1)
     radius = np.linalg.norm(run.y, axis=-1)
     assert radius.min() > 0.914
     assert radius.max() < 1.127
 
 
-@pytest.mark.parametrize("method", METHODS)
+@for_each("method", METHODS)
 def test_chain_follows_its_modes(method: str) -> None:
     """n equal masses and springs: mode j oscillates with ω = 2 sin(jπ/2(n+1)), as an oscillator of that ω does."""
     n, j, dt = 9, 4, 0.3
@@ -136,7 +133,7 @@ def test_verlet_of_first_order_is_false_euler() -> None:
     np.testing.assert_allclose(verlet.v, euler.v, rtol=0, atol=100**2 * np.finfo(float).eps / 0.5)
 
 
-@pytest.mark.parametrize("method", [m for m in METHODS if 0.0 < sw.method(m).limit < math.inf])
+@for_each("method", [m for m in METHODS if 0.0 < sw.method(m).limit < math.inf])
 def test_each_limit_from_both_sides(method: str) -> None:
     """Bounded a thousandth below the recorded limit, growing a thousandth above."""
     limit = sw.method(method).limit
@@ -153,7 +150,7 @@ def test_each_limit_from_both_sides(method: str) -> None:
     assert size[1] > 1e3
 
 
-@pytest.mark.parametrize("method", ["standard_euler", "standard_heun"])
+@for_each("method", ["standard_euler", "standard_heun"])
 def test_never_stable_means_never(method: str) -> None:
     """Φ = 0.05: Standard Euler and Heun grow at the predicted rate, r₁² = 1 + Φ² and 1 + Φ⁴/4."""
     phi, steps = 0.05, 100_000

@@ -68,7 +68,7 @@ CLOSED_FORMS: dict[str, Callable[[float], Matrix]] = {
 }
 
 
-def matrix_of(method: str, phi: float, form: str, backend: str) -> Matrix:
+def matrix_of(method: str, phi: float, form: str, backend: str = "rust") -> Matrix:
     """The transition matrix found by stepping (1, 0) and (0, 1), in canonical variables."""
     omega = 1.0 if form == "canonical" else 1.7
     scale = 1.0 if form == "canonical" else omega  # physical v = ω₀·canonical v
@@ -112,7 +112,7 @@ WEIGHTS: dict[str, dict[float, float]] = {
 }
 
 
-def quadrature_error(method: str, backend: str) -> float:
+def quadrature_error(method: str, backend: str = "rust") -> float:
     """How far one step under a(t) alone is from the rule; ω₀ = 1e-6 adds less than ω₀²."""
     t0, h = 0.7, 0.3
     system = sw.Oscillator(1e-6, a=sw.Sinusoid(1.0, 2.1, 0.4), form="physical")
