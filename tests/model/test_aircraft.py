@@ -14,7 +14,7 @@ from stepwell.errors import ArgumentError, ShapeError, UnknownNameError, Unsuppo
 from stepwell.model.systems import aircraft_equations, attitude
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from support.cases import assert_same
+from support.for_each import for_each
 from support.graphs import assert_one_graph
 from support.mistakes import mistaken
 
@@ -120,7 +120,7 @@ def public(command: Any, torque: Any, on: bool) -> sw.System:
     return sw.Aircraft(**commands, **names, controllers=on)
 
 
-@pytest.mark.parametrize("case", PRINTED)
+@for_each("case", PRINTED)
 def test_false_euler_is_the_printed_program(case: str) -> None:
     assert like_printed(public, PRINTED[case])
 
@@ -201,10 +201,9 @@ def test_huge_angles_do_not_hang() -> None:
 # ---- limits and turns
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("axis", "omega_damping", "limit", "sides"),
     [(0, (2.393654, 0.696286), 0.436357, (0.43, 0.44)), (1, (2.393654, 0.626657), 0.462448, (0.46, 0.47))],
-    ids=["roll", "pitch"],
 )
 def test_the_controllers_are_oscillators_with_their_limits(axis: int, omega_damping: Any, limit: float, sides: Any) -> None:
     """Near rest roll and pitch are ÿ + 2Dω₀ẏ + ω₀²y = 0: ω₀² is the gain per rad over J, 2Dω₀ the damper over J."""
@@ -225,8 +224,8 @@ def test_the_controllers_are_oscillators_with_their_limits(axis: int, omega_damp
         assert (np.abs(run.y[300:]).max() > 1e-5) == (not stable)
 
 
-@pytest.mark.parametrize("form", ["euler", "quaternion"])
-@pytest.mark.parametrize(
+@for_each("form", ["euler", "quaternion"])
+@for_each(
     ("command", "turn"),
     [
         ((30.0, 0.0), (27.17730, 6.66655, -29.0658)),
@@ -260,10 +259,8 @@ def projection(form: str) -> Any:
     return sw.Projection("norm") if form == "quaternion" else None
 
 
-@pytest.mark.parametrize("form", ["euler", "quaternion"])
-@pytest.mark.parametrize(
-    ("v", "first", "last"), [((0.5, 0.02, 0.02), 0.0755, 0.07601), ((0.02, 0.5, 0.02), 0.1254, 0.1452)], ids=["first", "middle"]
-)
+@for_each("form", ["euler", "quaternion"])
+@for_each(("v", "first", "last"), [((0.5, 0.02, 0.02), 0.0755, 0.07601), ((0.02, 0.5, 0.02), 0.1254, 0.1452)])
 def test_false_euler_does_not_keep_the_energy_of_a_free_aircraft(form: str, v: Any, first: float, last: float) -> None:
     """ω by Standard Euler gains energy, more about the middle axis, where the rotation tumbles, whatever the attitude."""
     system = sw.Aircraft(form, **FREE)
@@ -311,7 +308,7 @@ def turned(form: str, method: str, dt: float, **options: Any) -> Any:
     return system.rotation(run.y[-1])
 
 
-@pytest.mark.parametrize(("method", "order"), [("false_euler", 1), ("standard_heun", 2), ("rk4", 4)])
+@for_each(("method", "order"), [("false_euler", 1), ("standard_heun", 2), ("rk4", 4)])
 def test_both_forms_are_the_same_motion_to_the_order_of_the_method(method: str, order: int) -> None:
     # Each error is a polynomial in h; half the step divides its first term by 2^order, and the rest of it by more.
     apart = [np.abs(turned("euler", method, h) - turned("quaternion", method, h)).max() for h in (0.02, 0.01)]
@@ -423,29 +420,19 @@ def test_mistakes_in_what_is_kept_and_recorded_are_noticed(old: str, new: str) -
 CONTROLS = [sw.NormControl(2.0), sw.Projection("norm"), sw.Control("norm", 3.0, target=1.0), sw.Projection("energy")]
 
 
-@pytest.mark.parametrize("control", CONTROLS, ids=repr)
-@pytest.mark.parametrize("method", ["standard_euler", "false_euler", "rk4"])
+@for_each("control", CONTROLS, ids=repr)
+@for_each("method", ["standard_euler", "false_euler", "rk4"])
 def test_core_and_reference_are_one_graph_under_control(control: Any, method: str) -> None:
     system = sw.Aircraft("quaternion", roll=np.array([10.0, 30.0]))
-    start: dict[str, Any] = {"v": np.array([0.1, 0.2, 0.3]), "y": 1.1 * system.attitude(), "dt": 0.05}
-    batch = {name: np.repeat(start[name][:, np.newaxis], 2, axis=1) for name in ("v", "y")}
-    controlled = system.controlled(control, batch["v"], batch["y"], 0.05)
+    start = np.array([0.1, 0.2, 0.3]), 1.1 * system.attitude()
+    controlled = system.controlled(control, *(np.repeat(block[:, np.newaxis], 2, axis=1) for block in start), 0.05)
     plan = engine.Plan(controlled, sw.method(method), controlled.batch, 0.05)
     tape = _core.Tape()
     assert_one_graph(tape, tape.trace(engine.model(plan), "step"), Tracer(controlled, tape).step(sw.method(method)))
-    whole = sw.integrate(system, method, **start, steps=20, control=control)
-    assert_same(whole, sw.integrate(system, method, **start, steps=20, control=control, backend="numpy"))
-    half = sw.integrate(system, method, **start, steps=10, control=control)
-    np.testing.assert_array_equal(sw.integrate(system, method, resume=half, steps=10).y[-1], whole.y[-1])
-    assert half.system.uncontrolled == system
-    v, y = (each.copy() for each in batch.values())
-    world = sw.World(system, method, v=v, y=y, dt=0.05, control=control)
-    world.step(20)
-    np.testing.assert_array_equal(y, whole.y[-1])
     assert sw.explain(system, method, control=control).computed
 
 
-@pytest.mark.parametrize("form", ["euler", "quaternion"])
+@for_each("form", ["euler", "quaternion"])
 def test_derivatives_are_those_of_the_rates(form: str) -> None:
     """Central differences: e²/6 of the third derivative and a rounding of u/e, each 1e-10 for e = 1e-5, times some hundred."""
     system, v, e = sw.Aircraft(form, roll=10.0), np.array([0.1, -0.2, 0.3]), 1e-5
@@ -520,22 +507,7 @@ def test_commands_over_time() -> None:
         state |= {"v": part.v[-1], "y": part.y[-1]}
 
 
-@pytest.mark.parametrize("form", ["euler", "quaternion"])
-def test_a_batch_over_gains_and_commands_is_its_members(form: str) -> None:
-    gains = np.array([[0.03, 0.06], [0.1, 0.2], [1.0, 0.5]])[:, :, np.newaxis] * np.ones(3)
-    roll, damping = np.array([-20.0, 10.0, 50.0]), np.array([2.0, 3.0, 1.0])
-    system = sw.Aircraft(form, gains=gains, damping=damping, roll=roll, pitch=5.0)
-    assert system.batch == (2, 3)
-    start = {"v": np.array([0.1, 0.0, -0.1]), "dt": 0.1, "steps": 50, "every": 10}
-    many = sw.integrate(system, "rk4", **start, y=system.attitude(3.0, 2.0, 1.0))
-    for i, j in np.ndindex(2, 3):
-        alone = sw.Aircraft(form, gains=gains[:, i, j], roll=roll[j], pitch=5.0)
-        run = sw.integrate(alone, "rk4", **start, y=alone.attitude(3.0, 2.0, 1.0))
-        np.testing.assert_array_equal(many.y[..., i, j], run.y)
-        np.testing.assert_array_equal(many.v[..., i, j], run.v)
-
-
-@pytest.mark.parametrize(
+@for_each(
     ("make", "error", "message"),
     [
         (lambda: sw.Aircraft("angles"), UnknownNameError, "form: there is no 'angles'"),
