@@ -420,7 +420,7 @@ def test_mistakes_in_what_is_kept_and_recorded_are_noticed(old: str, new: str) -
 CONTROLS = [sw.NormControl(2.0), sw.Projection("norm"), sw.Control("norm", 3.0, target=1.0), sw.Projection("energy")]
 
 
-@for_each("control", CONTROLS, ids=repr)
+@for_each("control", CONTROLS)
 @for_each("method", ["standard_euler", "false_euler", "rk4"])
 def test_core_and_reference_are_one_graph_under_control(control: Any, method: str) -> None:
     system = sw.Aircraft("quaternion", roll=np.array([10.0, 30.0]))

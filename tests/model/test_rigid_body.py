@@ -181,7 +181,7 @@ def test_a_batch_of_three_is_no_vector() -> None:
         np.testing.assert_array_equal(run.y[-1, :, i], one.y[-1])
 
 
-@for_each("keeper", KEEPERS, ids=repr)
+@for_each("keeper", KEEPERS)
 @for_each("heavy", [False, True])
 def test_the_graphs_under_control_are_one(keeper: Any, heavy: bool) -> None:
     more: dict[str, Any] = {"weight": 1.3, "centre": [0.1, 0.2, 0.3], "space_torque": [None, 0.2, sw.Sinusoid(1.0, 2.0)]}
@@ -279,7 +279,7 @@ def test_quaternions() -> None:
 # ---- what else reads a step
 
 
-@for_each("keeper", [sw.NormControl(0.7), sw.Projection("norm")], ids=repr)
+@for_each("keeper", [sw.NormControl(0.7), sw.Projection("norm")])
 def test_a_step_under_control_is_explained_and_exported(keeper: Any) -> None:
     """Without a state, which such a control does not need; the exported Python makes the same step."""
     body = sw.RigidBody([1.0, 1.5, 2.0], damping=0.1)
@@ -295,7 +295,7 @@ def test_a_step_under_control_is_explained_and_exported(keeper: Any) -> None:
     assert off[1] < 0.1 * off[0]  # the control decays as exp(−2·0.7·3) = 0.015
 
 
-@for_each("keeper", [None, sw.NormControl(0.7), sw.Projection("norm")], ids=repr)
+@for_each("keeper", [None, sw.NormControl(0.7), sw.Projection("norm")])
 def test_the_derivative_of_a_step_under_control(keeper: Any) -> None:
     """By the complex step, as for every system here, against differences: their error is e² and a rounding by e."""
     free = sw.RigidBody([1.0, 1.5, 2.0], weight=1.2, centre=[0.1, 0.2, 0.3])
