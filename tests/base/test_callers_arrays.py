@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import stepwell as sw
 from stepwell.base.immutable import FixedDict, Immutable, ValueEquality, frozen
+from support.for_each import for_each
 
 TWO = np.ones(2)
 
@@ -87,7 +87,6 @@ MAKERS: dict[Any, list[Callable[[], dict[str, Any]]]] = {
     sw.TransferFunction: [lambda: {"num": ones(2), "den": ones(3), "x": sampled()}],
     own: [lambda: {"stiffness": ones(2), "weights": ones(2), "push": sampled()}],
 }
-CASES = [pytest.param(make, each, id=f"{make.__name__} {i}") for make, all_of in MAKERS.items() for i, each in enumerate(all_of)]
 
 
 def arrays(what: Any) -> list[Any]:
@@ -130,7 +129,7 @@ def test_no_public_class_is_left_out() -> None:
     assert public - set(MAKERS) == {sw.System, sw.Method, sw.Event}  # an abstract one, a record, a function
 
 
-@pytest.mark.parametrize(("make", "arguments"), CASES)
+@for_each("make, arguments", [(make, each) for make, all_of in MAKERS.items() for each in all_of])
 def test_nothing_of_it_changes(make: Any, arguments: Callable[[], dict[str, Any]]) -> None:
     options = arguments()
     one = make(**options)
@@ -143,7 +142,7 @@ def test_nothing_of_it_changes(make: Any, arguments: Callable[[], dict[str, Any]
         assert not each.flags.writeable
 
 
-@pytest.mark.parametrize("kind", ["an array", "a view", "a read-only view", "a broadcast", "a memory view", "another order"])
+@for_each("kind", ["an array", "a view", "a read-only view", "a broadcast", "a memory view", "another order"])
 def test_however_the_array_is_given(kind: str) -> None:
     mine = np.ones((3, 4))
     seen = mine.view()

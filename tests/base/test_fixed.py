@@ -14,6 +14,7 @@ import stepwell as sw
 from stepwell.base.immutable import Immutable, changed
 from stepwell.errors import FixedError, StepwellError
 from support.cases import SYSTEMS
+from support.for_each import for_each
 
 MADE: dict[str, Callable[[], Any]] = {
     "a sinusoid": lambda: sw.Sinusoid([1.0, 2.0], 3.0),
@@ -47,8 +48,8 @@ def arrays(what: Any) -> list[Any]:
     return []
 
 
-@pytest.mark.parametrize("copying", COPIES)
-@pytest.mark.parametrize("name", MADE)
+@for_each("copying", COPIES)
+@for_each("name", MADE)
 def test_nothing_of_it_is_assigned(name: str, copying: str) -> None:
     one = COPIES[copying](MADE[name]())
     before = pickle.dumps(one)

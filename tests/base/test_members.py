@@ -10,6 +10,7 @@ import pytest
 import stepwell as sw
 from stepwell.base.reprs import counted, first_of, in_words, of_member, share
 from support import ROOT
+from support.for_each import for_each
 
 FAST: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1000}
 
@@ -34,7 +35,7 @@ def test_how_many_of_how_many() -> None:
     ]
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("omega", "words"),
     [
         (30.0, "the run diverged at step 369 (t = 36.9), by false_euler with dt = 0.1"),

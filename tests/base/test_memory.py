@@ -17,6 +17,7 @@ from stepwell.base import available_memory
 from stepwell.errors import TooLargeError
 from stepwell.runs import engine
 from stepwell.runs.engine import linear
+from support.for_each import for_each
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits and peaks are asked of Linux")
 
@@ -31,7 +32,7 @@ def aside(code: str) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("steps", [10**9, 10**15])
+@for_each("steps", [10**9, 10**15])
 def test_more_kept_states_than_memory_are_refused_at_once(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(20e9, "memory of this machine")]))
     monkeypatch.setattr(engine, "advance", None)  # no work is begun
@@ -214,7 +215,7 @@ def test_the_copies_of_a_matrix_are_counted(monkeypatch: pytest.MonkeyPatch) -> 
         sw.LinearSystem(A)
 
 
-@pytest.mark.parametrize("form", ["matrix", "power"])
+@for_each("form", ["matrix", "power"])
 def test_transition_matrices_are_counted_before_they_are_made(form: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Eight numbers for an element of 60 000 × 60 000, and three more for a power of it."""
     monkeypatch.setattr(linear, "transition", None)  # no work is begun
@@ -297,10 +298,12 @@ def test_members_that_move_are_searched_some_at_a_time(monkeypatch: pytest.Monke
         searched.append(len(search.rates[0, 0]))
         return np.zeros(searched[-1]), np.zeros(searched[-1]), np.full(searched[-1], None)
 
-    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(0.2e9, "memory of this machine")]))  # with all it was 0.26 GB
+    monkeypatch.setattr(
+        available_memory, "_bounds", lambda: iter([(0.18e9, "memory of this machine")])
+    )
     monkeypatch.setattr(limit, "_of_some", some)
-    limit.limit_of(ring().for_state_shapes(), sw.method("rk4"), np.zeros((60, 300)), np.ones((60, 300)))
-    assert sum(searched) == 300
+    limit.limit_of(ring().for_state_shapes(), sw.method("rk4"), np.zeros((60, 100)), np.ones((60, 100)))
+    assert sum(searched) == 100
     assert max(searched) == 18
 
 
@@ -319,7 +322,7 @@ def test_limits_of_more_members_take_no_more_memory_than_their_results() -> None
     assert int(output) < counted < 126e6
 
 
-@pytest.mark.parametrize("system", ["batch of systems", "batch of states"])
+@for_each("system", ["batch of systems", "batch of states"])
 def test_limits_in_parts_are_those_of_all_at_once(system: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """To the bit, and so are their modes."""
     random = np.random.default_rng(5)

@@ -15,6 +15,7 @@ import pytest
 import stepwell as sw
 from stepwell.base.immutable import same
 from support.cases import SYSTEMS
+from support.for_each import for_each
 from support.own_systems import duffing
 
 
@@ -36,8 +37,8 @@ def test_such_an_array_is_what_it_says() -> None:
     np.testing.assert_array_equal(there, np.arange(5.0))
 
 
-@pytest.mark.parametrize("writeable", [False, True])
-@pytest.mark.parametrize("name", SYSTEMS)
+@for_each("writeable", [False, True])
+@for_each("name", SYSTEMS)
 def test_systems(name: str, writeable: bool) -> None:
     make: Callable[..., sw.System] = partial(SYSTEMS[name], np.random.default_rng(1), 3)
     system = make()
@@ -54,7 +55,7 @@ def test_systems(name: str, writeable: bool) -> None:
     np.testing.assert_array_equal(runs[0].v, runs[1].v)
 
 
-@pytest.mark.parametrize("method", ["rk4", "verlet", "leapfrog"])
+@for_each("method", ["rk4", "verlet", "leapfrog"])
 def test_worlds(method: str) -> None:
     y = np.linspace(0.5, 1.0, 7)
     world = sw.World(sw.Pendulum(np.linspace(1.0, 2.0, 7)), method, v=np.zeros(7), y=y, dt=0.1)

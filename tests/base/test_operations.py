@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 from stepwell import _core
 from stepwell.reference.bits import DOUBLE, SINGLE
 from stepwell.reference.tape.evaluate import Evaluation
@@ -16,6 +15,7 @@ from stepwell.source.exports.csharp import CSharp
 from stepwell.source.exports.javascript import JavaScript
 from stepwell.source.exports.plain_python import Python
 from stepwell.source.exports.rust import Rust
+from support.for_each import for_each
 
 #: What the core has besides: leaves, lines that copy or look up, and what only a split tape has.
 OTHERS = {"state", "parameter", "step", "time", "constant", "sample", "copy", "row", "uniform", "of the step", "held", "gather"}
@@ -32,8 +32,8 @@ def test_the_core_and_the_table_have_the_same_operations() -> None:
         assert (kind.counted or "none", kind.commutes) == (counted, commutes), name
 
 
-@pytest.mark.parametrize("single", [False, True], ids=["float64", "float32"])
-@pytest.mark.parametrize("name", OPERATIONS)
+@for_each("single", [False, True])
+@for_each("name", OPERATIONS)
 def test_an_operation_is_the_same_everywhere(name: str, single: bool) -> None:
     """Its meaning for numbers; written to a tape, evaluated there and replayed; in the core, which folds constants."""
     count, kind = CORE[name][0], OPERATIONS[name]
@@ -67,7 +67,7 @@ def same(precision: Any, a: Any, b: Any) -> bool:
     return bool(np.all(equal | (np.isnan(a) & np.isnan(b))))
 
 
-@pytest.mark.parametrize("language", [C, CSharp, JavaScript, Python, Rust])
+@for_each("language", [C, CSharp, JavaScript, Python, Rust])
 def test_every_language_writes_every_operation(language: Any) -> None:
     """Comparisons have a sign, operations on bits a function of the file, others of one number a function of the language."""
     for name, kind in OPERATIONS.items():

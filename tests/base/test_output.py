@@ -18,6 +18,7 @@ from stepwell.errors import ArgumentError, DTypeError
 from stepwell.studies.measuring import timing
 from stepwell.views import charts
 from support.commands import run_command
+from support.families import family
 
 #: Each command that writes: its words, what its work is done by, the name of a file, or one that it writes into a folder.
 COMMANDS: dict[str, tuple[list[str], str, str, str | None]] = {
@@ -94,8 +95,14 @@ def test_a_file_in_a_folder_is_tried_too(words: list[str], inside: str, capsys: 
     assert f"{inside}': Is a directory" in err
 
 
-@EACH
-@pytest.mark.parametrize("form", [["--json"], []])
+#: Whether the command prints JSON: both of some commands.
+PRINTED = family(
+    [(command, form) for command in COMMANDS for form in (["--json"], [])],
+    lambda command, form: bool(form) or command in ("run", "criteria"),
+)
+
+
+@pytest.mark.parametrize(("command", "form"), PRINTED)
 def test_what_was_found_is_printed_though_it_cannot_be_written(
     command: str, form: list[str], capsys: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

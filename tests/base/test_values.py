@@ -15,6 +15,7 @@ import stepwell as sw
 from stepwell.base.immutable import ValueEquality, same
 from stepwell.views import charts
 from support.cases import SYSTEMS
+from support.for_each import for_each
 
 FREE = sw.Oscillator(omega=2.0)
 QUATERNION: dict[str, Any] = {"v": np.ones(3), "y": np.array([1.0, 0.0, 0.0, 0.0]), "dt": 0.1, "steps": 1}
@@ -289,11 +290,9 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
 
 MAKERS["any system"] = [partial(make, np.random.default_rng(1), 2) for make in SYSTEMS.values()]
 
-PAIRS = [pytest.param(make, id=f"{name} {i}") for name, makers in MAKERS.items() for i, make in enumerate(makers)]
 
-
-@pytest.mark.parametrize("make", PAIRS)
-def test_a_copy_is_the_same(make: Callable[[], Any]) -> None:
+@for_each("name, i, make", [(name, i, make) for name, makers in MAKERS.items() for i, make in enumerate(makers)])
+def test_a_copy_is_the_same(name: str, i: int, make: Callable[[], Any]) -> None:
     one = make()
     for other in (
         copy.copy(one),
@@ -309,7 +308,7 @@ def test_a_copy_is_the_same(make: Callable[[], Any]) -> None:
     assert one != "one"
 
 
-@pytest.mark.parametrize("name", [name for name, makers in MAKERS.items() if len(makers) > 1 and name != "any system"])
+@for_each("name", [name for name, makers in MAKERS.items() if len(makers) > 1 and name != "any system"])
 def test_others_are_not(name: str) -> None:
     ones, twos = ([make() for make in MAKERS[name]] for _ in range(2))
     for i, a in enumerate(ones):
@@ -405,7 +404,7 @@ def test_a_pickled_state_goes_on() -> None:
     assert a == b
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("a", "b", "equal"),
     [
         (np.array([1.0, np.nan]), np.array([1.0, np.nan]), True),

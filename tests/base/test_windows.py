@@ -17,6 +17,7 @@ import pytest
 import stepwell as sw
 from stepwell.base import available_memory, files, paths, streams
 from stepwell.errors import ArgumentError
+from support.for_each import for_each
 
 WINDOWS = sys.platform == "win32"
 
@@ -78,7 +79,7 @@ def test_free_memory_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("as_windows")
-@pytest.mark.parametrize(
+@for_each(
     ("name", "why"),
     [
         ("run:2.png", "a name has no colon"),

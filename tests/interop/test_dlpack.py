@@ -9,6 +9,7 @@ import pytest
 import stepwell as sw
 from stepwell.base import buffer_pool
 from stepwell.errors import ArgumentError, DTypeError
+from support.for_each import for_each
 
 
 class Tensor:
@@ -65,7 +66,7 @@ def test_a_world_steps_them_in_place() -> None:
     assert np.shares_memory(world.y, y)
 
 
-@pytest.mark.parametrize("numbers", [buffer_pool.LEAST_POOLED // 8, 100_000, 600_000])
+@for_each("numbers", [buffer_pool.LEAST_POOLED // 8, 100_000, 600_000])
 def test_large_results_begin_at_a_cache_line(numbers: int) -> None:
     """As JAX asks for, which copies others; where NumPy's own memory begins is chance, so it is tried several times."""
     runs = []
@@ -76,7 +77,7 @@ def test_large_results_begin_at_a_cache_line(numbers: int) -> None:
         assert run.y.ctypes.data % 64 == run.v.ctypes.data % 64 == 0
 
 
-@pytest.mark.parametrize(
+@for_each(
     "use",
     [
         lambda array: sw.Oscillator(array),
@@ -155,14 +156,14 @@ SEVERAL = WithGradient(np.array([0.5, 1.0]))
 
 
 #: A list of tolerances is not here: it is refused before it is looked at, since it might mean a pair or members.
-@pytest.mark.parametrize("value", [ONE, SEVERAL, (ONE, ONE), [SEVERAL]], ids=["0 axes", "1 axis", "two", "a row"])
-@pytest.mark.parametrize("argument", ["v", "y", "dt", "t0", "force", "at", "omega"])
+@for_each("value", [ONE, SEVERAL, (ONE, ONE), [SEVERAL]])
+@for_each("argument", ["v", "y", "dt", "t0", "force", "at", "omega"])
 def test_those_with_a_gradient_are_refused(argument: str, value: Any) -> None:
     with pytest.raises(DTypeError, match=rf"^{argument}.*: expected .*without gradients.*\.detach\(\)"):
         _run(**{argument: value})
 
 
-@pytest.mark.parametrize("value", [ONE, SEVERAL, (ONE, ONE)], ids=["0 axes", "1 axis", "two"])
+@for_each("value", [ONE, SEVERAL, (ONE, ONE)])
 def test_tolerances_with_a_gradient_are_refused(value: Any) -> None:
     with pytest.raises(DTypeError, match=r"^tolerance.*: expected .*without gradients"):
         _run(tolerance=value)
@@ -176,7 +177,7 @@ def _run(omega: Any = 1.0, **options: Any) -> None:
     sw.integrate(sw.Oscillator(omega), method, **{"v": 0.0, "y": 1.0} | defaults | options)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("argument", "use"),
     [
         ("axes: omega", lambda: sw.sweep(sw.Oscillator, {"omega": ("omega", [ONE])}, "rk4", v=0.0, y=1.0, dt=0.1, steps=2)),

@@ -22,12 +22,13 @@ import stepwell.interop.gym  # noqa: E402
 from gymnasium.spaces import Box  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode  # noqa: E402
+from support.for_each import for_each  # noqa: E402
 
 NAMES = ["CartPole", "DoubleRod", "Pendulum"]
 EPS32 = np.finfo(np.float32).eps
 F = np.float32
 
-each_type = pytest.mark.parametrize("dtype", ["float64", "float32"])
+each_type = for_each("dtype", ["float64", "float32"])
 
 
 def many(name: str, num_envs: int = 5, **options: Any) -> Any:
@@ -39,7 +40,7 @@ def one(name: str, **options: Any) -> Any:
 
 
 @each_type
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_gymnasiums_checker_has_nothing_to_say(name: str, dtype: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -48,7 +49,7 @@ def test_gymnasiums_checker_has_nothing_to_say(name: str, dtype: str) -> None:
         check_env(one(name, dtype=dtype, render_mode="rgb_array").unwrapped)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_a_vector_is_what_it_says(name: str) -> None:
     """Shapes, types, spaces; that nothing that was returned is written to again."""
     envs = many(name, 7)
@@ -70,7 +71,7 @@ def test_a_vector_is_what_it_says(name: str) -> None:
 
 
 @each_type
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_the_same_seed_and_actions_give_the_same_bits(name: str, dtype: str) -> None:
     def observations(seed: int) -> bytes:
         envs = many(name, dtype=dtype)
@@ -82,7 +83,7 @@ def test_the_same_seed_and_actions_give_the_same_bits(name: str, dtype: str) -> 
     assert observations(1) != observations(2)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_one_is_a_vector_of_one(name: str) -> None:
     single, envs = one(name, max_episode_steps=20), many(name, 1, max_episode_steps=20)
     envs.action_space.seed(2)
@@ -99,7 +100,7 @@ def test_one_is_a_vector_of_one(name: str) -> None:
             np.testing.assert_array_equal(begun, envs.step(action)[0][0])
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_the_world_is_stepped_in_float32(name: str) -> None:
     """Its states are near those of float64, and not the same; rewards are float64, and what was seen is not written to again."""
     half, whole = many(name, dtype="float32"), many(name)
@@ -217,7 +218,7 @@ def test_a_step_of_one_tape_has_the_bits_of_rules_on_arrays(name: str, mode: str
             np.testing.assert_array_equal(one.steps, other.steps)
 
 
-@pytest.mark.parametrize("method", ["leapfrog", "implicit_midpoint"])
+@for_each("method", ["leapfrog", "implicit_midpoint"])
 def test_methods_that_are_not_on_that_tape(method: str) -> None:
     """Their rules are run on arrays; members that begin anew leave what others carry alone."""
     envs = many("Pendulum", 6, method=method, dt=0.02)
@@ -231,7 +232,7 @@ def test_methods_that_are_not_on_that_tape(method: str) -> None:
     assert np.isfinite(envs.step(np.ones((6, 1), F))[0]).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_copies_and_pickles_go_on_alike(name: str) -> None:
     ranges = {"CartPole": {"pole": (0.05, 0.2)}, "Pendulum": {"omega": (3.0, 4.0)}}.get(name, {"gravity": (9.0, 10.0)})
     envs = many(name, 6, max_episode_steps=9, randomise=ranges, render_mode="rgb_array")
@@ -310,7 +311,7 @@ def test_a_training_loop_of_gymnasium_takes_each_mode() -> None:
         assert min(lengths) > 5
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_parameters_that_each_episode_draws(name: str) -> None:
     """Uniform in the bounds, by seed; steps have the bits of a world with these parameters."""
     parameters = {"CartPole": {"pole": (0.05, 0.2), "gravity": (9.0, 10.0)}, "Pendulum": {"omega": (3.0, 4.0)}}
@@ -363,7 +364,7 @@ def test_wrong_ranges() -> None:
 # ---- pictures
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_pictures(name: str) -> None:
     """A frame of each environment shows its state: what moves is drawn where it is, in its colour."""
     from stepwell.interop.gym import pictures
@@ -449,9 +450,7 @@ def test_the_steps_of_gymnasiums_cart_pole() -> None:
     assert abs(envs.world.y[0, 0] - theirs.state[0]) > 1e-4
 
 
-@pytest.mark.parametrize(
-    "wrong", [("4.0 / 3.0", "1.3333"), ("pull - moment", "pull + moment"), ("cosine**2 / whole", "cosine**2")]
-)
+@for_each("wrong", [("4.0 / 3.0", "1.3333"), ("pull - moment", "pull + moment"), ("cosine**2 / whole", "cosine**2")])
 def test_a_wrong_formula_of_the_cart_would_be_seen(wrong: tuple[str, str]) -> None:
     """By far more than the bound above: one step of 0.02 s makes it so."""
     text = inspect.getsource(sw.gym.cart_pole.function)
@@ -486,7 +485,7 @@ def test_the_steps_of_gymnasiums_pendulum() -> None:
         assert float(mine[1][0]) == pytest.approx(float(reward), abs=1e-9)
 
 
-@pytest.mark.parametrize("torque", [1.0, -0.7])
+@for_each("torque", [1.0, -0.7])
 def test_the_motor_of_the_double_rod_does_its_work(torque: float) -> None:
     """The energy grows by ∫ u·(ω₂ − ω₁) dt: by the trapezoidal rule over n = 4000 steps of h, which errs by h²/12·t·max|f″|.
 
@@ -540,7 +539,7 @@ def test_shorter_steps_come_nearer_to_the_truth() -> None:
     assert 0 < abs(end(16) - finest) < abs(end(1) - finest) / 1000
 
 
-@pytest.mark.parametrize(
+@for_each(
     "name", [name for name in sw.gym.__all__ if name.endswith("VectorEnv") and name not in ("WorldVectorEnv", "TracedVectorEnv")]
 )
 def test_examples_print_what_they_say(name: str) -> None:
@@ -617,7 +616,7 @@ def test_gymnasium_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> 
         _ = sw.gym
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each("name", NAMES)
 def test_more_of_them_than_memory_has_room_for_are_refused(name: str) -> None:
     with pytest.raises(TooLargeError, match=r"num_envs: states and observations of 100000000000 members need .* take fewer"):
         many(name, 10**11)

@@ -18,12 +18,8 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, UnsupportedError
 from support import own_systems as own
-from support.cases import SYSTEMS, cases, representative
-
-METHODS = [m.name for m in sw.methods()]
-ADAPTIVE_METHODS = [m.name for m in sw.methods() if m.error_order is not None]
-#: A case for each system, and some for each method and form.
-CASES = representative(cases(), {"direct": 1, "matrix": 1, "power": 1}, "saved")
+from support.cases import SYSTEMS, Case
+from support.for_each import for_each
 
 
 @pytest.fixture(autouse=True)
@@ -52,74 +48,43 @@ def assert_equal_bits(a: sw.Run, b: sw.Run) -> None:
     assert repr(a) == repr(b)
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
-def test_a_run_goes_on_from_a_file_to_the_bit(case: Any, tmp_path: Path) -> None:
-    """Every system, method, form and start: the second half, from the file, ends where the whole run does."""
+@for_each("name", SYSTEMS)
+def test_every_system_is_read_as_it_was_written(name: str, tmp_path: Path) -> None:
+    """That runs go on from a file, ``test_ways.py`` shows."""
+    case = Case("rk4", name, "direct", None)
     system, _ = case.make(3)
-    whole, half = case.run(3, steps=24, every=12), case.run(3, steps=12, every=12)
-    back = through(half, tmp_path, system=system if "function of the time" in case.system else None)
-    assert_equal_bits(back, half)
-    rest = sw.integrate(back.system, back.method, steps=12, form=case.form, resume=back)
-    assert rest.y[-1].tobytes() == whole.y[-1].tobytes()
-    assert rest.v[-1].tobytes() == whole.v[-1].tobytes()
+    run = case.run(3, steps=2, every=1)
+    assert_equal_bits(through(run, tmp_path, system=system if "function of the time" in name else None), run)
 
 
-def test_every_system_is_among_the_cases() -> None:
-    assert {case.system for case in CASES} == set(SYSTEMS)
-    assert {case.method for case in CASES} == set(METHODS)
-
-
-@pytest.mark.parametrize("fused", [False, True])
-@pytest.mark.parametrize("method", ADAPTIVE_METHODS)
-def test_adaptive_steps_go_on_from_a_file(method: str, fused: bool, tmp_path: Path) -> None:
-    start: dict[str, Any] = {"v": np.array([0.1, 0.2, 0.3]), "y": 1.0, "tolerance": (1e-5, 1e-9), "fused": fused}
-    whole = sw.integrate(sw.Pendulum(), method, at=[1.0, 2.0, 3.0], **start)
-    first = through(sw.integrate(sw.Pendulum(), method, at=[1.0, 2.0], **start), tmp_path)
-    rest = sw.integrate(first.system, first.method, at=[3.0], resume=first)
-    assert rest.paces is not None
-    assert whole.paces is not None
-    assert rest.y[-1].tobytes() == whole.y[-1].tobytes()
-    for name in ("t", "h", "accepted", "rejected"):
-        np.testing.assert_array_equal(getattr(rest.paces, name), getattr(whole.paces, name))
-
-
-def controlled() -> dict[str, Callable[[int], sw.Run]]:
-    """Runs under each control and projection, of so many steps."""
+def controlled() -> dict[str, sw.Run]:
+    """Runs under each control and projection."""
     eight, rods, top = sw.scenes.figure_eight(), sw.scenes.double_pendulum(), sw.scenes.dzhanibekov()
 
-    def own_run(steps: int, control: Any) -> sw.Run:
-        return sw.integrate(own.pendulum(omega=1.5), "rk4", v=0.1, y=1.0, dt=0.01, steps=steps, control=control)
+    def own_run(control: Any) -> sw.Run:
+        return sw.integrate(own.pendulum(omega=1.5), "rk4", v=0.1, y=1.0, dt=0.01, steps=9, control=control)
 
     return {
-        "energy": lambda n: eight.run("rk4", steps=n, control=sw.EnergyControl(relative=0.1)),
-        "energy, printed": lambda n: eight.run("standard_euler", steps=n, control=sw.EnergyControl(0.1, "printed")),
-        "energy, between steps": lambda n: eight.run("pefrl", steps=n, control=sw.EnergyControl(0.1)),
-        "scaling": lambda n: eight.run("rk4", steps=n, control=sw.Projection("scaling")),
-        "nacozy": lambda n: eight.run("rk4", steps=n, control=sw.Projection("nacozy")),
-        "length": lambda n: rods.run("rk4", steps=n, control=sw.LengthControl(0.5)),
-        "length projection": lambda n: rods.run("rk4", steps=n, control=sw.Projection("length")),
-        "norm": lambda n: top.run("rk4", steps=n, control=sw.NormControl(0.5)),
-        "norm projection": lambda n: top.run("rk4", steps=n, control=sw.Projection("norm")),
-        "invariant": lambda n: own_run(n, sw.Control("energy", 1.0)),
-        "invariant, printed": lambda n: own_run(n, sw.Control("energy", 1.0, "printed")),
-        "invariant projection": lambda n: own_run(n, sw.Projection("energy")),
+        "energy": eight.run("rk4", steps=9, control=sw.EnergyControl(relative=0.1)),
+        "energy, printed": eight.run("standard_euler", steps=9, control=sw.EnergyControl(0.1, "printed")),
+        "energy, between steps": eight.run("pefrl", steps=9, control=sw.EnergyControl(0.1)),
+        "scaling": eight.run("rk4", steps=9, control=sw.Projection("scaling")),
+        "nacozy": eight.run("rk4", steps=9, control=sw.Projection("nacozy")),
+        "length": rods.run("rk4", steps=9, control=sw.LengthControl(0.5)),
+        "length projection": rods.run("rk4", steps=9, control=sw.Projection("length")),
+        "norm": top.run("rk4", steps=9, control=sw.NormControl(0.5)),
+        "norm projection": top.run("rk4", steps=9, control=sw.Projection("norm")),
+        "invariant": own_run(sw.Control("energy", 1.0)),
+        "invariant, printed": own_run(sw.Control("energy", 1.0, "printed")),
+        "invariant projection": own_run(sw.Projection("energy")),
     }
 
 
-@pytest.mark.parametrize("which", list(controlled()))
-def test_a_control_goes_on_from_a_file(which: str, tmp_path: Path) -> None:
-    make = controlled()[which]
-    whole, half = make(40), make(20)
-    back = through(half, tmp_path)
-    assert_equal_bits(back, half)
-    assert back.system.keeper == half.system.keeper
-    rest = sw.integrate(back.system, back.method, steps=20, resume=back)
-    assert rest.y[-1].tobytes() == whole.y[-1].tobytes()
-
-
-def test_all_kinds_of_control_are_tried() -> None:
-    kinds = {type(make(2).system.keeper) for make in controlled().values()}
-    assert kinds == {sw.EnergyControl, sw.Control, sw.LengthControl, sw.NormControl, sw.Projection}
+def test_a_control_is_read_as_it_was_written(tmp_path: Path) -> None:
+    for name, run in controlled().items():
+        back = through(run, tmp_path)
+        assert_equal_bits(back, run)
+        assert back.system.keeper == run.system.keeper, name
 
 
 @pytest.mark.parametrize("ending", [".npz", ".zarr"])
@@ -247,7 +212,7 @@ def test_a_function_of_the_time_must_be_given(tmp_path: Path) -> None:
 # ---- what is refused
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("path", "error", "match"),
     [
         (3, DTypeError, "path: expected the path of a file, got 3"),

@@ -22,6 +22,7 @@ from stepwell.errors import (
 )
 from stepwell.interop.ivp_events import ROOT_TOLERANCE, Part, zero
 from stepwell.reference.events import located, located_alone
+from support.for_each import for_each
 
 EPS = np.finfo(float).eps
 
@@ -104,7 +105,7 @@ sol = solve_ivp(lotkavolterra, [0, 15], [10, 5], args=(1.5, 1, 3, 1), dense_outp
 }
 
 
-@pytest.mark.parametrize("which", SCRIPTS)
+@for_each("which", SCRIPTS)
 def test_scipys_examples_run_by_one_import(which: str) -> None:
     pytest.importorskip("scipy")
     results = {}
@@ -199,7 +200,7 @@ def test_sol_is_refused_outside_its_steps() -> None:
         result.sol([[0.5]])
 
 
-@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.error_order is not None])
+@for_each("method", [m.name for m in sw.methods() if m.error_order is not None])
 def test_a_state_within_a_step_is_as_good_as_at_its_end(method: str) -> None:
     """Turning keeps lengths, so errors only add up: N steps and an extra one err by no more than (N + 1) tolerances."""
     rtol, atol = 1e-8, 1e-12
@@ -229,7 +230,7 @@ def root(g: Callable[[float], float], a: float, b: float, g_a: float, g_b: float
     return zero(g, (a, b), Part(0.0, 1.0, g_a, g_b))
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("g", "a", "b", "true"),
     [
         (lambda x: x**3 - 2.0, 0.0, 2.0, 2 ** (1 / 3)),
@@ -280,7 +281,7 @@ def test_one_event_is_located_as_several_are() -> None:
         assert g(high, "ends") == 0.0 or high - low <= 2.0**-52 * high
 
 
-@pytest.mark.parametrize("true", [1e-13, 3e-30, 1e-200])
+@for_each("true", [1e-13, 3e-30, 1e-200])
 def test_a_zero_is_found_to_the_roundings_of_a_tiny_time(true: float) -> None:
     """Of a step from 0, to four roundings of the zero; of a step around 0, to four of the time since its start."""
     assert abs(root(lambda t: t / true * t - true, 0.0, 1.0, -true, 1.0 / true) / true - 1.0) <= 2 * ROOT_TOLERANCE
@@ -315,8 +316,8 @@ def test_events_lie_where_they_do() -> None:
     np.testing.assert_array_equal(result.y, sw.solve_ivp(turning, (0, 20), [1.0, 0.0], rtol=rtol, atol=atol).y)
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize(("direction", "which"), [(0, [0, 1, 2, 3, 4, 5]), (1, [1, 3, 5]), (-1, [0, 2, 4])])
+@for_each("sign", [1, -1])
+@for_each(("direction", "which"), [(0, [0, 1, 2, 3, 4, 5]), (1, [1, 3, 5]), (-1, [0, 2, 4])])
 def test_directions_and_ends(direction: int, which: list[int], sign: int) -> None:
     """In the order of the run, forward or backward; SciPy's directions are those of the run as well."""
     options: dict[str, Any] = {"t_span": (0, 20 * sign), "y0": [1.0, 0.0], "rtol": 1e-9}
@@ -411,7 +412,7 @@ WAYS: dict[str, tuple[Any, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.parametrize("way", WAYS)
+@for_each("way", WAYS)
 def test_any_callable_is_traced(way: str) -> None:
     fun, options = WAYS[way]
     result = sw.solve_ivp(fun, (0, 5), [1.0, 0.0], rtol=1e-9, atol=1e-12, t_eval=[5.0], **options)
@@ -505,7 +506,7 @@ def test_methods_by_name() -> None:
     np.testing.assert_array_equal(sw.solve_ivp(decay, (0, 10), [1.0], scipy.DOP853).y, default.y)
 
 
-@pytest.mark.parametrize("name", ["RK45", "rk45", "RK23"])
+@for_each("name", ["RK45", "rk45", "RK23"])
 def test_methods_that_are_not_here_are_not_replaced(name: str) -> None:
     match = f"method: {name.upper()} is .* here.*write one of these: "
     with pytest.raises(UnknownNameError, match=match) as caught:
@@ -517,9 +518,7 @@ def test_methods_that_are_not_here_are_not_replaced(name: str) -> None:
         sw.solve_ivp(decay, (0, 10), [1.0], getattr(scipy, name.upper()))
 
 
-@pytest.mark.parametrize(
-    ("name", "taken"), [("Radau", "rodas5p"), ("bdf", "rodas4"), ("LSODA", "rodas4"), ("Rosenbrock", "rodas4")]
-)
+@for_each(("name", "taken"), [("Radau", "rodas5p"), ("bdf", "rodas4"), ("LSODA", "rodas4"), ("Rosenbrock", "rodas4")])
 def test_methods_for_stiff_equations_are_replaced_by_the_nearest_with_a_warning(name: str, taken: str) -> None:
     with pytest.warns(UserWarning, match=rf"method: {name} is not here; {taken} is taken".replace("bdf", "BDF")):
         result = sw.solve_ivp(decay, (0, 10), [1.0], name)
@@ -580,9 +579,7 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "match"), WRONG, ids=[f"{next(iter(arguments))} {i}" for i, (arguments, _, _) in enumerate(WRONG)]
-)
+@for_each(("arguments", "error", "match"), WRONG)
 def test_wrong_calls(arguments: dict[str, Any], error: type[Exception], match: str) -> None:
     with pytest.raises(error, match=match):
         sw.solve_ivp(**RIGHT | arguments)

@@ -10,6 +10,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from support import own_systems as own
+from support.for_each import for_each
 
 OMEGA = np.array([1.0, 2.0, 3.0])
 
@@ -32,7 +33,7 @@ def test_a_dataset_shares_the_arrays_of_the_run() -> None:
     assert "Oscillator" in table.attrs["system"]
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("make", "v_dims", "y_dims"),
     [
         (lambda: sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=4, every=2), ("t",), ("t",)),
@@ -117,7 +118,7 @@ def test_a_frame_of_two_batch_axes() -> None:
     assert table.loc[(1.0, 1, 2), "y"] == run.y[-1, 1, 2]
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("dims", "error", "match"),
     [
         (["a", "b"], ShapeError, "dims: expected a name for each of the 1 batch axes"),
@@ -139,7 +140,7 @@ def test_a_coordinate_may_not_hide_a_quantity() -> None:
         sweep().to_xarray(coords={"y": OMEGA})
 
 
-@pytest.mark.parametrize("package", ["xarray", "pandas"])
+@for_each("package", ["xarray", "pandas"])
 def test_a_package_that_is_missing_is_named(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     run = sweep()

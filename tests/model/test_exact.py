@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, UnsupportedError
+from support.for_each import for_each
+from support.ways import assert_equal_ways
 
 
 def driven(x: Any, *, batch: bool = False) -> sw.LinearSystem:
@@ -34,20 +36,17 @@ INPUTS: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("options", [{}, {"fused": True}, {"dtype": "float32"}, {"dtype": "float32", "fused": True}], ids=str)
-@pytest.mark.parametrize("name", INPUTS)
-def test_core_and_reference_have_equal_bits(name: str, options: Any) -> None:
-    system = driven(INPUTS[name], batch=True)
-    start = {"v": np.array([0.3, -0.2]), "y": np.array([1.0, 0.5])}
-    runs = [
-        sw.integrate(system, "exact", **start, dt=DT, steps=30, every=7, t0=DT, backend=backend, **options)
-        for backend in ("rust", "numpy")
-    ]
-    for block in ("v", "y"):
-        assert np.array_equal(getattr(runs[0], block), getattr(runs[1], block)), block
+@for_each("name", INPUTS)
+def test_every_input_goes_every_way(name: str) -> None:
+    """Those that begin with steps, as the method needs them."""
+    start = {"v": np.array([[0.3], [-0.2]]) * np.ones(3), "y": np.array([[1.0], [0.5]]) * np.ones(3)}
+    ways = ("by the reference", "in pieces", "in a world", "alone", "in company")
+    for options in ({}, {"dtype": "float32", "fused": True}):
+        system = driven(INPUTS[name], batch=True)
+        assert_equal_ways(system, "exact", **start, **options, dt=DT, steps=30, every=7, t0=DT, ways=ways)
 
 
-@pytest.mark.parametrize("name", INPUTS)
+@for_each("name", INPUTS)
 def test_it_is_the_solution(name: str) -> None:
     """Beside DOP853 to 1e-13, whose own error is some 1e-12 over these 8 units of time."""
     system, start = driven(INPUTS[name]) if "each" not in name else driven(INPUTS[name], batch=True), [0.3, -0.2]
@@ -67,7 +66,7 @@ def test_a_step_may_be_as_long_as_it_likes() -> None:
     assert float(np.hypot(undamped.v[-1], undamped.y[-1])) == pytest.approx(1.0, abs=1e-11)  # 1e5 steps of 1e-16
 
 
-@pytest.mark.parametrize("name", ["sinusoid", "held", "lines", "constant"])
+@for_each("name", ["sinusoid", "held", "lines", "constant"])
 def test_it_goes_back_in_time(name: str) -> None:
     system = driven(INPUTS[name])
     there = sw.integrate(system, "exact", v=[0.3, -0.2], y=[1.0, 0.5], dt=DT, steps=8)
@@ -76,33 +75,22 @@ def test_it_goes_back_in_time(name: str) -> None:
     assert back.v[-1] == pytest.approx([0.3, -0.2], abs=1e-12)
 
 
-def test_forms_and_pieces() -> None:
-    system, start = sw.Oscillator([1.0, 2.0], 0.1, x=sw.Sinusoid(1.0, 1.7), a=0.3), {"v": 0.2, "y": 1.0}
-    direct = sw.integrate(system, "exact", **start, dt=0.3, steps=50)
-    assert np.array_equal(sw.integrate(system, "exact", **start, dt=0.3, steps=50, form="matrix").y, direct.y)
-    assert sw.integrate(system, "exact", **start, dt=0.3, steps=50, form="power").y == pytest.approx(direct.y, abs=1e-13)
-    half = sw.integrate(system, "exact", **start, dt=0.3, steps=20)
-    assert np.array_equal(sw.integrate(system, "exact", dt=0.3, steps=30, resume=half).y, direct.y)
-    each = sw.integrate(system, "exact", **start, dt=0.3, steps=50, t0=np.array([0.0, 1.0]))
+def test_the_matrix_has_the_same_bits_and_powers_round() -> None:
+    system, options = sw.Oscillator([1.0, 2.0], 0.1, x=sw.Sinusoid(1.0, 1.7), a=0.3), {"v": 0.2, "y": 1.0, "dt": 0.3, "steps": 50}
+    direct = sw.integrate(system, "exact", **options)
+    assert np.array_equal(sw.integrate(system, "exact", **options, form="matrix").y, direct.y)
+    assert sw.integrate(system, "exact", **options, form="power").y == pytest.approx(direct.y, abs=1e-13)
+    each = sw.integrate(system, "exact", **options, t0=np.array([0.0, 1.0]))
     assert np.array_equal(each.y[..., 0], direct.y[..., 0])
-    assert np.array_equal(each.y[..., 1], sw.integrate(system, "exact", **start, dt=0.3, steps=50, t0=1.0).y[..., 1])
-    for k, omega in enumerate((1.0, 2.0)):
-        alone = sw.Oscillator(omega, 0.1, x=sw.Sinusoid(1.0, 1.7), a=0.3)
-        assert sw.integrate(alone, "exact", **start, dt=0.3, steps=50).y[-1] == direct.y[-1, k]
+    assert np.array_equal(each.y[..., 1], sw.integrate(system, "exact", **options, t0=1.0).y[..., 1])
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-def test_a_world(dtype: Any) -> None:
-    system = sw.Oscillator(np.array([1.0, 2.0]), 0.1, x=sw.Sinusoid(1.0, 1.7))
-    v, y = np.full(2, 0.2, dtype), np.ones(2, dtype)
-    run = sw.integrate(system, "exact", v=v.copy(), y=y.copy(), dt=0.3, steps=50, dtype=dtype)
-    world = sw.World(system, "exact", v=v, y=y, dt=0.3, dtype=dtype)
+def test_a_world_is_reset_and_has_no_parameters() -> None:
+    y = np.ones(2)
+    world = sw.World(sw.Oscillator(np.array([1.0, 2.0]), 0.1), "exact", v=np.full(2, 0.2), y=y, dt=0.3)
     world.step(20)
-    other = pickle.loads(pickle.dumps(world))
-    for each in (world, copy.deepcopy(other)):
-        each.step(30)
-        assert np.array_equal(each.y, run.y[-1])
-        assert np.array_equal(each.v, run.v[-1])
+    for again in (pickle.loads(pickle.dumps(world)), copy.deepcopy(world)):
+        assert np.array_equal(again.y, y)
     world.reset(0, v=0.2, y=1.0)
     assert y[0] == 1.0
     for call in (lambda: world.set(damping=0.2), lambda: world.parameters, lambda: world.reset(0, omega=2.0)):
@@ -192,7 +180,7 @@ REFUSED: list[tuple[Any, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("call", "message"), REFUSED)
+@for_each(("call", "message"), REFUSED)
 def test_what_is_refused(call: Any, message: str) -> None:
     with pytest.raises((UnsupportedError, ArgumentError)) as caught:
         call()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from support.for_each import for_each
 
 EPS = np.finfo(float).eps
 METHODS = [m.name for m in sw.methods()]
@@ -35,7 +36,7 @@ def as_block(own: sw.Run) -> sw.Run:
     return own
 
 
-@pytest.mark.parametrize("method", METHODS)
+@for_each("method", METHODS)
 def test_the_free_oscillator_to_the_bit(method: str) -> None:
     """A product with 0 adds nothing, so here even the roundings are those of the oscillator's own kernel."""
     omega = np.linspace(0.5, 2.0, 11)
@@ -49,7 +50,7 @@ def test_the_free_oscillator_to_the_bit(method: str) -> None:
     np.testing.assert_array_equal(linear.y, own.y)
 
 
-@pytest.mark.parametrize("method", [m for m in METHODS if not sw.method(m).needs_acceleration])
+@for_each("method", [m for m in METHODS if not sw.method(m).needs_acceleration])
 def test_the_driven_oscillator(method: str) -> None:
     omega, damping = np.linspace(0.5, 2.0, 11), 0.2
     nothing = np.zeros(11)
@@ -65,7 +66,7 @@ def test_the_driven_oscillator(method: str) -> None:
     )
 
 
-@pytest.mark.parametrize("method", METHODS)
+@for_each("method", METHODS)
 def test_the_chain(method: str) -> None:
     rng = np.random.default_rng(1)
     n, k, m = 4, rng.uniform(0.5, 1.5, (5, 3)), rng.uniform(0.8, 2.0, 4)
@@ -82,7 +83,7 @@ def test_the_chain(method: str) -> None:
     assert_close(linear, sw.integrate(sw.Chain(n, stiffness=k, mass=m), method, v=0.1, y=y, **RUN), method)
 
 
-@pytest.mark.parametrize("method", ["false_euler", "semi_false_heun", "rk4"])
+@for_each("method", ["false_euler", "semi_false_heun", "rk4"])
 def test_the_order_of_the_states_is_the_users(method: str) -> None:
     """Renumbering the states renumbers the result and changes no bit, if the order in the blocks stays: that is summed in."""
     rng = np.random.default_rng(2)
@@ -114,8 +115,8 @@ def test_which_block_goes_first_matters() -> None:
     np.testing.assert_array_equal(standard.y, np.concatenate([plain.v, plain.y], axis=1))  # nothing to go first
 
 
-@pytest.mark.parametrize("velocities", [None, 0, 3, [2, 0]])
-@pytest.mark.parametrize("batch", [(), (4,), (2, 3)])
+@for_each("velocities", [None, 0, 3, [2, 0]])
+@for_each("batch", [(), (4,), (2, 3)])
 def test_split_and_state_undo_each_other(velocities: Any, batch: tuple[int, ...]) -> None:
     system = sw.LinearSystem(np.eye(3), velocities=velocities)
     state = np.random.default_rng(3).normal(size=(3, *batch))
@@ -131,14 +132,13 @@ def test_states_of_numbers_and_batches_broadcast() -> None:
     np.testing.assert_array_equal(system.split(2.0)[1], [2.0, 2.0])
 
 
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize("form", ["direct", "matrix"])
-@pytest.mark.parametrize(("n", "velocities"), [(1, 0), (1, 1), (1, None), (3, 0), (3, 3)])
-def test_an_empty_block(n: int, velocities: int | None, form: str, backend: str) -> None:
+@for_each("form", ["direct", "matrix"])
+@for_each(("n", "velocities"), [(1, 0), (1, 1), (1, None), (3, 0), (3, 3)])
+def test_an_empty_block(n: int, velocities: int | None, form: str) -> None:
     """Every method is then one that has no second block: the Eulers are one, and so is Heun."""
     system = sw.LinearSystem(-np.eye(n), np.ones((n, 1)), np.ones((1, n)), x=np.array([0.0, 0.5]), velocities=velocities)
     of_v = velocities or 0
-    run = sw.integrate(system, "rk4", v=1.0, y=1.0, dt=0.1, steps=20, every=10, form=form, backend=backend)
+    run = sw.integrate(system, "rk4", v=1.0, y=1.0, dt=0.1, steps=20, every=10, form=form)
     assert run.v.shape == (3, of_v, 2)
     assert run.y.shape == (3, n - of_v, 2)
     assert run.z.shape == (3, 1, 2)
@@ -147,7 +147,7 @@ def test_an_empty_block(n: int, velocities: int | None, form: str, backend: str)
     np.testing.assert_allclose(run.z[:, 0, 1], n * 0.5 * (1 + np.exp(-run.t)), rtol=0, atol=n * 20 * 0.1**5 / 120)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("A", "B", "velocities", "second", "term"),
     [
         ([[0, -1], [1, 0]], None, None, True, False),

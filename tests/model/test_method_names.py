@@ -10,6 +10,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import UnknownNameError
 from stepwell.model.method_names import _why_not_here, names_of, spelling
+from support.for_each import for_each
 
 ALL = {m.name: m for m in sw.methods()}
 NAMES = [(m.name, name) for m in sw.methods() for name in (m.name, m.title, *m.other_names)]
@@ -23,7 +24,7 @@ def holders(name: str) -> list[str]:
     return exact or every
 
 
-@pytest.mark.parametrize(("method", "name"), NAMES)
+@for_each(("method", "name"), NAMES)
 def test_every_name_of_a_record_finds_its_method(method: str, name: str) -> None:
     expected = holders(name)
     assert method in expected or expected == [m for m in ALL if m == spelling(name)]
@@ -35,7 +36,7 @@ def test_every_name_of_a_record_finds_its_method(method: str, name: str) -> None
                 sw.method(written)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("name", "method"),
     {
         "euler": "standard_euler",
@@ -56,7 +57,7 @@ def test_names_that_people_type(name: str, method: str) -> None:
     assert sw.integrate(sw.Oscillator(), name, v=0.0, y=1.0, dt=0.1, steps=1).method.name == method
 
 
-@pytest.mark.parametrize(("method", "friend"), FRIENDS)
+@for_each(("method", "friend"), FRIENDS)
 def test_a_false_friend_is_another_method_or_explained(method: str, friend: str) -> None:
     own = holders(friend)
     if len(own) == 1:
@@ -76,7 +77,7 @@ def test_a_false_friend_is_another_method_or_explained(method: str, friend: str)
     assert method in message or ", which is not here" in message or "Dormand-Prince 5(4)" in friend
 
 
-@pytest.mark.parametrize("name", ["RK45", "rk45", "Dormand-Prince 5(4)", "dopri5", "ode45"])
+@for_each("name", ["RK45", "rk45", "Dormand-Prince 5(4)", "dopri5", "ode45"])
 def test_the_method_that_most_people_know_is_explained(name: str) -> None:
     with pytest.raises(UnknownNameError) as caught:
         sw.method(name)
@@ -84,9 +85,7 @@ def test_the_method_that_most_people_know_is_explained(name: str) -> None:
     assert re.search(r"Dormand-Prince 5\(4\)(, which)? is not here; nearest, but not the same: fehlberg_5\.$", message)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "meant"), [("dopri_5", None), ("backwards Radau", None), ("yoshida", None), ("RK54", "rk4"), ("rk5", "rk4")]
-)
+@for_each(("wrong", "meant"), [("dopri_5", None), ("backwards Radau", None), ("yoshida", None), ("RK54", "rk4"), ("rk5", "rk4")])
 def test_a_typing_error_in_a_false_friend_is_explained_too(wrong: str, meant: str | None) -> None:
     with pytest.raises(UnknownNameError) as caught:
         sw.method(wrong)
@@ -102,7 +101,7 @@ def test_a_name_without_its_remark_says_what_there_is() -> None:
     assert sw.method("RK2 (trapezoidal)").name == "standard_heun"
 
 
-@pytest.mark.parametrize("nothing", ["", "  ", "…", "qqqq"])
+@for_each("nothing", ["", "  ", "…", "qqqq"])
 def test_what_is_no_name(nothing: str) -> None:
     with pytest.raises(UnknownNameError, match="method: there is no "):
         sw.method(nothing)
@@ -123,7 +122,7 @@ def test_a_new_record_needs_nothing_else() -> None:
     assert names.friends["fourth_4_3"] == ("", ["two"])
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("names", "why"),
     [
         (

@@ -17,6 +17,7 @@ import pytest
 import stepwell as sw
 from stepwell.analysis.stability.expansion import polynomials
 from support import tops
+from support.for_each import for_each
 from support.truths import CLOSED_FORMS
 
 #: A series has no stages: what is said of them is not of it, and a test of its own has its growth.
@@ -72,8 +73,8 @@ def norms(method: str, h: float, steps: int, control: Any = None, q: Any = None)
     return square, 2.0 * math.asin(min(1.0, 0.5 * math.sqrt(((a - b) ** 2).sum())))
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("phi", [0.01, 0.3, 1.1])
+@for_each("method", METHODS)
+@for_each("phi", [0.01, 0.3, 1.1])
 def test_the_norm_grows_by_the_closed_form(method: str, phi: float) -> None:
     """To the roundings of some twenty operations a stage, on numbers below 4."""
     square, _ = norms(method, 2 * phi / OMEGA, 1)
@@ -85,7 +86,7 @@ def test_the_methods_of_the_package_have_closed_forms() -> None:
     assert {*GROWTH, *ONE_BLOCK} <= set(KNOWN)
 
 
-@pytest.mark.parametrize("method", KNOWN)
+@for_each("method", KNOWN)
 def test_the_closed_forms_are_those_of_the_reference(method: str) -> None:
     exact = determinant(method)
     for phi in (0.1, 0.7, 1.3):
@@ -109,8 +110,8 @@ class Plane:
         return self.h * (0.5j * OMEGA + self.k * (1.0 - abs(y) ** 2)) * y
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(("h", "k"), [(0.02, 5.0), (0.2, 2.0), (0.2, 0.5)])
+@for_each("method", METHODS)
+@for_each(("h", "k"), [(0.02, 5.0), (0.2, 2.0), (0.2, 0.5)])
 def test_the_norm_settles_where_it_should(method: str, h: float, k: float) -> None:
     """Where the same step in complex numbers has its fixed point; the angle of a step is that of its last."""
     s, y, before = Plane(h, k), 1.0 + 0.0j, 1.0 + 0.0j
@@ -134,7 +135,7 @@ def test_standard_euler_settles_by_the_formula() -> None:
     assert norms("standard_euler", 0.01, 4000, sw.NormControl(2.0))[0][-1] - 1 == pytest.approx(0.005625, rel=1e-4)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("method", "reset", "controlled", "gains"),
     [
         ("standard_euler", -1 / 3, 1 / 6, (0.02, 0.3, 0.9)),
@@ -169,7 +170,7 @@ def test_rk4_errs_by_its_own_order_with_a_small_gain() -> None:
     assert norms("rk4", h, 2000, sw.NormControl(0.9 / h))[1] / phi - 1 > 8 * phi**4 / 120
 
 
-@pytest.mark.parametrize("method", METHODS)
+@for_each("method", METHODS)
 def test_resetting_changes_no_attitude(method: str) -> None:
     """Rates that are linear in q, and torques that do not see its length: a step of a longer q is a longer step's q.
 
@@ -186,7 +187,7 @@ def test_resetting_changes_no_attitude(method: str) -> None:
         assert abs(length - 1.0) > 1e-7
 
 
-@pytest.mark.parametrize("phi", [0.0, 0.3, 0.6])
+@for_each("phi", [0.0, 0.3, 0.6])
 def test_standard_euler_settles_up_to_a_gain(phi: float) -> None:
     """A deviation of q·q shrinks by 1 − 2hk·r·√(1 − Φ²), r where it settles: up to hk = 1/√(1 − Φ²) − 1 + √(1 − Φ²), 1 at rest.
 
@@ -221,7 +222,7 @@ def test_at_rest_it_diverges_from_a_gain_of_two_on() -> None:
     assert run.status.tolist() == [0, 0, 1, 1]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@for_each("method", METHODS)
 def test_at_rest_the_gain_is_limited_by_the_method(method: str) -> None:
     """|q| − 1 decays at 2k, so hk is below half the limit on the negative real axis: 1 for Euler and Heun, 1.393 for RK4."""
     decay = sw.stability_limit(sw.LinearSystem([[-1.0]], velocities=0), method)
@@ -245,7 +246,7 @@ def test_at_rest_the_gain_is_limited_by_the_method(method: str) -> None:
         assert bool(off < 1e-12) is settles, off
 
 
-@pytest.mark.parametrize("phi", [0.01, 0.3, 1.1])
+@for_each("phi", [0.01, 0.3, 1.1])
 def test_the_norm_under_a_series_grows_as_the_series_ends(phi: float) -> None:
     """q̇ turns q by a right angle, so a step multiplies it by Σ (iΦ)ᵏ/k! up to the order; to a few roundings each."""
     order = sw.method("taylor").order

@@ -17,6 +17,7 @@ from stepwell.errors import ArgumentError
 from stepwell.model.equations import recognised
 from stepwell.model.systems import own
 from stepwell.studies.sweeps.portable import packed
+from support.for_each import for_each
 
 SCALE = 2.0
 TABLE = np.array([1.0, 2.0])
@@ -35,28 +36,8 @@ def helper(y: Any) -> Any:
     return SCALE * np.sin(y)
 
 
-def of_global() -> Any:
-    return lambda t, v, y: -SCALE * y
-
-
 def of_helper() -> Any:
     return lambda t, v, y: -helper(y)
-
-
-def of_array() -> Any:
-    return lambda t, v, y: -TABLE[0] * y
-
-
-def of_list() -> Any:
-    return lambda t, v, y: -LISTED[0] * y
-
-
-def of_dictionary() -> Any:
-    return lambda t, v, y: -NAMED["k"] * y
-
-
-def of_object() -> Any:
-    return lambda t, v, y: -SETTINGS.k * y
 
 
 CELL = types.SimpleNamespace(k=1.0)
@@ -85,13 +66,19 @@ def of_default() -> Any:
 
 
 CHANGES: dict[str, tuple[Callable[[], Any], Callable[[pytest.MonkeyPatch], None]]] = {
-    "a global": (of_global, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
-    "a global of a function that it calls": (of_helper, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
-    "a function that it calls": (of_helper, lambda patch: patch.setitem(globals(), "helper", lambda y: 7.0 * y)),
-    "an array in place": (of_array, lambda patch: TABLE.__setitem__(0, TABLE[0] + 1.0)),
-    "a list": (of_list, lambda patch: LISTED.__setitem__(0, LISTED[0] + 1.0)),
-    "a dictionary": (of_dictionary, lambda patch: patch.setitem(NAMED, "k", 5.0)),
-    "an attribute of an object": (of_object, lambda patch: patch.setattr(SETTINGS, "k", 5.0)),
+    "a global": (lambda: lambda t, v, y: -SCALE * y, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
+    "a global of a function that it calls": (
+        lambda: lambda t, v, y: -helper(y),
+        lambda patch: patch.setitem(globals(), "SCALE", 3.0),
+    ),
+    "a function that it calls": (
+        lambda: lambda t, v, y: -helper(y),
+        lambda patch: patch.setitem(globals(), "helper", lambda y: 7.0 * y),
+    ),
+    "an array in place": (lambda: lambda t, v, y: -TABLE[0] * y, lambda patch: TABLE.__setitem__(0, TABLE[0] + 1.0)),
+    "a list": (lambda: lambda t, v, y: -LISTED[0] * y, lambda patch: LISTED.__setitem__(0, LISTED[0] + 1.0)),
+    "a dictionary": (lambda: lambda t, v, y: -NAMED["k"] * y, lambda patch: patch.setitem(NAMED, "k", 5.0)),
+    "an attribute of an object": (lambda: lambda t, v, y: -SETTINGS.k * y, lambda patch: patch.setattr(SETTINGS, "k", 5.0)),
     "a captured variable": (of_closure, lambda patch: patch.setattr(CELL, "k", 5.0)),
     "a global of a function within it": (of_inner, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
     "a default": (of_default, lambda patch: patch.setattr(CELL, "k", 5.0)),
@@ -227,7 +214,7 @@ def test_functions_of_the_time_and_invariants_count() -> None:
     assert sw.integrate(with_energy(1.5)(), "rk4", **start, record="energy").recorded["energy"][0] == pytest.approx(1.5, rel=1e-4)
 
 
-@pytest.mark.parametrize(
+@for_each(
     "function",
     [
         lambda: SETTINGS.k,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import TraceError
+from support.for_each import for_each
 
 
 def number(y: Any) -> Any:
@@ -57,34 +58,31 @@ def with_hasattr(y: Any) -> Any:
 SWALLOWED = [number, branch, unknown, written, summed, attribute, with_hasattr]
 
 
-@pytest.mark.parametrize("function", SWALLOWED, ids=lambda each: each.__name__)
-def test_in_rates(function: Any) -> None:
+@for_each("function", SWALLOWED)
+def test_in_rates_inputs_invariants_and_events(function: Any) -> None:
     @sw.system
     def own(t: Any, v: Any, y: Any) -> Any:
         return -function(y)
 
+    start = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1}
     with pytest.raises(TraceError, match=r"^own \(.*line \d+: .*\): .*(no number|no truth|own equations)"):
-        sw.integrate(own, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+        sw.integrate(own, "rk4", **start)
 
-
-@pytest.mark.parametrize("function", SWALLOWED, ids=lambda each: each.__name__)
-def test_in_inputs_invariants_and_events(function: Any) -> None:
     @sw.system
-    def own(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
+    def driven(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
         return push - y
 
-    start = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1}
-    with pytest.raises(TraceError, match="own: push"):
-        sw.integrate(own(push=lambda t: function(t)), "rk4", **start)
+    with pytest.raises(TraceError, match="driven: push"):
+        sw.integrate(driven(push=lambda t: function(t)), "rk4", **start)
     with pytest.raises(TraceError, match="events: low"):
-        sw.integrate(own, "rk4", **start, events=[sw.Event(lambda t, v, y: function(y), name="low")])
+        sw.integrate(driven, "rk4", **start, events=[sw.Event(lambda t, v, y: function(y), name="low")])
 
-    @own.invariant
+    @driven.invariant
     def energy(v: Any, y: Any) -> Any:
         return function(y)
 
-    with pytest.raises(TraceError, match="own: energy"):
-        sw.integrate(own, "rk4", **start, record="energy")
+    with pytest.raises(TraceError, match="driven: energy"):
+        sw.integrate(driven, "rk4", **start, record="energy")
 
 
 def test_an_error_of_ones_own_is_told_and_what_is_no_error_of_a_trace_may_be_caught() -> None:
