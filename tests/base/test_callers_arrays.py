@@ -43,7 +43,7 @@ MAKERS: dict[Any, list[Callable[[], dict[str, Any]]]] = {
     ],
     sw.LengthControl: [lambda: {"c": 0.5 * ones(2)}],
     sw.LinearSystem: [
-        lambda: {"A": -np.eye(2), "B": ones(2, 1), "C": ones(1, 2), "D": ones(1, 1), "x": ones(2), "velocities": np.array([0])},
+        lambda: {"A": -np.eye(2), "B": ones(2, 1), "C": ones(1, 2), "D": ones(1, 1), "x": ones(2), "velocities": np.array([0])}
     ],
     sw.NBody: [lambda: {"masses": ones(3), "G": ones(2), "softening": ones(2), "floor": [sw.Floor(offset=-9.0 * ones(2))]}],
     sw.NormControl: [lambda: {"k": ones(2)}],

@@ -228,10 +228,7 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]).controller_state,
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]).controller_state,
     ],
-    "Mode": [
-        lambda: sw.stability_limit(FREE, "false_euler").mode,
-        lambda: sw.stability_limit(FREE, "rk4").mode,
-    ],
+    "Mode": [lambda: sw.stability_limit(FREE, "false_euler").mode, lambda: sw.stability_limit(FREE, "rk4").mode],
     "At": [lambda: sw.criteria(["rk4"])[0].at[0], lambda: sw.criteria(["false_euler"])[0].at[0]],
     "Explanation": [
         lambda: sw.explain(FREE, "rk4"),

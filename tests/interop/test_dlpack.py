@@ -78,11 +78,7 @@ def test_large_results_begin_at_a_cache_line(numbers: int) -> None:
 
 
 @for_each(
-    "use",
-    [
-        lambda array: sw.Oscillator(array),
-        lambda array: sw.World(sw.Oscillator(), "rk4", v=array, y=np.ones(3), dt=0.1),
-    ],
+    "use", [lambda array: sw.Oscillator(array), lambda array: sw.World(sw.Oscillator(), "rk4", v=array, y=np.ones(3), dt=0.1)]
 )
 def test_those_elsewhere_are_refused(use: Any) -> None:
     match = r"expected an array in the memory of the CPU.*got test_dlpack\.OnDevice \(the array is on CUDA device 0\).*convert it"

@@ -60,9 +60,7 @@ def test_the_driven_oscillator(method: str) -> None:
     )
     own = sw.Oscillator(omega, damping, x=x, a=a)
     assert_close(
-        sw.integrate(linear, method, v=0.3, y=1.0, **RUN),
-        as_block(sw.integrate(own, method, v=0.3, y=1.0, **RUN)),
-        method,
+        sw.integrate(linear, method, v=0.3, y=1.0, **RUN), as_block(sw.integrate(own, method, v=0.3, y=1.0, **RUN)), method
     )
 
 

@@ -125,10 +125,7 @@ def test_a_new_record_needs_nothing_else() -> None:
 @for_each(
     ("names", "why"),
     [
-        (
-            "implicit Adams|Rosenbrock32|Rodas4P|Rodas5|ROS3P|Radau|BDF|BDF2|LSODA|SDIRK2|ode15s",
-            "implicit, and",
-        ),
+        ("implicit Adams|Rosenbrock32|Rodas4P|Rodas5|ROS3P|Radau|BDF|BDF2|LSODA|SDIRK2|ode15s", "implicit, and"),
         (
             "TR-BDF2|Newmark-beta|Kvaerno5|KenCarp4|IMEX|Gauss-Legendre 4|generalized alpha",
             "implicit, and not here; for stiff equations rosenbrock23, rodas4 and rodas5p choose their steps",

@@ -95,10 +95,7 @@ def test_two_equal_bodies_are_a_mirror():
 
 
 def test_forces_of_the_velocity_are_refused_by_verlet():
-    for system, term in (
-        (sw.Pendulum(damping=0.1), "damping"),
-        (sw.RestrictedThreeBody(), "the Coriolis force"),
-    ):
+    for system, term in ((sw.Pendulum(damping=0.1), "damping"), (sw.RestrictedThreeBody(), "the Coriolis force")):
         with pytest.raises(UnsupportedError, match=term):
             sw.integrate(system, "verlet", v=np.zeros(system.v_shape), y=np.ones(system.y_shape), dt=0.1, steps=1)
     for form in ("matrix", "power"):

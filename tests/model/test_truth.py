@@ -18,10 +18,7 @@ from support.truths import CLOSED_FORMS, PROGRAMS, WEIGHTS, forced_error, matrix
 METHODS = [m.name for m in sw.methods()]
 PHIS = (1e-3, 0.1, 0.7, 1.2, 1.9)
 C = np.sqrt(0.75)
-CLOVER = {
-    "v": np.array([[-0.5, C], [-0.5, -C], [1.0, 0.0]]),
-    "y": np.array([[-C, -0.5], [C, -0.5], [0.0, 1.0]]),
-}
+CLOVER = {"v": np.array([[-0.5, C], [-0.5, -C], [1.0, 0.0]]), "y": np.array([[-C, -0.5], [C, -0.5], [0.0, 1.0]])}
 
 
 @for_each("form", ["canonical", "physical"])
