@@ -298,10 +298,10 @@ def test_members_that_move_are_searched_some_at_a_time(monkeypatch: pytest.Monke
         searched.append(len(search.rates[0, 0]))
         return np.zeros(searched[-1]), np.zeros(searched[-1]), np.full(searched[-1], None)
 
-    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(0.18e9, "memory of this machine")]))
+    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(0.15e9, "memory of this machine")]))
     monkeypatch.setattr(limit, "_of_some", some)
-    limit.limit_of(ring().for_state_shapes(), sw.method("rk4"), np.zeros((60, 100)), np.ones((60, 100)))
-    assert sum(searched) == 100
+    limit.limit_of(ring().for_state_shapes(), sw.method("rk4"), np.zeros((60, 40)), np.ones((60, 40)))
+    assert sum(searched) == 40
     assert max(searched) == 18
 
 

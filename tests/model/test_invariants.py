@@ -107,23 +107,14 @@ def test_the_error_of_an_invariant_decays_as_it_is_said() -> None:
 
 
 def test_a_limited_control_never_overshoots() -> None:
-    y = np.array([1.2, 0.0, 0.0, 0.0])
+    start = {"v": np.zeros(3), "y": np.array([1.2, 0.0, 0.0, 0.0]), "dt": 0.1}
     for gain in (10.0, 1e3, 1e6):
-        run = sw.integrate(
-            own.top(),
-            "standard_euler",
-            v=np.zeros(3),
-            y=y,
-            dt=0.1,
-            steps=60,
-            every=1,
-            control=sw.Control("norm", gain, target=1.0),
-            record="norm",
-        )
+        control = sw.Control("norm", gain, target=1.0)
+        run = sw.integrate(own.top(), "standard_euler", **start, steps=60, every=1, control=control, record="norm")
         error = run.recorded["norm"] - 1.0
         assert (np.diff(np.abs(error)) <= 2**-52).all()
     with pytest.warns(sw.ControlWarning, match=r"gain: h·gain = 100"):
-        sw.integrate(own.top(), "standard_euler", v=np.zeros(3), y=y, dt=0.1, steps=1, control=sw.Control("norm", 1e3, "printed"))
+        sw.integrate(own.top(), "standard_euler", **start, steps=1, control=sw.Control("norm", 1e3, "printed"))
 
 
 def test_where_the_gradient_is_zero_nothing_is_pushed() -> None:
@@ -160,7 +151,7 @@ def test_batches_of_gains_and_targets() -> None:
 
 
 def test_what_cannot_be() -> None:
-    arguments = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1}
+    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1}
     with pytest.raises(UnknownNameError, match=r"control: there is no 'enrgy'; did you mean 'energy'"):
         sw.integrate(own.pendulum(), "rk4", **arguments, control=sw.Control("enrgy", 1.0))
     with pytest.raises(UnsupportedError, match=r"EnergyControl .* use Control\('energy', gain\)"):
@@ -168,15 +159,7 @@ def test_what_cannot_be() -> None:
     with pytest.raises(UnsupportedError, match=r"Projection\('scaling'\) .* use Projection\('energy'\)"):
         sw.integrate(own.pendulum(), "rk4", **arguments, control=sw.Projection())
     with pytest.raises(UnsupportedError, match=r"is for an invariant of an own system"):
-        sw.integrate(
-            sw.NBody(),
-            "rk4",
-            v=0.0,
-            y=np.random.default_rng(0).normal(size=(3, 2)),
-            dt=0.1,
-            steps=1,
-            control=sw.Control("energy", 1.0),
-        )
+        sw.integrate(sw.NBody(), "rk4", **arguments | {"y": np.eye(3, 2)}, control=sw.Control("energy", 1.0))
     with pytest.raises(UnsupportedError, match=r"energy: duffing.* declare one: @duffing.invariant"):
         sw.integrate(own.duffing(), "rk4", **arguments, record="energy")
     with pytest.raises(UnsupportedError, match=r"verlet needs"):

@@ -1,4 +1,4 @@
-"""The power form: many steps of a linear system at once, by powers of its transition matrix (§4, Appendix B)."""
+"""Linear systems by their transition matrix (Appendix B), and many steps at once by its powers (§4)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.reference import trig
+from support.cases import Case, cases
 from support.for_each import for_each
 
 U = np.finfo(float).eps / 2
 METHODS = list(sw.methods())
+MATRIX = [case for case in cases() if case.form == "matrix"]
 
 
 def bound(steps: float, kappa: float, numbers: int, roundings: int = 40, size: float = 2.0) -> float:
@@ -66,6 +67,36 @@ def test_power_and_direct_agree(method: sw.Method, driven: bool) -> None:
         assert apart < bound(1003, kappa, 7 if driven else 2) * size * (4 if method.carry else 1)
         assert apart > 0 or not driven  # it is another form
         np.testing.assert_array_equal(power.t, direct.t)
+
+
+@for_each("case", MATRIX)
+def test_direct_and_matrix_agree(case: Case) -> None:
+    n = 200
+    # Small steps, so that no method grows by more than 10 in 200 of them and errors are not amplified by more.
+    matrix = case.run(20, steps=n, every=10, dt=0.05)
+    direct = Case(case.method, case.system, "direct", case.start).run(20, steps=n, every=10, dt=0.05)
+    same = np.array_equal(matrix.v, direct.v) and np.array_equal(matrix.y, direct.y)
+    assert not same or case.method in ("standard_euler", "false_euler")
+    size = max(np.abs(direct.y).max(initial=0.0), np.abs(direct.v).max(initial=0.0))
+    # Each step of either form rounds some dozens of times (rows of P and the stages alike) relative to the largest number; n
+    # steps add up n of those, times the growth. Verlet's recursion has a double root near 1: n²/2 of them, and its v divides by
+    # h·ω₀ ≥ 0.025.
+    steps = n * n / 2 / 0.025 if case.method == "verlet" else n
+    bound = 40 * steps * 2 * U * 10 * size
+    np.testing.assert_allclose(matrix.y, direct.y, rtol=0, atol=bound)
+    np.testing.assert_allclose(matrix.v, direct.v, rtol=0, atol=bound)
+
+
+def test_the_misprinted_matrix_of_false_heun_is_not_the_method() -> None:
+    """§10 prints 1 − Φ²/2 in the corner; the program of Appendix B has 1 − Φ² + Φ⁴/2, and so has the method."""
+    phi = 0.9
+    printed = np.array([[1 - phi**2 / 2, -phi * (1 - phi**2 / 2)], [phi * (1 - phi**2 / 2), 1 - phi**2 / 2]])
+    run = sw.integrate(
+        sw.Oscillator(phi), "false_heun", v=np.array([1.0, 0.0]), y=np.array([0.0, 1.0]), dt=1.0, steps=1, form="matrix"
+    )
+    matrix = np.array([run.v[-1], run.y[-1]])
+    assert matrix[1, 1] == pytest.approx(1 - phi**2 + phi**4 / 2, abs=4 * 2 * U)
+    assert matrix[1, 1] - printed[1, 1] == pytest.approx(phi**4 / 2 - phi**2 / 2, abs=4 * 2 * U)
 
 
 def test_against_exact_powers() -> None:
@@ -191,10 +222,3 @@ def test_progress() -> None:
     plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=100, every=25, form="power", progress=shares.append)
     engine.advance(plan, np.zeros(()), np.ones(()))
     assert shares == [0.2, 0.4, 0.6, 0.8, 1.0]
-
-
-def test_the_cosine() -> None:
-    """As good as the sine of numerics.md; the machine's own is good to an ulp."""
-    x = np.linspace(-1e6, 1e6, 300_001)
-    assert np.abs(trig.cos(x) - np.cos(x)).max() < 4 * U
-    np.testing.assert_array_equal(trig.cos(np.zeros(1)), 1.0)
