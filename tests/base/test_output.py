@@ -154,15 +154,8 @@ def test_charts_try_their_place_before_they_draw(tmp_path: Path, monkeypatch: py
         "animation": picture.animate,
         "criteria": sw.criteria(["rk4"]).to_json,
     }
-    for name in (
-        "picture",
-        "figures_picture",
-        "zplane_picture",
-        "map_picture",
-        "runs_picture",
-        "panel_picture",
-        "runs_animation",
-    ):
+    drawers = ("picture", "figures_picture", "zplane_picture", "map_picture", "runs_picture", "panel_picture", "runs_animation")
+    for name in drawers:
         module = __import__(f"stepwell.views.charts.{name}", fromlist=["x"])
         for drawer in ("draw", "loci", "overview", "one", "write"):
             if hasattr(module, drawer):

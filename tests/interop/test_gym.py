@@ -109,19 +109,17 @@ def test_the_world_is_stepped_in_float32(name: str) -> None:
     # Both draw the same start, whose numbers are below 8 and are rounded by half a unit in their last place, 2⁻²².
     np.testing.assert_allclose(*first, atol=2.0**-21)
     before = first[0].copy()
+    # Twenty steps within a second, each of which rounds by some 2⁻²¹ what then grows by e⁵ at most: upside down a pendulum of
+    # these lengths falls like e⁴ᵗ. Rewards of pendulums are sums of squares, whose slopes are 2π at most.
+    near = 20 * 2.0**-21 * np.exp(5.0)
     for _ in range(20):
         action = half.action_space.sample()
         mine, theirs = half.step(action), whole.step(action)
-        assert mine[0].dtype == F
-        assert mine[1].dtype == np.float64
-        # Twenty steps within a second, each of which rounds by some 2⁻²¹ what then grows by e⁵ at most: upside down a pendulum
-        # of these lengths falls like e⁴ᵗ. Rewards of pendulums are sums of squares, whose slopes are 2π at most.
-        near = 20 * 2.0**-21 * np.exp(5.0)
+        assert (mine[0].dtype, mine[1].dtype) == (F, np.float64)
         np.testing.assert_allclose(mine[0], theirs[0], atol=near)
         np.testing.assert_allclose(mine[1], theirs[1], atol=2.0 * np.pi * near)
     np.testing.assert_array_equal(first[0], before)
     assert half.world.v.dtype == half.world.y.dtype == F
-    assert whole.world.y.dtype == np.float64
     assert (half.world.v != whole.world.v.astype(F)).any()
     assert [each.dtype for each in half.states] == [np.float64] * 2
     assert np.shares_memory(whole.states[1], whole.world.y)

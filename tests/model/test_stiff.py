@@ -213,19 +213,6 @@ def test_order_conditions(name: str, embedded: int) -> None:
 # Orders as they are measured.
 
 
-@for_each("method", IMPLICIT)
-def test_the_order_on_a_forced_and_on_a_nonlinear_problem(method: str) -> None:
-    order = sw.method(method).order
-    for system, start in stiff.SMOOTH:
-        true = np.concatenate([np.ravel(x) for x in stiff.end(system, "dop853", start, tolerance=1e-14, at=[1.0])])
-        steps = (32, 64) if order == 4 else (16, 32) if order == 5 else (128, 256)
-        errors = [
-            np.linalg.norm(np.concatenate([np.ravel(x) for x in stiff.end(system, method, start, dt=1 / n, steps=n)]) - true)
-            for n in steps
-        ]
-        assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.4), (system, errors)
-
-
 @for_each(
     ("method", "order"),
     [("backward_euler", 1), ("linearly_implicit_euler", 1), ("implicit_midpoint", 2), ("trapezoidal", 2), ("rosenbrock23", 2),

@@ -67,18 +67,6 @@ def test_order_of_each_start_of_verlet(start: str) -> None:
         assert slope(lambda dt: forced_error("verlet", dt, block, start=start)) == pytest.approx(expected, abs=0.1)  # noqa: B023
 
 
-@for_each("method", [m for m in METHODS if sw.method(m).order <= 5])  # test_orders has the others
-def test_order_in_the_clover(method: str) -> None:
-    """Three bodies on the unit circle, angular speed 1: a nonlinear system with an exact solution."""
-
-    def error(dt: float) -> float:
-        run = sw.integrate(sw.NBody(), method, **CLOVER, dt=dt, steps=round(1.0 / dt))
-        turn = np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])  # clockwise: rows times it
-        return float(np.abs(run.y[-1] - CLOVER["y"] @ turn).max())
-
-    assert slope(error) == pytest.approx(sw.method(method).order, abs=0.2 if method == "rodas5p" else 0.1)
-
-
 def test_clover_stays_bounded_by_false_euler() -> None:
     """The document's figure: T = 0.3, stable ad infinitum; the radius stays within [0.914, 1.127] for 100 000 steps."""
     run = sw.integrate(sw.NBody(), "false_euler", **CLOVER, dt=0.3, steps=100_000, every=1)

@@ -103,27 +103,8 @@ PROBLEMS = {
 
 
 @sw.system(order=1)
-def forced(t, y):  # type: ignore[no-untyped-def]
-    return -2.0 * y + np.cos(3.0 * t) * (1.0 + 0.5 * y)
-
-
-@sw.system
-def driven_pendulum(t, v, y):  # type: ignore[no-untyped-def]
-    return -np.sin(y) - 0.1 * v * v * v + 0.3 * np.cos(2.0 * t)
-
-
-SMOOTH: tuple[tuple[Any, dict[str, float]], ...] = ((forced, {"y": 1.0}), (driven_pendulum, {"v": 0.3, "y": 1.0}))
-
-
-@sw.system(order=1)
 def prothero_robinson(t, y, rate=1e6):  # type: ignore[no-untyped-def]
     return -rate * (y - np.sin(t + 0.5)) + np.cos(t + 0.5)
-
-
-def end(system: Any, method: str, start: dict[str, float], **options: Any) -> list[Any]:
-    """Both blocks at the end of a run."""
-    run = sw.integrate(system, method, **start, **options)
-    return [run.v[-1], run.y[-1]]
 
 
 def exponential(matrix: Any, t: float) -> Any:
