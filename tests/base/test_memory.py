@@ -300,8 +300,8 @@ def test_members_that_move_are_searched_some_at_a_time(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(0.15e9, "memory of this machine")]))
     monkeypatch.setattr(limit, "_of_some", some)
-    limit.limit_of(ring().for_state_shapes(), sw.method("rk4"), np.zeros((60, 40)), np.ones((60, 40)))
-    assert sum(searched) == 40
+    limit.limit_of(ring().for_state_shapes(), sw.method("rk4"), np.zeros((60, 20)), np.ones((60, 20)))
+    assert sum(searched) == 20
     assert max(searched) == 18
 
 

@@ -153,9 +153,10 @@ def test_backward_in_time() -> None:
         assert abs(y / np.exp((4 - t * t) / 2) - 1) < bound
     back = sw.solve_ivp(lambda t, y: -t * y, (-1.0, 2.0), there.y[:, -1], rtol=rtol, atol=atol)
     assert abs(back.y[0, -1] - 1.0) < bound + (len(back.t) + 1) * (rtol + atol)
-    falling = sw.solve_ivp(turning, (0.0, -7.0), [1.0, 0.0], t_eval=[0.0, -1.0, -7.0], rtol=1e-9)
-    assert falling.t.tolist() == [0.0, -1.0, -7.0]
-    assert falling.y[0] == pytest.approx(np.cos(falling.t), abs=1e-6)
+    for options in ({}, {"dense_output": True}):
+        falling = sw.solve_ivp(turning, (0.0, -7.0), [1.0, 0.0], t_eval=[0.0, -1.0, -7.0], rtol=1e-9, **options)
+        assert falling.t.tolist() == [0.0, -1.0, -7.0]
+        assert falling.y[0] == pytest.approx(np.cos(falling.t), abs=1e-6)
 
 
 # ---- the same bits as a run
