@@ -22,9 +22,16 @@ from support.for_each import for_each
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits and peaks are asked of Linux")
 
 
+PREAMBLE = """import resource, numpy as np, stepwell as sw
+def leave(room):
+    used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + room, resource.RLIM_INFINITY))
+"""
+
+
 def aside(code: str) -> str:
-    """What the code prints, in a process of its own."""
-    code = "import resource, sys, time, numpy as np, stepwell as sw\n" + textwrap.dedent(code)
+    """What the code prints, in a process of its own, in which ``leave`` limits the memory that it may still take."""
+    code = PREAMBLE + textwrap.dedent(code)
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}
     )
@@ -45,8 +52,7 @@ def test_more_kept_states_than_memory_are_refused_at_once(steps: int, monkeypatc
 def test_a_limit_of_the_address_space_is_heard(arguments: str) -> None:
     """20 million states of 32 bytes do not fit where 400 MB are left; what does fit is made."""
     output = aside(f"""
-        used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (used + 400_000_000,) * 2)
+        leave(400_000_000)
         try:
             sw.integrate(sw.Oscillator(1.0), "dop853", v=0.0, y=1.0, dt=0.1, {arguments})
         except MemoryError as error:
@@ -81,8 +87,7 @@ def test_a_system_that_does_not_fit_is_an_error_and_no_abort() -> None:
         n = 4_000_000
         system, y = sw.Chain(n), np.zeros(n)
         v = np.zeros(n)
-        used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (used + 300_000_000,) * 2)
+        leave(300_000_000)
         for make in (
             lambda: sw.integrate(system, "rk4", v=v, y=y, dt=0.1, steps=1),
             lambda: sw.World(system, "rk4", v=v, y=y, dt=0.1),
@@ -99,8 +104,7 @@ def test_a_system_that_does_not_fit_is_an_error_and_no_abort() -> None:
 def test_threads_that_cannot_be_had_are_done_without() -> None:
     """A stack for each of 64 threads is more than there is."""
     output = aside("""
-        used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (used + 60_000_000,) * 2)
+        leave(60_000_000)
         run = sw.integrate(sw.Oscillator(np.linspace(1, 2, 5000)), "rk4", v=0.0, y=1.0, dt=0.1, steps=300, threads=64)
         print(run.y.shape)
     """)

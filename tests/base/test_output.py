@@ -20,35 +20,24 @@ from stepwell.views import charts
 from support.commands import run_command
 from support.families import family
 
+RUN = ["run", "clover", "--method", "rk4", "--steps", "5"]
+CHART = ["chart", "oscillator", "--methods", "false_euler"]
+ADVISE = ["advise", "oscillator", "--methods", "rk4", "--cost", "evaluations", "--tolerance", "0.1"]
+CLI = "stepwell.views.cli"
 #: Each command that writes: its words, what its work is done by, the name of a file, or one that it writes into a folder.
 COMMANDS: dict[str, tuple[list[str], str, str, str | None]] = {
-    "run": (["run", "clover", "--method", "rk4", "--steps", "5"], "stepwell.scenes.Scene.run", "run.csv", None),
-    "run npz": (["run", "clover", "--method", "rk4", "--steps", "5"], "stepwell.scenes.Scene.run", "run.npz", None),
-    "run picture": (["run", "clover", "--method", "rk4", "--steps", "5"], "stepwell.scenes.Scene.run", "run.png", None),
-    "run animation": (["run", "clover", "--method", "rk4", "--steps", "5"], "stepwell.scenes.Scene.run", "run.gif", None),
-    "advise": (
-        ["advise", "oscillator", "--methods", "rk4", "--cost", "evaluations", "--tolerance", "0.1"],
-        "stepwell.views.cli.advise.advise",
-        "a.json",
-        None,
-    ),
-    "explore": (["explore", "--scene", "oscillator", "--only"], "stepwell.views.cli.explore.explore", "page.html", None),
-    "criteria": (["criteria", "rk4"], "stepwell.views.cli.criteria.criteria", "c.md", None),
-    "criteria json": (["criteria", "rk4"], "stepwell.views.cli.criteria.criteria", "c.json", None),
-    "chart": (
-        ["chart", "oscillator", "--methods", "false_euler"],
-        "stepwell.views.cli.chart.work_precision",
-        "",
-        "oscillator.csv",
-    ),
-    "chart panel": (
-        ["chart", "oscillator", "--methods", "false_euler", "--panel"],
-        "stepwell.views.cli.chart.work_precision",
-        "",
-        "panel.json",
-    ),
-    "figures": (["figures", "rk4"], "stepwell.views.cli.figures.figures", "", None),
-    "stability": (["stability", "rk4", "--charts", "loci"], "stepwell.views.cli.stability.stability", "", "stability.csv"),
+    "run": (RUN, "stepwell.scenes.Scene.run", "run.csv", None),
+    "run npz": (RUN, "stepwell.scenes.Scene.run", "run.npz", None),
+    "run picture": (RUN, "stepwell.scenes.Scene.run", "run.png", None),
+    "run animation": (RUN, "stepwell.scenes.Scene.run", "run.gif", None),
+    "advise": (ADVISE, f"{CLI}.advise.advise", "a.json", None),
+    "explore": (["explore", "--scene", "oscillator", "--only"], f"{CLI}.explore.explore", "page.html", None),
+    "criteria": (["criteria", "rk4"], f"{CLI}.criteria.criteria", "c.md", None),
+    "criteria json": (["criteria", "rk4"], f"{CLI}.criteria.criteria", "c.json", None),
+    "chart": (CHART, f"{CLI}.chart.work_precision", "", "oscillator.csv"),
+    "chart panel": ([*CHART, "--panel"], f"{CLI}.chart.work_precision", "", "panel.json"),
+    "figures": (["figures", "rk4"], f"{CLI}.figures.figures", "", None),
+    "stability": (["stability", "rk4", "--charts", "loci"], f"{CLI}.stability.stability", "", "stability.csv"),
 }
 
 EACH = pytest.mark.parametrize("command", COMMANDS)

@@ -553,16 +553,16 @@ def test_examples_print_what_they_say(name: str) -> None:
 
 
 def test_wrong_calls() -> None:
-    with pytest.raises(ArgumentError, match="num_envs: expected 1 or more, got 0"):
-        sw.gym.PendulumVectorEnv(0)
-    with pytest.raises(ArgumentError, match="dt: expected numbers above zero in seconds"):
-        sw.gym.PendulumVectorEnv(dt=0.0)
-    with pytest.raises(UnknownNameError, match="there is no 'rk5'"):
-        sw.gym.PendulumVectorEnv(method="rk5")
+    for options, error, message in (
+        ({"num_envs": 0}, ArgumentError, "num_envs: expected 1 or more, got 0"),
+        ({"dt": 0.0}, ArgumentError, "dt: expected numbers above zero in seconds"),
+        ({"method": "rk5"}, UnknownNameError, "there is no 'rk5'"),
+        ({"render_mode": "ansi"}, UnknownNameError, "render_mode: there is no 'ansi'"),
+    ):
+        with pytest.raises(error, match=message):
+            sw.gym.PendulumVectorEnv(**options)
     with pytest.raises(UnsupportedError, match="leapfrog needs a second-order system"):
         sw.gym.CartPoleVectorEnv(method="leapfrog")
-    with pytest.raises(UnknownNameError, match="render_mode: there is no 'ansi'"):
-        sw.gym.PendulumVectorEnv(render_mode="ansi")
     envs = sw.gym.CartPoleVectorEnv(3)
     with pytest.raises(ArgumentError, match=r"step: expected after reset\(\)"):
         envs.step(np.zeros(3, dtype=int))

@@ -109,20 +109,24 @@ def test_a_chunk_of_negative_zeros(tmp_path: Path) -> None:
     assert np.signbit(through(run, tmp_path, ".zarr").y).all()
 
 
-def test_a_run_that_diverged_says_where_bodies_met(tmp_path: Path) -> None:
-    y = np.array([[1.0, 3.0], [-2.0, -1.0], [1.0, -1.0]])
-    y = np.stack([y, np.zeros((3, 2))], axis=-1)
-    run = sw.integrate(sw.NBody([3.0, 4.0, 5.0]), "rk4", v=0.0, y=y, dt=0.01, steps=20)
+def test_what_happened_on_the_way_is_in_the_file(tmp_path: Path) -> None:
+    """Where bodies met in a run that diverged, recorded quantities, events."""
+    y = np.stack([[[1.0, 3.0], [-2.0, -1.0], [1.0, -1.0]], np.zeros((3, 2))], axis=-1)
+    run = sw.integrate(sw.NBody([3.0, 4.0, 5.0]), "rk4", v=0.0, y=y, dt=0.01, steps=20, every=2, record="energy")
     back = through(run, tmp_path)
+    assert back == run
     assert back.collisions == run.collisions
     assert len(back.collisions) == 1
     assert back.encounters == run.encounters
-
-
-def test_recorded_quantities_are_there(tmp_path: Path) -> None:
-    run = sw.scenes.figure_eight().run("rk4", steps=10, every=2, record="energy")
-    back = through(run, tmp_path)
     np.testing.assert_array_equal(back.recorded["energy"], run.recorded["energy"])
+    ends = sw.Event(lambda t, v, y: y, direction=1, name="lowest")
+    low = sw.Event(lambda t, v, y: y - 0.5, direction=-1, terminal=True, name="half")
+    for events in (ends, [ends, low]):
+        run = sw.integrate(sw.Pendulum(omega=[1.0, 2.0]), "rk4", v=0.0, y=1.0, dt=0.05, steps=400, events=events)
+        back = through(run, tmp_path)
+        assert back == run
+        assert back.events == run.events
+    assert np.isfinite(back.stopped_at).all()
 
 
 def test_other_programs_find_the_arrays(tmp_path: Path) -> None:
@@ -354,15 +358,3 @@ def test_zarr_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.Monke
     for use in (lambda: run.save(tmp_path / "run.zarr"), lambda: sw.load(tmp_path / "run.zarr")):
         with pytest.raises(UnsupportedError, match=r"needs zarr, which is not installed; pip install 'stepwell\[zarr\]'"):
             use()
-
-
-def test_events_are_in_the_file(tmp_path: Path) -> None:
-    ends = sw.Event(lambda t, v, y: y, direction=1, name="lowest")
-    low = sw.Event(lambda t, v, y: y - 0.5, direction=-1, terminal=True, name="half")
-    for events in (ends, [ends, low]):
-        run = sw.integrate(sw.Pendulum(omega=[1.0, 2.0]), "rk4", v=0.0, y=1.0, dt=0.05, steps=400, events=events)
-        run.save(tmp_path / "run.npz")
-        back = sw.load(tmp_path / "run.npz")
-        assert back == run
-        assert back.events == run.events
-    assert np.isfinite(back.stopped_at).all()

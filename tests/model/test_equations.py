@@ -356,36 +356,32 @@ def test_parameters_may_have_any_name() -> None:
         np.testing.assert_allclose(run.y, expected.y, rtol=1e-12)
 
 
-def test_what_is_wrong_with_parameters() -> None:
-    with pytest.raises(UnknownNameError, match=r"duffing: there is no parameter 'bta'. Known: alpha, beta"):
-        own.duffing(bta=1.0)
-    with pytest.raises(NotFiniteError, match=r"duffing: beta: expected finite numbers, got nan"):
-        own.duffing(beta=np.nan)
-    with pytest.raises(DTypeError, match=r"duffing: beta: expected real numbers"):
-        own.duffing(beta="x")
-    with pytest.raises(ShapeError, match=r"duffing: alpha .*duffing: beta"):
-        own.duffing(alpha=np.ones(2), beta=np.ones(3))
-    with pytest.raises(ArgumentError, match=r"f: expected a default of the parameter k"):
-        sw.system(lambda_of("f", "t, v, y, *, k"))
-    with pytest.raises(ArgumentError, match=r"f: expected a function \(t, v, y, \*, …\), got \(t, y\)"):
-        sw.system(lambda_of("f", "t, y"))
-    with pytest.raises(ArgumentError, match=r"f: expected parameters with names"):
-        sw.system(lambda_of("f", "t, v, y, **rest"))
-    with pytest.raises(DTypeError, match=r"function: expected a Python function"):
-        sw.system(3.0)  # type: ignore[call-overload]
-    with pytest.raises(ArgumentError, match=r"order: expected 1"):
-        sw.system(order=3)
-    with pytest.raises(ArgumentError, match=r"blocks: expected 1 with order=1"):
-        sw.system(order=1, blocks=2)
-    with pytest.raises(TraceError, match=r"pushed: x .*np\.sinc"):
-        sw.integrate(own.pushed(x=lambda t: np.sinc(t)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
-
-
 def lambda_of(name: str, arguments: str) -> Any:
     """A function with these arguments."""
     namespace: dict[str, Any] = {}
     exec(f"def {name}({arguments}):\n    return -y", namespace)
     return namespace[name]
+
+
+WRONG: list[tuple[Any, type[Exception], str]] = [
+    (lambda: own.duffing(bta=1.0), UnknownNameError, r"duffing: there is no parameter 'bta'. Known: alpha, beta"),
+    (lambda: own.duffing(beta=np.nan), NotFiniteError, r"duffing: beta: expected finite numbers, got nan"),
+    (lambda: own.duffing(beta="x"), DTypeError, r"duffing: beta: expected real numbers"),
+    (lambda: own.duffing(alpha=np.ones(2), beta=np.ones(3)), ShapeError, r"duffing: alpha .*duffing: beta"),
+    (lambda: sw.system(lambda_of("f", "t, v, y, *, k")), ArgumentError, r"f: expected a default of the parameter k"),
+    (lambda: sw.system(lambda_of("f", "t, y")), ArgumentError, r"f: expected a function \(t, v, y, \*, …\), got \(t, y\)"),
+    (lambda: sw.system(lambda_of("f", "t, v, y, **rest")), ArgumentError, r"f: expected parameters with names"),
+    (lambda: sw.system(3.0), DTypeError, r"function: expected a Python function"),  # type: ignore[call-overload]
+    (lambda: sw.system(order=3), ArgumentError, r"order: expected 1"),
+    (lambda: sw.system(order=1, blocks=2), ArgumentError, r"blocks: expected 1 with order=1"),
+    (lambda: run(own.pushed(x=lambda t: np.sinc(t)), v=0.0, y=1.0), TraceError, r"pushed: x .*np\.sinc"),
+]
+
+
+@for_each("call, error, message", WRONG)
+def test_what_is_wrong_with_parameters(call: Any, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        call()
 
 
 def test_a_bare_function_is_to_be_wrapped() -> None:

@@ -197,16 +197,8 @@ def test_standard_euler_settles_up_to_a_gain(phi: float) -> None:
     limit = 1 / cosine - 1 + cosine
     spin = SPIN if phi else np.zeros(3)
     for factor, settles in ((0.99, True), (1.01, False)):
-        run = sw.integrate(
-            BODY,
-            "standard_euler",
-            v=spin,
-            y=1.001 * tops.some_attitude(1),
-            dt=h,
-            steps=4001,
-            every=1,
-            control=sw.NormControl(factor * limit / h),
-        )
+        start = {"v": spin, "y": 1.001 * tops.some_attitude(1), "dt": h, "steps": 4001, "every": 1}
+        run = sw.integrate(BODY, "standard_euler", **start, control=sw.NormControl(factor * limit / h))
         one, two = (run.y[-2:] ** 2).sum(axis=1)
         assert bool(abs(one - two) < 1e-12) is settles
         assert one == pytest.approx(1.0, abs=0.4)
@@ -232,16 +224,8 @@ def test_at_rest_the_gain_is_limited_by_the_method(method: str) -> None:
     if method == "rk4":
         assert limit == pytest.approx(0.5 * 2.785293563405282, rel=1e-9)
     for factor, settles in ((0.99, True), (1.01, False)):
-        run = sw.integrate(
-            BODY,
-            method,
-            v=np.zeros(3),
-            y=1.0001 * tops.some_attitude(1),
-            dt=0.1,
-            steps=3000,
-            every=1,
-            control=sw.NormControl(factor * limit / 0.1),
-        )
+        start = {"v": np.zeros(3), "y": 1.0001 * tops.some_attitude(1), "dt": 0.1, "steps": 3000, "every": 1}
+        run = sw.integrate(BODY, method, **start, control=sw.NormControl(factor * limit / 0.1))
         off = abs((run.y[-20:] ** 2).sum(axis=1) - 1.0).max()
         assert bool(off < 1e-12) is settles, off
 
