@@ -36,7 +36,7 @@ TESTS_ON_WINDOWS := windows recorded_bits kernels fixed saved_runs output cli in
 
 .DEFAULT_GOAL := help
 .PHONY: help demo docs test test-outer test-all test-long test-wheels test-oldest test-aarch64 test-windows campaign wheel wheels release deny
-.PHONY: licences dev bench format pins clean hooks lint lint-rust lint-python lint-outer check-rust check-python check-budget check-workflows
+.PHONY: licences dev bench gate format pins clean hooks lint lint-rust lint-python lint-outer check-rust check-python check-budget check-workflows
 .PHONY: rust-build rust-test python-test python-outer durations
 
 help: ## list the targets
@@ -123,10 +123,15 @@ hooks: .venv/test ## check format, lints, types and tables before each commit; .
 	$(PIP) pre-commit
 	$(BIN)/pre-commit install
 
-bench: .venv/bench ## time every language on the same work, into benches/RESULTS.md, and stiff systems, into their page
-	$(BIN)/python -m benches.compare
+bench: .venv/bench ## time every language on the same work, in half an hour, into benches/RESULTS.md and the docs (BENCH=--quick: two minutes, into out/)
 	@$(PIP) numbalsoda 2> /dev/null || echo "numbalsoda is left out: pip builds it, which takes cmake and a Fortran compiler"
-	$(BIN)/python -m benches.stiff
+	$(BIN)/python -m benches.compare $(BENCH)
+	$(BIN)/python -m benches.stiff $(BENCH)
+	$(BIN)/python docs/generate.py
+	$(BIN)/python docs/speed.py
+
+gate: .venv/bench ## compare ten speeds with C, in a minute; one below 0.9 of benches/gate.json fails
+	$(BIN)/python -m benches.gate
 
 # In `make test` two of these run at a time, so that neither core waits for a download or a program that uses only one.
 lint: lint-rust lint-python
@@ -260,7 +265,7 @@ $(BIN)/python$(EXE):
 .venv/demo .venv/demo.needs: EXTRA = chart
 .venv/docs .venv/docs.needs: EXTRA = docs
 .venv/test .venv/test.needs: EXTRA = test,docs
-.venv/bench .venv/bench.needs: EXTRA = bench
+.venv/bench .venv/bench.needs: EXTRA = bench,chart
 NEEDS = import tomllib; extras = tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]; \
         print(*(need for extra in "$(EXTRA)".split(",") for need in extras[extra]), sep="\n")
 

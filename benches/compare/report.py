@@ -101,9 +101,28 @@ def sections(text: str) -> dict[str, str]:
     return {"": parts[0].strip()} | {part.partition("\n")[0]: f"## {part.strip()}" for part in parts[1:]}
 
 
+def left_out(text: str) -> str:
+    """The last section of a report: every row of its tables with a dash, and why; what is so in several tables is said once."""
+    tables: dict[str, list[str]] = {}
+    for title, part in sections(text).items():
+        head, _, *lines = [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("|")] or [[], []]
+        for line in lines:
+            cells = dict(zip(head, line, strict=False))
+            columns = [name for name, cell in cells.items() if cell == "—" and not name.startswith("÷")]
+            if columns:
+                every = len(columns) >= len([name for name in head if not name.startswith("÷")]) - 2
+                where = "" if every else f", {', '.join(columns)}"
+                why = cells.get("remarks") or "not as exact, or not in time"
+                tables.setdefault(f"{line[0]}{where}: {why}", []).append(title)
+    items = [line.replace("left out: ", "", 1) for line in sections(text)[""].splitlines() if line.startswith("- left out: ")]
+    items += [f"- {what} ({'; '.join(titles)})" for what, titles in tables.items()]
+    return "\n".join(["## Left out", "", *(items or ["Nothing."])])
+
+
 def renewed(before: str, now: str, only: str) -> str:
     """A report in which some works were done again, in a run of their own. Ratios are within a work, so they hold on."""
     old, new = sections(before), sections(now)
+    old.pop("Left out", None)
     date = next((line for line in new[""].splitlines() if line.startswith("- date: ")), "- date: unknown")
     again = f"- done again in a run of their own, {date.removeprefix('- date: ')}: {only}"
     head = [line for line in old[""].splitlines() if line != again]

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..budget import Budget, StoppedError
 from ..compare.peers import MissingPeerError
 from .contestants import OURS, PEERS, Contestant, Setting, Solve
 from .problems import Problem
@@ -28,8 +29,8 @@ AIMS = (1e-3, 1e-6, 1e-9)
 TOLERANCES = tuple(10.0 ** -np.arange(1.5, 13.5, 0.5))
 #: Seconds of a trial after which no finer tolerance is tried, and of a trial that is made again for its time, so often.
 PATIENCE, SHORT, AGAIN = 1.0, 0.1, 3
-#: Seconds of all trials of a contestant together, after which no setting is tried.
-BUDGET = 10.0
+#: Seconds of all trials of a contestant together, after which no setting is tried; the second in a quick run.
+BUDGET, QUICK = 10.0, 1.0
 #: Nor is one tried where a member takes so many times as long as by a setting that is exact enough for all.
 HOPELESS = 2.0
 #: Contestants take turns so often; a peer that takes longer than so many seconds in one has only one.
@@ -82,13 +83,13 @@ def seconds(call: Callable[[], object], calls: int = 1) -> float:
     return (time.process_time() - begin) / calls
 
 
-def points(contestant: Contestant, solve: Solve, problem: Problem, least: float) -> Iterator[Point]:
-    """All settings, from coarse to fine, until an error is undercut or patience ends."""
+def points(contestant: Contestant, solve: Solve, problem: Problem, least: float, most: float = BUDGET) -> Iterator[Point]:
+    """All settings, from coarse to fine, until an error is undercut, or patience or so many seconds end."""
     parameters = problem.parameters(contestant.trial)
     cheapest, begun = math.inf, time.process_time()
     for method, share in itertools.product(contestant.methods, contestant.shares):
         for tolerance in TOLERANCES:
-            if time.process_time() - begun > BUDGET:
+            if time.process_time() - begun > most:
                 return
             setting = Setting(method, float(tolerance), share)
             ends: Any = None
@@ -150,48 +151,58 @@ def silent() -> Iterator[None]:
 
 
 def prepared(
-    problem: Problem, aims: tuple[float, ...], most_members: int | None, peers: tuple[str, ...] = ()
-) -> Iterator[tuple[str, Row, Solve | None]]:
-    """Every contestant, or stepwell and these peers, with the settings that it will be timed with."""
-    for contestant in (OURS, *(each for each in PEERS if not peers or each.name in peers)):
-        print(f"{problem.name}: {contestant.name}", file=sys.stderr, flush=True)
-        if most_members is not None:
-            contestant = contestant._replace(members=most_members, trial=most_members)
-        if (missing := warmed_up(contestant)) is not None:
-            yield contestant.name, Row(missing), None
-            continue
-        begin = time.process_time()
-        solve = contestant.make(problem)
-        making = time.process_time() - begin
-        calls = [seconds(lambda solve=solve: tried_once(solve, contestant, problem)) for _ in range(2)]  # type: ignore[misc]  # noqa: B023
-        tried = tuple(points(contestant, solve, problem, min(aims)))
-        chosen = tuple(cheapest(tried, aim) for aim in aims)
-        row = Row(
-            "", making + calls[0] - calls[1], contestant.members, tried, chosen, *(tuple([] for _ in aims) for _ in range(2))
-        )
-        yield contestant.name, row, solve
+    contestant: Contestant, problem: Problem, aims: tuple[float, ...], most_members: int | None
+) -> tuple[Row, Solve | None]:
+    """A contestant, with the settings that it will be timed with."""
+    if most_members is not None:
+        contestant = contestant._replace(members=most_members, trial=most_members)
+    if (missing := warmed_up(contestant)) is not None:
+        return Row(missing), None
+    begin = time.process_time()
+    solve = contestant.make(problem)
+    making = time.process_time() - begin
+    calls = [seconds(lambda: tried_once(solve, contestant, problem)) for _ in range(2)]
+    tried = tuple(points(contestant, solve, problem, min(aims), BUDGET if most_members is None else QUICK))
+    chosen = tuple(cheapest(tried, aim) for aim in aims)
+    times = (tuple([] for _ in aims) for _ in range(2))
+    return Row("", making + calls[0] - calls[1], contestant.members, tried, chosen, *times), solve
 
 
 def measure(
-    problem: Problem, aims: tuple[float, ...], turns: int, most_members: int | None = None, peers: tuple[str, ...] = ()
+    problem: Problem,
+    aims: tuple[float, ...],
+    turns: int,
+    budget: Budget,
+    most_members: int | None = None,
+    peers: tuple[str, ...] = (),
 ) -> dict[str, Row]:
-    """All contestants with a problem, in turns, so that what disturbs the machine disturbs all alike."""
+    """All contestants, or stepwell and these peers, in turns, so that what disturbs the machine disturbs all alike."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    contestants = [OURS, *(each for each in PEERS if not peers or each.name in peers)]
+    budget, rows, solves = budget.part(len(contestants) + 1), dict[str, Row](), dict[str, Solve | None]()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of tolerances that are far too coarse
-        made = list(prepared(problem, aims, most_members, peers))
+        for contestant in contestants:
+            print(f"{problem.name}: {contestant.name}", file=sys.stderr, flush=True)
+            try:
+                with budget.part().limit():
+                    rows[contestant.name], solves[contestant.name] = prepared(contestant, problem, aims, most_members)
+            except StoppedError as why:
+                rows[contestant.name] = Row(str(why))
         single = problem.parameters(1)
-        for _, (_, row, solve) in itertools.product(range(turns), made):
-            for place, setting in enumerate(row.chosen):
-                if (
-                    solve is None
-                    or setting is None
-                    or (row.batch[place] and row.batch[place][0] * row.members > LONGEST_IN_TURNS)
-                ):
-                    continue
-                _one_turn(solve, setting, problem, row, place, single)
-    return {name: row for name, row, _ in made}
+        try:
+            with budget.part().limit():
+                for _, (name, solve) in itertools.product(range(turns), solves.items()):
+                    row = rows[name]
+                    for place, setting in enumerate(row.chosen):
+                        late = row.batch[place] and row.batch[place][0] * row.members > LONGEST_IN_TURNS
+                        if solve is not None and setting is not None and not late:
+                            with contextlib.suppress(*FAILURES), silent():  # the trial had no member like the single one
+                                _one_turn(solve, setting, problem, row, place, single)
+        except StoppedError as why:
+            print(f"{problem.name}: turns {why}", file=sys.stderr)
+    return rows
 
 
 def _one_turn(solve: Solve, setting: Setting, problem: Problem, row: Row, place: int, single: Any) -> None:

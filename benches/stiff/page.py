@@ -90,7 +90,7 @@ def write(known: dict[str, Any], page: Path) -> None:
     parts = [known["machine"], "", "Times as fast as the best peer:", "", summary(known)]
     for name, rows in known["problems"].items():
         parts += [f"## {name}", "", details(known, rows)]
-    text = page.read_text(encoding="utf-8")
+    text = (page if page.exists() else PAGE).read_text(encoding="utf-8")
     page.write_text(PLACE.sub(lambda found: found[1] + "\n".join(parts) + found[2], text), encoding="utf-8")
 
 

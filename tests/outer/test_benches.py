@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 import re
 import subprocess
 import sys
 import time
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -20,9 +22,11 @@ import stepwell as sw
 from support import ROOT
 from support.cases import number
 
-from benches import growth, roots
+from benches import budget, gate, growth, roots
+from benches.budget import Budget
 from benches.compare import machine, peers, report, runner, workloads
-from benches.compare.chosen import solar
+from benches.compare.chosen import orbits, solar, tables
+from benches.compare.chosen.contestants import Contestant as Adaptive
 from benches.compare.own import first_call, tolerance
 from benches.compare.own.equations import EQUATIONS, Equation
 from benches.compare.peers import (
@@ -158,9 +162,9 @@ def test_a_tolerance_is_the_coarsest_that_is_exact_enough() -> None:
 
 
 def test_tracing_and_compiling_has_a_line_for_each_system() -> None:
-    title, head, lines = first_call.table(2, quick=True)
+    title, head, lines = first_call.table(2, True, Budget(600.0))
     assert "Own equations" in title
-    assert [(line[1], line[-1]) for line in lines] == [("3", "≤ 5"), ("10", "≤ 100")]
+    assert [(line[1], line[-2]) for line in lines] == [("3", "≤ 5"), ("10", "≤ 100")]
     for line in lines:
         assert len(line) == len(head)
         python, trace, code, together = map(float, line[2:6])
@@ -185,7 +189,7 @@ def cells(line: str) -> list[str]:
 @pytest.mark.parametrize("only", [("W2", "chosen"), pytest.param(("",), marks=pytest.mark.long)], ids=["some", "all"])
 def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) -> None:
     out = tmp_path / "report.md"
-    works = [work for work in workloads.catalogue() if work.name.startswith(only)]
+    works = {type(work): work for work in reversed(workloads.catalogue()) if work.name.startswith(only)}.values()
     command: list[Any] = [sys.executable, "-m", "benches.compare", "--quick", "--only", ",".join(only), "-o", out]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -198,12 +202,14 @@ def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) ->
     head: list[str] = []
     for row in lines[first_chosen : next(i for i, line in enumerate(lines) if line[0] == "what")]:
         head = row if row[0] == "contestant" else head
-        if row[0].startswith("stepwell") and head[1].startswith("error after"):
+        if "—" in row:
+            assert row[-1]
+        elif row[0].startswith("stepwell") and head[1].startswith("error after"):
             assert 0 < float(row[1]) < 1e-12  # a hundred years of the outer solar system, at rounding level
             assert float(row[2]) > 0
         elif row[0].startswith("stepwell"):
             assert float(row[1]) > 0
-            assert float(row[-1]) >= 1
+            assert float(row[-2]) >= 1
     chosen = {row[0] for row in lines[first_chosen:]}
     assert {f"stepwell {m.name}" for m in sw.methods() if m.error_order is not None} <= chosen
     for row in lines[:first_chosen]:
@@ -217,6 +223,7 @@ def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) ->
     assert {c.name for c in peers.catalogue() if any(work.kind in c.kernels for work in works)} <= rows
     assert {"wheel", "`import stepwell` after NumPy"} <= rows
     assert sw.isa() in report
+    assert "\n## Left out\n\n- of a quick run, all but the first work of a class" in report
 
 
 def test_works_that_are_done_again_replace_their_own_part_of_a_report() -> None:
@@ -230,26 +237,162 @@ def test_works_that_are_done_again_replace_their_own_part_of_a_report() -> None:
     assert report.renewed(text, now, "W1,W3") == text
 
 
-def test_who_does_not_end_is_ended_and_told() -> None:
+def test_who_does_not_end_is_ended_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hundred million years take hours; a process of its own has some seconds, most of which its imports may need."""
     begin = time.perf_counter()
     measured = solar.measured("stepwell taylor", (10.0, 1e8), 3.0)
     assert time.perf_counter() - begin < 20.0
     assert measured is not None
     assert len(measured) <= 1
-    _, head, lines = solar.table((1.0, 1e8), 3.0)
+    monkeypatch.setattr(solar, "BUDGET", 3.0)
+    _, head, lines = solar.table((1.0, 1e8), Budget(600.0))
     row = next(line for line in lines if line[0] == "stepwell taylor")
-    assert row[-2:] == ["—", "not in 3 s"]
+    assert row[-3:] == ["—", "—", "stopped after 3 s"]
     assert len(row) == len(head)
 
 
-def test_who_is_not_installed_has_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And what fails is no missing row."""
+def test_who_is_not_installed_is_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what fails is not taken for missing."""
     monkeypatch.setattr(solar, "contestants", lambda: {"heyoka": None, "nobody": None})
     if find_spec("heyoka") is None:
         assert solar.measured("heyoka", (1.0,), 60.0) is None
     with pytest.raises(RuntimeError, match="nobody"):
         solar.measured("nobody", (1.0,), 60.0)
+
+
+def forever(*_: Any) -> Any:
+    """Runs away, and would not be stopped by an exception."""
+    while True:
+        try:
+            time.sleep(0.001)
+        except Exception:
+            continue
+
+
+def finds(*_: Any) -> peers.Ready:
+    """Does its work, and warns of it."""
+    work = WORKS[0]
+
+    def call() -> Any:
+        warnings.warn("as it stands", sw.StiffnessWarning, stacklevel=1)
+        return work.exact()
+
+    return peers.Ready(call)
+
+
+def test_who_runs_away_from_a_work_is_stopped_and_the_others_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(budget, "AGAIN", 0.01)
+    work = WORKS[0]
+    away = [peers.Contestant(name, {work.kind: forever}) for name in ("away", "away, too")]
+    calls = itertools.count()
+    late = peers.Contestant("late", {work.kind: lambda *_: peers.Ready(lambda: work.exact() if next(calls) < 2 else forever())})
+    contestants = [away[0], peers.Contestant("finds", {work.kind: finds}), away[1]]
+    rows = {row.name: row for row in runner.measure(contestants, work, 2, True, Budget(2.0, 3))}
+    assert rows["finds"].seconds
+    assert rows["finds"].note == "1 finding: stiffness"
+    text = report.markdown(*report.table(work, list(rows.values())))
+    for name in ("away", "away, too"):
+        assert rows[name].missing.startswith("stopped after ")
+        assert re.search(rf"^\| {name} \| — .* \| stopped after \S+ s \|$", text, re.MULTILINE)
+    (row,) = runner.measure([late], work, 2, True, Budget(0.3))
+    assert row.missing.startswith("stopped after ")
+
+
+def test_other_warnings_are_errors() -> None:
+    work = WORKS[0]
+
+    def warns(*_: Any) -> Any:
+        warnings.warn("a mistake", RuntimeWarning, stacklevel=1)
+
+    with pytest.raises(RuntimeWarning, match="a mistake"):
+        runner.measure([peers.Contestant("warns", {work.kind: warns})], work, 1, True, Budget(60.0))
+
+
+def test_who_runs_away_from_orbits_is_stopped_and_findings_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    def until(tolerance: float) -> Any:
+        return lambda some: lambda wanted: some.y + wanted if wanted > tolerance else forever()
+
+    def finding(some: orbits.Orbits) -> Any:
+        def solve(tolerance: float) -> Any:
+            if tolerance == tables.TOLERANCES[0]:
+                warnings.warn("as it stands", sw.StiffnessWarning, stacklevel=1)
+            return some.y + tolerance
+
+        return solve
+
+    three = [Adaptive("away", until(1.0)), Adaptive("half", until(1e-6)), Adaptive("finds", finding)]
+    absent = Adaptive("absent", until(1.0), missing="absent is not installed")
+    monkeypatch.setattr(tables, "contestants", lambda: iter([*three, absent]))
+    made = tables.table(orbits.kepler(2, 1), 3, (1e-3, 1e-6), True, Budget(2.0))
+    lines = {line[0]: line[1:] for line in made[2]}
+    assert lines["finds"][-1] == "1 finding: stiffness"
+    assert "—" not in lines["finds"]
+    for name, dashes in (("away", 3), ("half", 1), ("absent", 3)):
+        assert lines[name].count("—") == dashes
+    assert lines["away"][-1].startswith("stopped after ")
+    assert lines["half"][-1].startswith("stopped after ")
+    left_out = report.left_out(report.markdown(*made))
+    assert re.findall(r"^- ([^:]+): ([a-z ]+)", left_out, re.MULTILINE) == [
+        ("half, 1e-06", "stopped after "),
+        ("away", "stopped after "),
+        ("absent", "absent is not installed "),
+    ]
+
+
+def test_all_that_was_left_out_is_listed() -> None:
+    head = ["contestant", "G steps/s", "min … max", "error", "÷ C", "remarks"]
+    right = ["stepwell", "1", "1 … 1", "1e-03", "—", ""]
+    absent, wrong = (["C", *["—"] * 4, "no C compiler"], ["numba", *["—"] * 4, "not timed: error 1"])
+    parts = [report.markdown("W1", head, [right, absent, wrong]), report.markdown("W2", head, [right, absent])]
+    parts.append(report.markdown("Chosen", ["contestant", "1e-03", "1e-06", "remarks"], [["merson", "1", "—", ""]]))
+    text = "\n".join(["- left out: what is not quick", "", *parts])
+    assert report.left_out(text).splitlines()[2:] == [
+        "- what is not quick",
+        "- C: no C compiler (W1; W2)",
+        "- numba: not timed: error 1 (W1)",
+        "- merson, 1e-06: not as exact, or not in time (Chosen)",
+    ]
+    assert report.left_out(report.markdown("W1", head, [right])).splitlines()[2:] == ["Nothing."]
+
+
+def test_a_part_leaves_what_it_does_not_need() -> None:
+    whole = Budget(100.0, 10)
+    assert whole.part().seconds == pytest.approx(10.0 * budget.SHARES, abs=1.0)
+    for _ in range(8):
+        assert whole.part().seconds <= 51.0
+    assert whole.part().seconds == pytest.approx(100.0, abs=1.0)
+    assert Budget(0.0).part().seconds == 0.0
+
+
+def test_the_gate_fails_where_all_of_the_spread_is_too_low() -> None:
+    expected = {"level": 1.0, "slower": 1.0, "unsure": 2.0}
+    measured = {"level": [0.91, 0.95, 1.2], "slower": [0.8, 0.85, 0.89], "unsure": [1.0, 1.1, 2.9], "new": [0.1]}
+    lines = {line[0]: (line[-1], failed) for line, failed in gate.judged(measured, expected)}
+    assert lines == {"level": ("", False), "slower": ("fails", True), "unsure": ("", False), "new": ("", False)}
+
+
+@pytest.mark.parametrize("slower", [1, 3])
+def test_the_gate_ends_with_what_it_found(slower: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def work() -> None:
+        sum(range(20_000))
+
+    def ours() -> None:
+        for _ in range(slower):
+            work()
+
+    monkeypatch.setattr(gate, "ROWS", {"a row": lambda: (ours, work)})
+    monkeypatch.setattr(gate, "KEPT", tmp_path / "gate.json")
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary.md"))
+    gate.KEPT.write_text(json.dumps({sw.isa(): {"machine": "this one", "ratios": {"a row": 0.8}}}), encoding="utf-8")
+    assert gate.main([]) == (slower > 1)
+    assert "| a row | " in (tmp_path / "summary.md").read_text(encoding="utf-8")
+    assert gate.main(["--keep"]) == 0
+
+
+def test_the_gate_has_ten_rows_and_knows_what_to_expect() -> None:
+    kept = json.loads(gate.KEPT.read_text(encoding="utf-8"))
+    assert len(gate.ROWS) == 10
+    assert all(list(level["ratios"]) == list(gate.ROWS) for level in kept.values())
 
 
 def test_pictures_are_drawn_of_what_was_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -83,7 +83,7 @@ def test_actions_are_pinned_by_hash_and_alike() -> None:
 def test_workflows_run_what_a_person_runs() -> None:
     run = {target for script in scripts() for target in re.findall(r"\bmake ([a-z-]+)", script)}
     run |= set(jobs(ROOT / ".github" / "workflows" / "weekly.yml")["long"]["strategy"]["matrix"]["target"])
-    assert {"test", "test-oldest", "deny", "release", "docs", "test-long", "campaign"} == run
+    assert {"test", "test-oldest", "deny", "release", "docs", "test-long", "campaign", "gate"} == run
     assert run <= TARGETS
     files = {name for script in scripts() for name in re.findall(r"(?:tests|\.ci)/\w+(?:\.py)?", script)}
     assert files == {"tests/installed.py", ".ci/run"}

@@ -19,25 +19,26 @@ Solve = Callable[[float], Array]
 
 @dataclass(frozen=True)
 class Contestant:
-    """A program. It may be timed on ``some`` of the orbits, if it takes them one after the other."""
+    """A program. It may be timed on ``some`` of the orbits, if it takes one after the other. ``missing``: why it is not timed."""
 
     name: str
     make: Callable[[Orbits], Solve]
     some: int | None = None
+    missing: str = ""
 
 
 def contestants() -> Iterator[Contestant]:
-    """Those that are installed."""
+    """All, those that are not installed too."""
     for method in sw.methods():
         if method.error_order is not None:
             yield Contestant(f"stepwell {method.name}", lambda orbits, name=method.name: ours(orbits, name))
     yield Contestant("stepwell taylor, own equations", our_equations)
     yield Contestant("stepwell taylor, own equations, fused", lambda orbits: our_equations(orbits, fused=True))
-    for maker in (numbas, heyokas, scipys):
+    for name, maker in {"numba": numbas, "heyoka": heyokas, "SciPy": scipys}.items():
         try:
             yield from maker()
         except ImportError:
-            continue
+            yield Contestant(name, our_equations, missing=f"{name} is not installed")
 
 
 def ours(orbits: Orbits, method: str) -> Solve:

@@ -11,9 +11,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import stepwell as sw
 
+from ...budget import Budget, StoppedError
 from ..report import Table, number
+from ..runner import counted, heard
 from . import solar
 from .contestants import Contestant, contestants
 from .orbits import Orbits, arenstorf, kepler
@@ -28,16 +29,18 @@ REPEATS_TIME = 0.5
 #: Contestants take turns this often with some of the repeats; one whose solution takes longer than so many seconds comes once.
 TURNS, LONGEST_IN_TURNS = 3, 0.05
 #: A quick run has one tolerance in so many, takes one turn, and its least time of a sample is this part of the other.
-QUICK_STRIDE, QUICK_TURNS, QUICK_SAMPLE = 4, 1, 0.1
+QUICK_STRIDE, QUICK_SAMPLE = 4, 0.1
 
 READING = """\
 Microseconds an orbit for a median error at the end of so much, between the two tolerances that enclose it; the median
 of up to {repeats} repeats in three turns of all contestants, fewer where a solution takes long. *Spread* is the most
 over the least time of the repeats, of the worst tolerance. One thread. — says that it did not get there, or not in
-time. What numba and heyoka compile is not timed. SciPy does 5 of many orbits.
+time. Findings are warnings of stepwell, in one call at each tolerance. What numba and heyoka compile is not timed. SciPy
+does 5 of many orbits.
 
 The outer solar system is another question: all go at a tolerance of a rounding, and what is compared is how the roundings of
-the energy add up, and the time of a single run. Each goes in a process of its own, which is ended after {budget:.0f} s.
+the energy add up, and the time of a single run. Each goes in a process of its own, which is ended after {budget:.0f} s at
+the latest.
 """
 
 
@@ -54,26 +57,44 @@ class Sample(NamedTuple):
 
 
 class Measured:
-    """What is measured of a contestant: tolerance after tolerance, until the least error is undercut or patience ends."""
+    """What is measured of a contestant: tolerance after tolerance, until the least error is undercut or patience ends.
+
+    ``stopped`` says why there is no more of it, ``findings`` what stepwell found in the first call at each tolerance.
+    """
 
     def __init__(self, contestant: Contestant, orbits: Orbits, least_error: float, quick: bool) -> None:
-        """Whatever it compiles is compiled here."""
-        self.name, self.least_error = contestant.name, least_error
+        """Nothing is measured yet."""
+        self.contestant, self.least_error, self.stopped = contestant, least_error, contestant.missing
         self.lasts = QUICK_SAMPLE * SAMPLE if quick else SAMPLE
         self.tolerances = TOLERANCES[:: QUICK_STRIDE if quick else 1]
         self.orbits = orbits.cut(contestant.some or orbits.members)
-        self.solve, self.samples = contestant.make(self.orbits), dict[float, Sample]()
-        self.solve(TOLERANCES[0])
+        self.samples, self.findings = dict[float, Sample](), list[warnings.WarningMessage]()
 
-    def turn(self, repeats: int) -> None:
+    def within(self, budget: Budget, repeats: int) -> None:
+        """A turn, or before the first one whatever is compiled; none once it was stopped."""
+        if self.stopped:
+            return
+        try:
+            with budget.limit(), heard() as findings:
+                if repeats:
+                    self.turn(repeats, findings)
+                else:
+                    self.solve = self.contestant.make(self.orbits)
+                    self.solve(TOLERANCES[0])
+        except StoppedError as why:
+            self.stopped = str(why)
+
+    def turn(self, repeats: int, findings: list[warnings.WarningMessage]) -> None:
         """So many repeats of each tolerance."""
         again = bool(self.samples)
         for tolerance in list(self.samples) or self.tolerances:
+            findings.clear()
             begin = time.perf_counter()
             end = self.solve(tolerance)
             first = time.perf_counter() - begin
             if again and first > LONGEST_IN_TURNS:
                 return
+            self.findings += [] if again else findings
             error = float(np.median(self.orbits.errors(end)))
             sample = self.samples.setdefault(tolerance, Sample(error, []))
             calls = max(1, round(self.lasts / max(first, 1e-7)))
@@ -97,34 +118,37 @@ def at_error(samples: list[Sample], wanted: float) -> float:
     return math.nan
 
 
-def table(orbits: Orbits, repeats: int, errors: tuple[float, ...], quick: bool) -> Table:
+def table(orbits: Orbits, repeats: int, errors: tuple[float, ...], quick: bool, budget: Budget) -> Table:
     """One table, the fastest at the error in the middle first."""
+    measured = [Measured(contestant, orbits, min(errors), quick) for contestant in contestants()]
+    budget = budget.part(2 * len(measured) + 1)
+    for repeats_of_turn in (0, -(-repeats // TURNS)):
+        for each in measured:
+            each.within(budget.part(), repeats_of_turn)
+    later = budget.part()
+    for _, each in itertools.product(range(0 if quick else TURNS - 1), measured):
+        each.within(later, -(-repeats // TURNS))
     rows = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", sw.ToleranceWarning)
-        warnings.simplefilter("ignore", sw.AccuracyWarning)
-        all_measured = [Measured(contestant, orbits, min(errors), quick) for contestant in contestants()]
-        turns = QUICK_TURNS if quick else TURNS
-        for _, each in itertools.product(range(turns), all_measured):
-            each.turn(-(-repeats // TURNS))
-    for each in all_measured:
-        samples = list(each.samples.values())
+    for each in measured:
+        samples = [sample for sample in each.samples.values() if sample.times]
         seconds = [at_error(samples, error) for error in errors]
-        rows.append((each.name, seconds, max(max(sample.times) / min(sample.times) for sample in samples)))
+        spread = max((max(sample.times) / min(sample.times) for sample in samples), default=math.nan)
+        rows.append((each.contestant.name, seconds, spread, "; ".join(filter(None, [counted(each.findings), each.stopped]))))
     rows.sort(key=lambda row: (math.isnan(row[1][1]), row[1][1]))
     lines = []
-    for name, seconds, spread in rows:
+    for name, seconds, spread, remarks in rows:
         cells = ["—" if math.isnan(s) else number(1e6 * s) for s in seconds]
-        lines.append([name, *cells, f"{spread:.2f}"])
+        lines.append([name, *cells, "—" if math.isnan(spread) else f"{spread:.2f}", remarks])
     many = "one orbit" if orbits.members == 1 else f"{orbits.members:,} orbits"
-    return f"Adaptive steps: {orbits.name}, {many}", ["contestant", *(f"{e:.0e}" for e in errors), "spread"], lines
+    head = ["contestant", *(f"{error:.0e}" for error in errors), "spread", "remarks"]
+    return f"Adaptive steps: {orbits.name}, {many}", head, lines
 
 
-def tables(repeats: int, quick: bool, members: int = 10_000) -> Iterator[Table]:
+def tables(repeats: int, quick: bool, members: int, budget: Budget) -> Iterator[Table]:
     """Single orbits and many. Along Arenstorf's orbit starts are known to 1e-9 at best: errors grow."""
     members, errors = (16, ERRORS[:2]) if quick else (members, ERRORS)
-    yield table(kepler(1, 1 if quick else 10), repeats, errors, quick)
-    yield table(arenstorf(1), repeats, errors, quick)
-    yield table(kepler(members, 1 if quick else 10), repeats, errors, quick)
-    yield table(arenstorf(members), repeats, errors[:2], quick)
-    yield solar.table((100.0,) if quick else (1e3, 1e4, 1e5))
+    yield table(kepler(1, 1 if quick else 10), repeats, errors, quick, budget)
+    yield table(arenstorf(1), repeats, errors, quick, budget)
+    yield table(kepler(members, 1 if quick else 10), repeats, errors, quick, budget)
+    yield table(arenstorf(members), repeats, errors[:2], quick, budget)
+    yield solar.table((100.0,) if quick else (1e3, 1e4, 1e5), budget)

@@ -11,6 +11,7 @@ import stepwell as sw
 from stepwell import _core
 from stepwell.runs import engine
 
+from ...budget import Budget, StoppedError
 from ..peers import MissingPeerError, heyoka_peer, numba_own, numba_peer
 from ..report import Table, number
 from .equations import EQUATIONS, NAMED, Equation
@@ -121,25 +122,32 @@ def heyokas(equation: Equation) -> float:
     return seconds(lambda: hy.taylor_adaptive_batch(heyoka_peer.equations(equation), state, tol=1e-9, pars=own))
 
 
-def table(repeats: int, quick: bool = False) -> Table:
+def table(repeats: int, quick: bool, budget: Budget) -> Table:
     """A line for each of the equations, and one for a system of 100 states."""
-
-    def tried(call: Callable[[], Any], missing: Any) -> Any:
-        try:
-            return call()
-        except MissingPeerError:
-            return missing
-
     equations = [NAMED["lorenz"], ring(10)] if quick else [*EQUATIONS, ring(POINTS)]
-    none = float("nan")
-    tried(lambda: numbas(NAMED["duffing"]), none)  # what is loaded once
-    tried(lambda: heyokas(NAMED["duffing"]), none)
-    lines = []
+    budget = budget.part(2 * len(equations) + 2)
+
+    def tried(name: str, compiled: Callable[[Equation], Any], equation: Equation, missing: Any) -> Any:
+        try:
+            with budget.part().limit():
+                return compiled(equation)
+        except MissingPeerError as why:
+            remarks.append(str(why))
+        except StoppedError as why:
+            remarks.append(f"{name} {why}")
+        return missing
+
+    def others(equation: Equation) -> list[float]:
+        nothing = float("nan")
+        return [*tried("numba", numbas, equation, (nothing, nothing)), tried("heyoka", heyokas, equation, nothing)]
+
+    lines, remarks = [], list[str]()
+    others(NAMED["duffing"])  # what is loaded once
     for equation in equations:
+        remarks = [] if equation.name in NAMED else ["no blocks are written for it"]
         parts = ours(equation, repeats)
-        others = [*tried(lambda e=equation: numbas(e), (none, none)), tried(lambda e=equation: heyokas(e), none)]
-        shown = ["—" if np.isnan(each) else number(1e3 * each) for each in (*parts, sum(parts), *others)]
+        shown = ["—" if np.isnan(each) else number(1e3 * each) for each in (*parts, sum(parts), *others(equation))]
         aim = {"lorenz": "≤ 5", "fisher": "≤ 100"}.get(equation.name, "")
-        lines.append([equation.about, str(len(equation.states)), *shown, aim])
-    head = ["equations", "states", "Python", "trace", "code", "together", "numba, blocks", "numba, plain", "heyoka", "aim"]
-    return "Own equations: tracing and compiling, ms", head, lines
+        lines.append([equation.about, str(len(equation.states)), *shown, aim, "; ".join(remarks)])
+    head = ["equations", "states", "Python", "trace", "code", "together", "numba, blocks", "numba, plain", "heyoka"]
+    return "Own equations: tracing and compiling, ms", [*head, "aim", "remarks"], lines
