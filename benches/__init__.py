@@ -1,1 +1,1 @@
-"""Benchmarks: ``compare`` times every language on the same work, ``kernels`` times every kernel of the core."""
+"""Benchmarks: ``compare`` times every language on the same work, ``gate`` notices within a minute if stepwell has become slower."""

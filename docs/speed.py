@@ -1,6 +1,7 @@
 """Speeds beside peers, from the report of ``make bench``: the table of docs/benchmarks/speed.md, and its pictures.
 
-Run ``.venv/bin/python docs/speed.py`` to draw the pictures; ``docs/generate.py`` writes the table.
+``make bench`` runs it after the report is written: it draws the pictures and prints the figures that sentences give, in README.md
+and docs/benchmarks/speed.md; ``docs/generate.py`` writes the tables.
 """
 
 from __future__ import annotations
@@ -255,5 +256,33 @@ def draw() -> None:
             (ROOT / "docs" / "images" / file).write_bytes(png(figure))
 
 
+#: Contestants that take many times as long as stepwell on own equations, as sentences say.
+SLOWER = "numba, plain", "diffrax", "NumPy reference", "SciPy"
+
+
+def figures() -> list[str]:
+    """What sentences say of the report: how many times as long others take, and in how many works stepwell is level."""
+    own = [table for title, table in tables().items() if title.startswith("W7")]
+    lines = []
+    for name in SLOWER:
+        rows = [
+            (each["stepwell, 1 thread"], each[name]) for each in own if name in each
+        ]
+        times = [
+            float(ours["M steps/s"]) / float(row["M steps/s"])
+            for ours, row in rows
+            if row["M steps/s"] != "—"
+        ]
+        lines.append(
+            f"{name} takes {min(times):.3g} to {max(times):.3g} times as long"
+            if times
+            else f"{name} was left out"
+        )
+    every = ratios()
+    level = sum(each.exact >= 1.0 - LEVEL for each in every)
+    return [*lines, f"level or ahead: {level} of {len(every)}"]
+
+
 if __name__ == "__main__":
     draw()
+    print(*figures(), sep="\n")

@@ -333,8 +333,8 @@ def test_who_runs_away_from_orbits_is_stopped_and_findings_are_counted(monkeypat
     assert lines["half"][-1].startswith("stopped after ")
     left_out = report.left_out(report.markdown(*made))
     assert re.findall(r"^- ([^:]+): ([a-z ]+)", left_out, re.MULTILINE) == [
-        ("half, 1e-06", "stopped after "),
         ("away", "stopped after "),
+        ("half, 1e-06", "stopped after "),
         ("absent", "absent is not installed "),
     ]
 
