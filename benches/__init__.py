@@ -1,1 +1,1 @@
-"""Benchmarks: ``compare`` times every language on the same work, ``gate`` notices within a minute if stepwell has become slower."""
+"""Benchmarks: ``compare`` times every language on the same work, ``gate`` notices within a minute what has become slower."""
