@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import signal
 import time
 from collections.abc import Iterator
@@ -10,6 +11,8 @@ from dataclasses import dataclass
 
 #: A part may take so many times an equal share of what is left, since most need less; but half of it at most, if others follow.
 SHARES = 3
+#: A program that goes on so many seconds after its time is ended.
+LAST = 60.0
 #: Whoever goes on although it was stopped is stopped again after so many seconds.
 AGAIN = 1.0
 
@@ -35,6 +38,15 @@ class Budget:
         share = min(0.5, SHARES / self.parts) if self.parts > 1 else 1.0
         self.parts -= 1
         return Budget(share * left, parts)
+
+    @contextmanager
+    def last_resort(self) -> Iterator[None]:
+        """A call of C that never returns cannot be stopped alone: it ends the program, with a trace that says where."""
+        faulthandler.dump_traceback_later(self.seconds + LAST, exit=True)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
 
     @contextmanager
     def limit(self) -> Iterator[None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import faulthandler
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -71,8 +70,6 @@ def main() -> None:
 
     begin, load = time.perf_counter(), machine.load()
     budget = Budget(60.0 * asked.minutes, len(works(asked)) + TABLES)
-    # A call of C that never returns cannot be stopped alone: it ends the run, and the trace says where. All before it is written.
-    faulthandler.dump_traceback_later(60.0 * asked.minutes + 60.0, exit=True)
     reading = report.READING.format(repeats=asked.repeats, sample=1e3 * runner.SAMPLE / (10 if asked.quick else 1))
     texts = [f"## How to read\n\n{reading}"]
     before = asked.output.read_text(encoding="utf-8") if asked.only and asked.output.is_file() else None
@@ -88,7 +85,7 @@ def main() -> None:
         text = text if before is None else report.renewed(before, text, asked.only)
         asked.output.write_text(f"{text}\n{report.left_out(text)}\n", encoding="utf-8")
 
-    with runner.heard():
+    with budget.last_resort(), runner.heard():
         for part in parts(asked, budget):
             if not isinstance(part, str):
                 report.show(*part)

@@ -46,13 +46,14 @@ def main(given: list[str] | None = None) -> None:
         packages = [machine.version(each.package) for each in (OURS, *PEERS)]
         known["machine"] = f"{about['CPU']}, {about['CPU level of stepwell'].split()[0]}, {about['date']}, {', '.join(packages)}"
         known["machine"] += ", a quick run: times of so few members tell little." if asked.quick else "."
-        for problem in problems:
-            rows = measuring.measure(problem, aims, turns, budget, most, tuple(filter(None, asked.peers.split(","))))
-            before = known["problems"].get(problem.name, {}) if asked.peers else {}
-            known["problems"][problem.name] = before | {name: row._asdict() for name, row in rows.items()}
-            known = json.loads(json.dumps(known))  # tuples are lists, as in what was kept
-            asked.numbers.write_text(json.dumps(known) + "\n", encoding="utf-8")
-            print(f"{problem.name}\n{page.details(known, known['problems'][problem.name])}", flush=True)
+        with budget.last_resort():
+            for problem in problems:
+                rows = measuring.measure(problem, aims, turns, budget, most, tuple(filter(None, asked.peers.split(","))))
+                before = known["problems"].get(problem.name, {}) if asked.peers else {}
+                known["problems"][problem.name] = before | {name: row._asdict() for name, row in rows.items()}
+                known = json.loads(json.dumps(known))  # tuples are lists, as in what was kept
+                asked.numbers.write_text(json.dumps(known) + "\n", encoding="utf-8")
+                print(f"{problem.name}\n{page.details(known, known['problems'][problem.name])}", flush=True)
         print(page.summary(known))
         missing = [(name, row["missing"], of) for of, rows in known["problems"].items() for name, row in rows.items()]
         left_out = [f"- {name}: {why} ({of})" for name, why, of in missing if why]
