@@ -25,7 +25,7 @@ import stepwell as sw
 
 from .compare import machine, peers, report, runner
 from .compare.chosen import contestants, orbits
-from .compare.peers import stepwell_peer
+from .compare.peers import c_peer, stepwell_peer
 from .compare.workloads import (
     Workload,
     w1_false_euler,
@@ -70,22 +70,28 @@ def by(name: str, work: Workload) -> Call:
     return ready(next(each for each in peers.catalogue() if each.name == name), work)
 
 
+def c(work: Workload) -> Call:
+    """C with the same arithmetic, in the form that takes the least processor time: other programs must not choose it."""
+    forms = [form.made(work).call for form in c_peer.FORMS[work.kind](work, True, True)]
+    return min(forms, key=lambda call: min(seconds(call) for _ in range(5)))
+
+
 def beside_c(work: Workload) -> tuple[Call, Call]:
     """stepwell, and C with the same arithmetic."""
-    return by("stepwell, 1 thread", work), by("C, exact", work)
+    return by("stepwell, 1 thread", work), c(work)
 
 
 def own_equation() -> tuple[Call, Call]:
     """Pendulums of an own equation; C has them, too."""
     work = w2_pendulums.make("rk4").cut(members=2000)
     made = functools.partial(stepwell_peer.made, own, "rk4", {"threads": 1})
-    return ready(peers.Contestant("own equation", {work.kind: made}), work), by("C, exact", work)
+    return ready(peers.Contestant("own equation", {work.kind: made}), work), c(work)
 
 
 def adaptive_steps() -> tuple[Call, Call]:
     """Orbits with steps of their own, beside oscillators by C."""
     solve = contestants.ours(orbits.kepler(1000, 1), "dop853")
-    return lambda: solve(1e-6), by("C, exact", w1_false_euler.make(20_000, 1000))
+    return lambda: solve(1e-6), c(w1_false_euler.make(20_000, 1000))
 
 
 def prepared_run() -> tuple[Call, Call]:
