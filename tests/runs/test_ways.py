@@ -94,6 +94,7 @@ def goes(row: Row) -> bool:
     matrix, tolerance, back, single = drive in ("matrix", "power"), "tolerance" in drive, "back" in drive, "float32" in numbers
     events, energy, own = row.get("events", "none") != "none", row.get("record") == "energy", row.get("clock") == "of each member"
     way, every = row.get("way", ""), row.get("every")
+    hard = method and (method.is_implicit or method.has_series)
     pieces = way in ("in pieces", "from a pickle", "from a file")
     return not (
         # A world has steps of one length from one time, and nothing ends it.
