@@ -118,14 +118,8 @@ def goes(row: Row) -> bool:
         # A change of v that a rod does not allow has no meaning.
         or (system and system.constraint == "length" and row.get("events") == "changes")
         # These go, and take the reference minutes.
-        or (
-            system
-            and is_long(system)
-            and "fused" in numbers
-            and (events or (method and (method.is_implicit or method.has_series)))
-        )
-        or (system and is_long(system) and system.constraint and tolerance and events)
-        or (method and system and bounces(system) and events and (method.is_implicit or method.has_series))
+        or (system and is_long(system) and events and ("fused" in numbers or (system.constraint and tolerance)))
+        or (system and hard and ((is_long(system) and "fused" in numbers) or (bounces(system) and events)))
         or (system and push in ("control", "projection") and not can_be_held(row["system"]))
         or (method and system and (not fits(system, method) or (method.is_exact and not system.linear)))
     )
