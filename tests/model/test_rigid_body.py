@@ -35,7 +35,7 @@ MUTANTS = [
     ("each + by * turned", "each + self.half * turned", tops.torques_of_space),
     ("zip(axes, self.space_torque", "zip(zip(*axes), self.space_torque", tops.torques_of_space),
     ("(each / square for each", "(each for each", tops.torques_of_space),
-    ("weight * each for", "each for", tops.horizontal_top),
+    ("self.weight[0] * each for", "each for", tops.horizontal_top),
     ("(c * up[1] - b * up[2], ", "(b * up[2] - c * up[1], ", tops.horizontal_top),
     ("a * up[2] - c * up[0]", "c * up[0] - a * up[2]", tops.horizontal_top),
     ("up, (a, b, c) = axes[2]", "up, (a, b, c) = [row[2] for row in axes]", tops.horizontal_top),

@@ -7,21 +7,29 @@ import inspect
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import pytest
+
 
 def for_each(names: str | tuple[str, ...], values: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """As ``pytest.mark.parametrize``, but the test goes through all values by itself; two such decorators are their product."""
     names = tuple(name.strip() for name in names.split(",")) if isinstance(names, str) else names
     cases = [dict(zip(names, value if len(names) > 1 else (value,), strict=True)) for value in values]
+    assert cases, f"no values of {', '.join(names)}"
 
     def of(test: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(test)
         def all_of_them(**fixtures: Any) -> None:
+            skipped = None
             for case in cases:
                 try:
                     test(**fixtures, **case)
-                except Exception as error:
+                except pytest.skip.Exception as reason:  # the other cases are tried all the same
+                    skipped = reason
+                except BaseException as error:
                     error.add_note(f"case: {case}")
                     raise
+            if skipped:
+                raise skipped
 
         signature = inspect.signature(test)
         others = [parameter for name, parameter in signature.parameters.items() if name not in names]
