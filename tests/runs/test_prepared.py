@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import copy
 import gc
+import itertools
 import pickle
 import re
 import threading
 import warnings
 import weakref
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -16,6 +18,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.runs import recent as module
+from support.cases import number
+from support.families import family
 from support.own_systems import duffing, lorenz, lotka_volterra, pendulum, top
 
 OPTIONS: list[dict[str, Any]] = [
@@ -59,26 +63,34 @@ def with_warnings(call: Any) -> tuple[sw.Run, list[str]]:
     return run, [f"{each.filename} {each.category.__name__} {each.message}" for each in caught]
 
 
-def is_short(run: Any) -> bool:
-    return run._short is not None
+def in_threads(work: Any, number: int = 8) -> None:
+    """``work(i)`` in so many threads at once; what one of them raises is raised."""
+    with ThreadPoolExecutor(number) as pool:
+        list(pool.map(work, range(number)))
 
 
-@pytest.mark.parametrize("options", OPTIONS, ids=lambda options: " ".join(f"{k}={v}" for k, v in options.items()) or "plain")
-@pytest.mark.parametrize("method", sw.methods())
-def test_it_makes_the_run_of_integrate(method: str, options: dict[str, Any]) -> None:
-    """Every method, with each option, for one member and for many."""
-    for system in (sw.Oscillator(1.3), sw.Oscillator(np.linspace(0.5, 2.0, 37)), sw.Pendulum(2.0), duffing(beta=np.ones(3))):
-        arguments = {**DT, **options}
-        try:
-            expected = [whole(system, method, v=v, y=y, **arguments) for v, y in ((0.1, 1.0), (0.3, -2.0), (0.0, 0.0))]
-        except sw.StepwellError as error:
-            with pytest.raises(type(error), match=re.escape(str(error))):
-                sw.prepare(system, method, v=0.1, y=1.0, **arguments)
-            continue
-        run = sw.prepare(system, method, v=0.1, y=1.0, **arguments)
-        assert is_short(run) == (not {"record", "form", "backend"} & options.keys() and not sw.method(method).is_exact)
-        for (v, y), other in zip(((0.1, 1.0), (0.3, -2.0), (0.0, 0.0)), expected, strict=True):
-            assert_same(run(v, y), other)
+#: Methods of each kind of step: explicit, with a carry of each sort, with an estimate, a series, implicit, and exact.
+KINDS = ("false_euler", "rk4", "verlet", "leapfrog", "dop853", "taylor", "rodas4", "trapezoidal", "wisdom_holman", "exact")
+
+
+@pytest.mark.parametrize("method", KINDS)
+def test_it_makes_the_run_of_integrate(method: str) -> None:
+    """With each option, for one member and for many."""
+    starts = ((0.1, 1.0), (0.3, -2.0), (0.0, 0.0))
+    for options in OPTIONS:
+        for system in (sw.Oscillator(1.3), sw.Oscillator(np.linspace(0.5, 2.0, 37)), sw.Pendulum(2.0), duffing(beta=np.ones(3))):
+            arguments = {**DT, **options}
+            try:
+                expected = [whole(system, method, v=v, y=y, **arguments) for v, y in starts]
+            except sw.StepwellError as error:
+                with pytest.raises(type(error), match=re.escape(str(error))):
+                    sw.prepare(system, method, v=0.1, y=1.0, **arguments)
+                continue
+            run = sw.prepare(system, method, v=0.1, y=1.0, **arguments)
+            long = {"record", "form", "backend"} & options.keys() or sw.method(method).is_exact
+            assert (run._short is None) == bool(long), (system, options)
+            for start, other in zip(starts, expected, strict=True):
+                assert_same(run(*start), other)
 
 
 ORBIT: dict[str, Any] = {"tolerance": 1e-6, "at": [0.5, 3.0]}
@@ -101,29 +113,16 @@ OTHERS: list[Any] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("system", "method", "start", "other", "arguments"), OTHERS, ids=lambda each: str(each)[:40])
-def test_other_runs_are_made_too(system: Any, method: str, start: Any, other: Any, arguments: dict[str, Any]) -> None:
+def test_other_runs_are_made_too() -> None:
     """Those that are not short, some of which are checked as a whole each time."""
-    run = sw.prepare(system, method, v=start[0], y=start[1], **arguments)
-    for v, y in (other, start, other):
-        got, warned = with_warnings(partial(run, v, y))
-        expected, said = with_warnings(partial(whole, system, method, v=v, y=y, **arguments))
-        assert said == warned
-        assert got.y.tobytes() == expected.y.tobytes()
-        assert got.v.tobytes() == expected.v.tobytes()
-        assert_same_parts(got, expected)
-
-
-def assert_same_parts(run: sw.Run, other: sw.Run) -> None:
-    """Times, recorded quantities and events are equal, too."""
-    assert run.t.tobytes() == other.t.tobytes()
-    assert {name: each.tobytes() for name, each in run.recorded.items()} == {
-        name: each.tobytes() for name, each in other.recorded.items()
-    }
-    assert repr(run.events) == repr(other.events)
-    assert repr(run.paces) == repr(other.paces)
-    assert run.status.tobytes() == other.status.tobytes()
-    assert run.findings == other.findings
+    for system, method, start, other, arguments in OTHERS:
+        run = sw.prepare(system, method, v=start[0], y=start[1], **arguments)
+        for v, y in (other, start, other):
+            got, warned = with_warnings(partial(run, v, y))
+            expected, said = with_warnings(partial(whole, system, method, v=v, y=y, **arguments))
+            assert said == warned
+            assert got.events == expected.events
+            assert_same(got, expected)
 
 
 ADAPTIVE: list[dict[str, Any]] = [
@@ -148,11 +147,17 @@ STARTS: list[Any] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("options", ADAPTIVE, ids=lambda options: " ".join(f"{k}={v}" for k, v in options.items()) or "plain")
-@pytest.mark.parametrize("method", ["fehlberg", "dop853", "taylor", "rosenbrock23", "rodas5p"])
-def test_adaptive_runs_are_those_of_integrate(method: str, options: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    ("method", "every"),
+    family(
+        itertools.product(("fehlberg", "dop853", "taylor", "rosenbrock23", "rodas5p"), (1, 8)),
+        lambda method, every: every > 1,
+    ),
+)
+def test_adaptive_runs_are_those_of_integrate(method: str, every: int) -> None:
     """Systems with and without an energy, a barrier, amounts and many members, with their warnings."""
-    for system, starts in STARTS:
+    of_all = [(options, *each) for options in ADAPTIVE for each in STARTS]
+    for options, system, starts in of_all[number(method) % every :: every]:
         arguments = {**ORBIT, **options}
         expected = []
         try:
@@ -163,7 +168,6 @@ def test_adaptive_runs_are_those_of_integrate(method: str, options: dict[str, An
                 sw.prepare(system, method, v=v, y=y, **arguments)
             continue
         run = sw.prepare(system, method, v=starts[0][0], y=starts[0][1], **arguments)
-        assert is_short(run)
         assert run._short is not None
         if method != "rosenbrock23":  # whose steps may be very many
             for start, (other, _) in zip(starts, expected, strict=True):
@@ -191,7 +195,7 @@ def test_systems_of_first_order_have_no_velocities() -> None:
     for y in ([1.0, 2.0, 3.0], np.array([1.0, 2.0, 3.0])):
         assert_same(run(y=y), whole(lorenz(), "rk4", y=y, dt=0.01, steps=10))
         assert_same(run(None, y), run(y=y))
-    assert is_short(run)
+    assert run._short is not None
 
 
 def test_starts_of_other_shapes_mean_what_they_mean_for_integrate() -> None:
@@ -210,14 +214,14 @@ def test_starts_of_other_shapes_mean_what_they_mean_for_integrate() -> None:
 def test_errors_are_those_of_integrate() -> None:
     """Of the start at each call, of everything else at once."""
     system, arguments = sw.Oscillator(), {"dt": 0.1, "steps": 5}
-    run = sw.prepare(system, "rk4", v=0.0, y=1.0, **arguments)
     starts: list[tuple[Any, Any]] = [
         ("a", 1.0), (0.0, None), (None, 1.0), (np.nan, 1.0), (0.0, np.inf), (0.0, np.array(np.nan)), (1j, 1.0),
         (np.zeros(2), np.zeros(3)),
     ]  # fmt: skip
-    for v, y in starts:
+    for dtype, v, y in [("float64", *start) for start in starts] + [("float32", 0.0, 1e39)]:
+        run = sw.prepare(system, "rk4", v=0.0, y=1.0, dtype=dtype, **arguments)
         with pytest.raises(sw.StepwellError) as expected:
-            whole(system, "rk4", v=v, y=y, **arguments)
+            whole(system, "rk4", v=v, y=y, dtype=dtype, **arguments)
         with pytest.raises(type(expected.value)) as raised:
             run(v, y)
         assert str(raised.value) == str(expected.value)
@@ -227,39 +231,34 @@ def test_errors_are_those_of_integrate() -> None:
         sw.prepare(system, "rk4", dt=0.1, steps=5, resume=whole(system, "rk4", v=0.0, y=1.0, **arguments))
     with pytest.raises(sw.errors.ArgumentError, match="steps"):
         sw.prepare(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=0)
-    single = sw.prepare(system, "rk4", v=0.0, y=1.0, dtype="float32", **arguments)
-    with pytest.raises(sw.errors.ArgumentError) as expected:
-        whole(system, "rk4", v=0.0, y=1e39, dtype="float32", **arguments)
-    with pytest.raises(sw.errors.ArgumentError) as raised:
-        single(0.0, 1e39)
-    assert str(raised.value) == str(expected.value)
 
 
-@pytest.mark.parametrize(
-    ("system", "method", "start", "arguments"),
-    [
-        (lorenz(), "euler", (None, [1.0, 1.0, 1e9]), {"dt": 1.0, "steps": 20}),  # diverges
-        (lorenz(), "euler", (None, [1e-3, 1e-3, 1e-3]), {"dt": 1.0, "steps": 20}),
-        (sw.Oscillator(), "euler", (0.0, 1.0), {"dt": 3.0, "steps": 60}),  # grows by its steps alone
-        (sw.Oscillator(), "euler", (0.0, 1e-200), {"dt": 3.0, "steps": 13}),
-        (sw.Oscillator([1.0, 3.0]), "rk4", (0.0, 1.0), {"dt": 1.0, "steps": 400}),
-        (sw.Pendulum(), "rk4", (1e300, 1.0), {"dt": 1.0, "steps": 3}),  # an angle without a sine
-        (sw.Pendulum(), "verlet", (0.0, 3.1), {"dt": 0.5, "steps": 3000}),
-    ],
-    ids=str,
-)
-def test_warnings_are_those_of_integrate(system: Any, method: str, start: Any, arguments: Any) -> None:
+WARNED: list[Any] = [
+    (lorenz(), "euler", (None, [1.0, 1.0, 1e9]), {"dt": 1.0, "steps": 20}),  # diverges
+    (lorenz(), "euler", (None, [1e-3, 1e-3, 1e-3]), {"dt": 1.0, "steps": 20}),
+    (sw.Oscillator(), "euler", (0.0, 1.0), {"dt": 3.0, "steps": 60}),  # grows by its steps alone
+    (sw.Oscillator(), "euler", (0.0, 1e-200), {"dt": 3.0, "steps": 13}),
+    (sw.Oscillator([1.0, 3.0]), "rk4", (0.0, 1.0), {"dt": 1.0, "steps": 400}),
+    (sw.Pendulum(), "rk4", (1e300, 1.0), {"dt": 1.0, "steps": 3}),  # an angle without a sine
+    (sw.Pendulum(), "verlet", (0.0, 3.1), {"dt": 0.5, "steps": 3000}),
+    (sw.Oscillator(30.0, damping=2e4), "dop853", (0.0, 1.0), {"tolerance": 1e-3, "at": [1.0]}),  # stiff
+]
+
+
+def test_warnings_are_those_of_integrate() -> None:
     """The same words, at the line of the caller, from the first call and from later ones."""
-    expected, said = with_warnings(lambda: whole(system, method, v=start[0], y=start[1], **arguments))
-    gentle = (None, [1.0, 1.0, 1.0]) if start[0] is None else (0.0, 1e-3)
-    run = sw.prepare(system, method, v=gentle[0], y=gentle[1], **arguments)
-    for _ in range(3):
-        got, warned = with_warnings(lambda: run(*start))
-        assert_same(got, expected)
-        assert warned == said
-        again, warned = with_warnings(lambda: sw.integrate(system, method, v=start[0], y=start[1], **arguments))
-        assert_same(again, expected)
-        assert warned == said
+    kinds: set[str] = set()
+    for system, method, start, arguments in WARNED:
+        expected, said = with_warnings(partial(whole, system, method, v=start[0], y=start[1], **arguments))
+        kinds.update(each.split()[1] for each in said)
+        gentle = (None, [1.0, 1.0, 1.0]) if start[0] is None else (0.0, 1e-3)
+        run = sw.prepare(system, method, v=gentle[0], y=gentle[1], **arguments)
+        for _ in range(3):
+            for call in (partial(run, *start), partial(sw.integrate, system, method, v=start[0], y=start[1], **arguments)):
+                got, warned = with_warnings(call)
+                assert_same(got, expected)
+                assert warned == said
+    assert kinds == {"DivergenceWarning", "AccuracyWarning", "StiffnessWarning"}
 
 
 def test_runs_share_no_arrays() -> None:
@@ -271,14 +270,6 @@ def test_runs_share_no_arrays() -> None:
         array[...] = 7
     first.recorded["own"] = first.y
     assert_same(run(0.0, 1.0), expected)
-
-
-def test_a_prepared_run_goes_on_as_any_other() -> None:
-    """By ``resume``, to the bit."""
-    system = sw.Oscillator(1.7)
-    run = sw.prepare(system, "verlet", v=0.0, y=1.0, dt=0.1, steps=4)
-    whole_run = whole(system, "verlet", v=0.0, y=1.0, dt=0.1, steps=10)
-    assert sw.integrate(system, "verlet", resume=run(0.0, 1.0), steps=6).y.tobytes() == whole_run.y.tobytes()
 
 
 def test_copies_make_the_same_runs() -> None:
@@ -294,36 +285,20 @@ def test_threads_may_call_it_at_once() -> None:
     """Every call has its own start and result."""
     run = sw.prepare(sw.Oscillator(np.linspace(1.0, 2.0, 200)), "rk4", v=0.0, y=1.0, dt=0.01, steps=300)
     expected = [run(0.0, float(i)).y for i in range(8)]
-    wrong: list[int] = []
-
-    def work(i: int) -> None:
-        wrong.extend(i for _ in range(50) if not np.array_equal(run(0.0, float(i)).y, expected[i]))
-
-    threads = [threading.Thread(target=work, args=(i,)) for i in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not wrong
+    in_threads(lambda i: [np.testing.assert_array_equal(run(0.0, float(i)).y, expected[i]) for _ in range(50)])
 
 
 def test_threads_may_make_the_first_adaptive_run_at_once() -> None:
     """From which what does not depend on the start is known."""
     expected = [whole(sw.Oscillator(), "dop853", v=0.0, y=float(i), **ORBIT) for i in range(8)]
     for _ in range(50):
-        run, gate, same = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, **ORBIT), threading.Barrier(8), [False] * 8
+        run, gate = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, **ORBIT), threading.Barrier(8)
 
-        def work(i: int, run: Any = run, gate: Any = gate, same: Any = same) -> None:
+        def work(i: int, run: Any = run, gate: Any = gate) -> None:
             gate.wait()
             assert_same(run(0.0, float(i)), expected[i])
-            same[i] = True
 
-        threads = [threading.Thread(target=work, args=(i,)) for i in range(8)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        assert all(same)
+        in_threads(work)
 
 
 def test_threads_may_call_integrate_at_once() -> None:
@@ -331,24 +306,15 @@ def test_threads_may_call_integrate_at_once() -> None:
     expected = [
         whole(sw.Oscillator(1.0 + i), "rk4", v=0.0, y=1.0, dt=0.1, steps=3).y.tobytes() for i in range(2 * module.MOST_RECENT)
     ]
-    wrong: list[int] = []
 
-    def work() -> None:
-        for _ in range(20):
+    def work(_: int) -> None:
+        for _ in range(10):
             for i, bits in enumerate(expected):
                 run = sw.integrate(sw.Oscillator(1.0 + i), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
-                wrong.extend([i] * (run.y.tobytes() != bits))
-        done.append(True)
+                assert run.y.tobytes() == bits, i
 
-    done: list[bool] = []
-    threads = [threading.Thread(target=work) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not wrong
-    assert len(done) == len(threads)
-    assert len(module._recent) <= module.MOST_RECENT + len(threads)
+    in_threads(work)
+    assert len(module._recent) <= module.MOST_RECENT + 8
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
@@ -398,26 +364,11 @@ def test_of_adaptive_steps_too(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_long_run_is_made_as_any_other() -> None:
     """It is given up after some tenths of a millisecond, and not tried again."""
-    run, arguments = (
-        sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-9, at=[1e4]),
-        {"tolerance": 1e-9, "at": [1e4]},
-    )
+    arguments: dict[str, Any] = {"tolerance": 1e-9, "at": [1e4]}
+    run = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, **arguments)
     assert run._short is not None
     assert_same(run(0.0, 1.0), whole(sw.Oscillator(), "dop853", v=0.0, y=1.0, **arguments))
     assert run._short.run(0.0, 1.0) is None
-
-
-def test_stiffness_is_noticed() -> None:
-    """Of some hundred steps, which are looked at."""
-    system = sw.Oscillator(30.0, damping=2e4)
-    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-3, "at": [1.0]}
-    expected, said = with_warnings(partial(whole, system, "dop853", **arguments))
-    assert "StiffnessWarning" in said[0]
-    run = sw.prepare(system, "dop853", **arguments)
-    for _ in range(2):
-        got, warned = with_warnings(partial(run, 0.0, 1.0))
-        assert_same(got, expected)
-        assert warned == said
 
 
 def test_integrate_knows_a_run_by_all_of_its_options() -> None:
@@ -436,10 +387,6 @@ def test_integrate_knows_a_run_by_all_of_its_options() -> None:
     push = np.zeros(())
     for size in (0.0, 1.0, 2.0):
         push[...] = size
-        assert_same(
-            sw.integrate(system, "rk4", v=0.0, y=1.0, force=push, dt=0.1, steps=3),
-            whole(system, "rk4", v=0.0, y=1.0, force=size, dt=0.1, steps=3),
-        ) if size == 0.0 else None
         run = sw.integrate(system, "rk4", v=0.0, y=1.0, force=push, dt=0.1, steps=3)
         assert run.y.tobytes() == whole(system, "rk4", v=0.0, y=1.0, force=size, dt=0.1, steps=3).y.tobytes()
 
@@ -515,4 +462,4 @@ def test_integrate_keeps_little_memory() -> None:
     kept, start = weakref.ref(start), None  # type: ignore[assignment]
     gc.collect()
     assert kept() is None
-    assert all(each.run is None or not is_short(each.run) for each in module._recent.values() if each.system() is small)
+    assert all(each.run is None or each.run._short is None for each in module._recent.values() if each.system() is small)
