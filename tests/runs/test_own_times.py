@@ -15,9 +15,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
-from support.cases import SYSTEMS, Case, assert_same, by_both_backends, cases
-
-METHODS = [m.name for m in sw.methods()]
+from support.ways import assert_equal_ways
 
 
 @sw.system
@@ -33,97 +31,69 @@ def quietly(system: Any, method: str, **options: Any) -> sw.Run:
         return sw.integrate(system, method, **options)
 
 
-@pytest.mark.parametrize(("case", "backend"), by_both_backends(cases(), {"direct": 1, "matrix": 1, "power": 1}, "own times"))
-def test_each_member_is_a_run_of_its_own_time(case: Case, backend: Any) -> None:
-    """Its bits and times are those of the batch that all begins when it does, of which it is the same member."""
-    begins = np.array([0.0, -1.3, 2.75, 100.0, 7e5 / 3.0])
-    system, arguments = case.make(5)
-    arguments |= {"steps": 23, "every": 5, "backend": backend}
-    together = quietly(system, t0=begins, **arguments)
-    assert together.t.shape == (6, 5)
-    for i, begin in enumerate(begins):
-        common = quietly(system, t0=float(begin), **arguments)
-        np.testing.assert_array_equal(together.t[:, i], common.t)
-        np.testing.assert_array_equal(together.v[..., i], common.v[..., i])
-        np.testing.assert_array_equal(together.y[..., i], common.y[..., i])
-        assert together.first_bad_step[i] == common.first_bad_step[i]
+#: A method of each kind of step.
+KINDS = ("false_euler", "rk4", "leapfrog", "verlet", "dop853", "taylor", "trapezoidal", "rodas4")
+BESIDE = ("by the reference", "at each level", "alone", "in company")
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("options", [{}, {"fused": True}, {"backend": "numpy"}, {"fused": True, "backend": "numpy"}], ids=str)
-def test_a_member_alone(method: str, options: dict[str, Any]) -> None:
-    """Of many members, of which machine code steps whole vectors; forward and back; two batch axes."""
+@pytest.mark.parametrize("method", KINDS)
+@pytest.mark.parametrize("fused", [False, True])
+def test_two_axes_of_members_forward_and_back(method: str, fused: bool) -> None:
+    """Of many members, of which machine code steps whole vectors."""
     begins = np.linspace(-3.0, 4.0, 70).reshape(7, 10)
-    steps = 5 if options.get("backend") else 60  # each takes NumPy milliseconds
     for dt in (0.1, -0.1):
-        start = {"v": 0.3, "y": np.linspace(0.5, 1.5, 10), "dt": dt, "steps": steps, **options}
+        start = {"v": 0.3, "y": np.linspace(0.5, 1.5, 10), "dt": dt, "steps": 60, "fused": fused}
         run = sw.integrate(swept(), method, t0=begins, **start)
         assert run.y.shape == run.t.shape == (1, 7, 10)
-        np.testing.assert_array_equal(run.t[0], begins + steps * dt)
+        np.testing.assert_array_equal(run.t[0], begins + 60 * dt)
         for index in ((0, 0), (3, 7), (6, 9)):
             alone = sw.integrate(swept(), method, t0=begins[index], **start | {"y": start["y"][index[1]]})
             np.testing.assert_array_equal((run.v[(0, *index)], run.y[(0, *index)]), (alone.v[0], alone.y[0]))
 
 
-@pytest.mark.parametrize("drive", [sw.Sinusoid(0.5, 1.3), sw.Sampled(np.sin(np.arange(40.0)), 0.25, start=-2.0)], ids=str)
-@pytest.mark.parametrize("method", ["rk4", "leapfrog", "dop853"])
-def test_inputs_of_own_equations_and_of_systems(method: str, drive: Any) -> None:
-    begins = np.array([-1.0, 0.3, 2.0])
-    for system in (swept(drive=drive), sw.Pendulum(1.5, a=drive), sw.Oscillator(1.5, x=drive)):
-        start = {"v": 0.3, "y": 1.0, "dt": 0.07, "steps": 60}
-        run = sw.integrate(system, method, t0=begins, **start)
-        np.testing.assert_array_equal(run.y, sw.integrate(system, method, t0=begins, backend="numpy", **start).y)
-        for i, begin in enumerate(begins):
-            assert run.y[0, i] == sw.integrate(system, method, t0=begin, **start).y[0]
-
-
-@pytest.mark.parametrize(
-    ("method", "options"),
-    [(method, {}) for method in METHODS]
-    + [(method, options) for method in ("rk4", "leapfrog") for options in ({"fused": True}, {"backend": "numpy"})],
-    ids=str,
-)
-def test_means_of_several_samples_within_a_step(method: str, options: dict[str, Any]) -> None:
-    """Which are others for each t0; samples are the same for all members, or of each."""
+@pytest.mark.parametrize("method", KINDS)
+def test_means_of_several_samples_within_a_step(method: str) -> None:
+    """Which are others for each t0; samples are the same for all members, or of each; and a sinusoid."""
     rng = np.random.default_rng(5)
-    begins = np.array([[-1.0], [0.3], [2.013]])
-    common, own = sw.Sampled(rng.normal(size=90), 0.03, -1.3), sw.Sampled(rng.normal(size=(60, 2)), 0.04, -1.1)
-    start = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 40, "every": 9, **options}
-    for system in (swept(k=own, drive=common), sw.Pendulum(1.5, a=own)):
-        run = sw.integrate(system, method, t0=begins, **start)
-        for i, begin in enumerate(begins[:, 0]):
-            alone = sw.integrate(system, method, t0=float(begin), **start)
-            for j in range(run.y.shape[2]):
-                member = (slice(None), j) if alone.y.ndim == 2 else slice(None)
-                np.testing.assert_array_equal(run.y[:, i, j], alone.y[member])
-                np.testing.assert_array_equal(run.v[:, i, j], alone.v[member])
+    common, own = sw.Sampled(rng.normal(size=140), 0.03, -1.3), sw.Sampled(rng.normal(size=(110, 5)), 0.04, -1.1)
+    start = {"v": np.full(5, 0.3), "y": np.linspace(0.5, 1.5, 5), "t0": np.array([-1.0, 0.3, 2.013, -0.5, 1.0])}
+    for system in (swept(k=own, drive=common), sw.Pendulum(1.5, a=own), sw.Oscillator(1.5, x=sw.Sinusoid(0.5, 1.3), a=common)):
+        for fused in (False, True) if method in ("rk4", "leapfrog") else (False,):
+            assert_equal_ways(system, method, ways=BESIDE, dt=0.1, steps=20, every=9, fused=fused, **start)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_pieces_are_the_run(method: str) -> None:
-    begins = np.array([-1.0, 0.3, 2.0])
-    start = {"v": 0.3, "y": 1.0, "t0": begins, "dt": 0.1}
-    whole = sw.integrate(swept(), method, steps=30, every=10, **start)
-    half = sw.integrate(swept(), method, steps=20, **start)
-    rest = sw.integrate(swept(), method, steps=10, resume=half)
-    np.testing.assert_array_equal((rest.v[-1], rest.y[-1], rest.t[-1]), (whole.v[-1], whole.y[-1], whole.t[-1]))
+def falls(t: Any, v: Any, y: Any) -> Any:
+    return y - 0.01 * t
 
 
-@pytest.mark.parametrize("method", ["rk4", "verlet"])
-@pytest.mark.parametrize("members", [3, 200])
-@pytest.mark.parametrize("every", [None, 7])
-def test_events_are_at_the_times_of_their_members(method: str, members: int, every: int | None) -> None:
-    begins = np.linspace(-2.0, 3.0, members)
-    events = [sw.Event(lambda t, v, y: y - 0.01 * t, name="low"), sw.Event(lambda t, v, y: t - 4.0, name="four", terminal=True)]
-    start = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 120, "every": every}
-    run = sw.integrate(swept(), method, t0=begins, events=events, **start)
-    assert run.stopped_at is not None
-    for i in (0, 1, members - 1):
-        alone = sw.integrate(swept(), method, t0=float(begins[i]), events=events, **start)
-        for name in ("low", "four"):
-            np.testing.assert_array_equal(run.events[name].t[run.events[name].member == i], alone.events[name].t)
-        assert run.stopped_at[i] == alone.stopped_at
-        np.testing.assert_array_equal(run.y[:, i], alone.y)
+EVENTS: dict[str, list[sw.Event]] = {
+    "seen": [sw.Event(falls, name="low"), sw.Event(lambda t, v, y: t - 4.03, name="four")],
+    "one stops": [sw.Event(falls, name="low"), sw.Event(lambda t, v, y: t - 4.0, name="four", terminal=True)],
+    "both change": [
+        sw.Event(falls, direction=-1, then=lambda t, v, y: (-0.9 * v, y), name="low"),
+        sw.Event(lambda t, v, y: t - 4.0, then=lambda t, v, y: (v + 0.1 * t, y), name="four"),
+    ],
+}
+
+
+@pytest.mark.parametrize("method", ["rk4", "leapfrog"])
+@pytest.mark.parametrize("kind", EVENTS)
+def test_events_are_at_the_times_of_their_members(kind: str, method: str) -> None:
+    """Of many members the core notices changes of sign by itself, where it knows their times; of a system without time, too."""
+    many = 40 if kind == "both change" else 200
+    for system, members, every, backend in (
+        (swept(), 3, None, "rust"), (swept(), 3, 7, "numpy"), (swept(), many, 7, "rust"), (sw.Pendulum(1.5), many, None, "rust"),
+    ):  # fmt: skip
+        begins, y = np.linspace(-2.0, 3.0, members), np.linspace(0.5, 1.5, members)
+        start: dict[str, Any] = {"v": 0.3, "dt": 0.1, "steps": 90, "every": every, "events": EVENTS[kind], "backend": backend}
+        run = sw.integrate(system, method, y=y, t0=begins, **start)
+        for i in (0, members // 2, members - 1):
+            alone = sw.integrate(system, method, y=y[i], t0=float(begins[i]), **start)
+            assert len(alone.events["four"].t) == 1
+            for name in ("low", "four"):
+                np.testing.assert_array_equal(run.events[name].t[run.events[name].member == i], alone.events[name].t)
+            np.testing.assert_array_equal(run.stopped_at if run.stopped_at is None else run.stopped_at[i], alone.stopped_at)
+            np.testing.assert_array_equal((run.v[:, i], run.y[:, i]), (alone.v, alone.y))
 
 
 def test_what_knows_no_time_is_only_told_other_times() -> None:
@@ -173,13 +143,8 @@ def many(t: Any, v: Any, y: Any) -> Any:
 
 def test_steps_that_are_not_one_tape_else() -> None:
     """300 coordinates, each driven at its own phase."""
-    rng = np.random.default_rng(3)
-    v, y = rng.normal(size=(2, 300, 6))
-    begins = np.linspace(0.0, 3.0, 6)
-    run = sw.integrate(many(), "rk4", v=v, y=y, t0=begins, dt=0.05, steps=5)
-    for i in (0, 5):
-        alone = sw.integrate(many(), "rk4", v=v[:, i], y=y[:, i], t0=float(begins[i]), dt=0.05, steps=5)
-        np.testing.assert_array_equal(run.y[..., i], alone.y)
+    v, y = np.random.default_rng(3).normal(size=(2, 300, 6))
+    assert_equal_ways(many(), "rk4", ways=("alone",), v=v, y=y, t0=np.linspace(0.0, 3.0, 6), dt=0.05, steps=5)
 
 
 def test_a_step_too_long_for_one_tape_is_refused() -> None:
@@ -187,49 +152,6 @@ def test_a_step_too_long_for_one_tape_is_refused() -> None:
     large = sw.LinearSystem(-np.eye(200), np.ones((200, 1)), x=sw.Sinusoid(1.0, 1.3))
     with pytest.raises(UnsupportedError, match=r"t0: a step of about .* operations is too long for times of its members' own"):
         sw.integrate(large, "dop853", v=0.0, y=np.ones((100, 2)), t0=np.arange(2.0), dt=0.05, steps=5)
-
-
-def test_the_same_cases_are_the_reference() -> None:
-    """Core and reference, of a few cases of every form, in one comparison of all that a run keeps."""
-    for form in ("direct", "matrix", "power"):
-        for case in [
-            case for case in cases() if case.form == form and SYSTEMS[case.system](np.random.default_rng(0), 1).given_inputs()
-        ][:6]:
-            system, arguments = case.make(3)
-            arguments |= {"steps": 23, "every": 5, "t0": np.array([0.0, 1.5, -2.0])}
-            assert_same(quietly(system, **arguments), quietly(system, backend="numpy", **arguments))
-
-
-@pytest.mark.parametrize("method", ["rk4", "leapfrog"])
-@pytest.mark.parametrize(("members", "backend"), [(3, "rust"), (90, "rust"), (3, "numpy")])
-def test_events_change_the_state_at_the_times_of_their_members(method: str, members: int, backend: Any) -> None:
-    events = [
-        sw.Event(lambda t, v, y: y - 0.01 * t, direction=-1, then=lambda t, v, y: (-0.9 * v, y), name="low"),
-        sw.Event(lambda t, v, y: t - 4.0, then=lambda t, v, y: (v + 0.1 * t, y), name="four"),
-    ]
-    begins, y = np.linspace(-2.0, 3.0, members), np.linspace(0.5, 1.5, members)
-    start: dict[str, Any] = {"v": 0.3, "dt": 0.1, "steps": 90, "every": 7, "events": events, "backend": backend}
-    run = sw.integrate(swept(), method, y=y, t0=begins, **start)
-    for i in (0, 1, members - 1):
-        alone = sw.integrate(swept(), method, y=y[i], t0=float(begins[i]), **start)
-        assert len(alone.events["four"].t) == 1
-        for name in ("low", "four"):
-            np.testing.assert_array_equal(run.events[name].t[run.events[name].member == i], alone.events[name].t)
-        np.testing.assert_array_equal(run.v[:, i], alone.v)
-        np.testing.assert_array_equal(run.y[:, i], alone.y)
-
-
-def test_events_by_the_time_of_a_system_without_time() -> None:
-    """Of so many members the core notices changes of sign by itself, where it knows their times."""
-    events = [sw.Event(lambda t, v, y: t - 4.03, name="four"), sw.Event(lambda t, v, y: y, name="zero")]
-    begins = np.linspace(-2.0, 3.0, 200)
-    start: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 120, "events": events}
-    run = sw.integrate(sw.Pendulum(1.5), "rk4", t0=begins, **start)
-    assert len(run.events["four"].t) == 200
-    for i in (0, 77, 199):
-        alone = sw.integrate(sw.Pendulum(1.5), "rk4", t0=float(begins[i]), **start)
-        for name in ("four", "zero"):
-            np.testing.assert_array_equal(run.events[name].t[run.events[name].member == i], alone.events[name].t)
 
 
 @sw.system
@@ -242,21 +164,13 @@ def energy(v: Any, y: Any) -> Any:
     return 0.5 * v * v - np.cos(y)
 
 
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize("method", ["rk4", "leapfrog", "verlet", "dop853"])
-def test_forces_controls_records_and_threads(method: str, backend: Any) -> None:
-    begins, force = np.array([0.0, 1.0, 2.5, -4.0]), np.array([0.1, 0.2, 0.3, 0.4])
-    options: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 40, "every": 7, "record": "energy", "backend": backend}
-    if method in ("rk4", "dop853"):
+@pytest.mark.parametrize("method", ["rk4", "leapfrog"])
+def test_forces_controls_and_records(method: str) -> None:
+    options: dict[str, Any] = {"v": np.full(4, 0.3), "y": np.ones(4), "dt": 0.1, "steps": 15, "every": 7, "record": "energy"}
+    options |= {"t0": np.array([0.0, 1.0, 2.5, -4.0]), "force": np.array([0.1, 0.2, 0.3, 0.4])}
+    if method == "rk4":
         options["control"] = sw.Control("energy", gain=0.5)
-    run = quietly(driven(), method, t0=begins, force=force, threads=3, **options)
-    for i in range(4):
-        alone = quietly(driven(), method, t0=begins[i], force=force[i], **options)
-        np.testing.assert_array_equal(run.y[:, i], alone.y)
-        np.testing.assert_array_equal(run.recorded["energy"][:, i], alone.recorded["energy"])
-        np.testing.assert_array_equal(run.t[:, i], alone.t)
-        if run.work is not None:
-            assert run.work[i] == alone.work
+    assert_equal_ways(driven(), method, ways=BESIDE, **options)
 
 
 @pytest.mark.parametrize("backend", ["rust", "numpy"])
@@ -281,11 +195,10 @@ def test_a_run_keeps_times_of_its_own() -> None:
 
 def test_outputs_and_limits_along_a_run_are_at_the_times_of_their_members() -> None:
     begins = np.array([0.0, 1.0])
-    mass = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], C=[0.2, 4.0], D=1.0, x=sw.Sinusoid(1.0, 2.0), velocities=1)
     start: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 20, "every": 1}
-    run, nonlinear = (sw.integrate(system, "rk4", t0=begins, **start) for system in (mass, swept()))
+    run, nonlinear = (sw.integrate(system, "rk4", t0=begins, **start) for system in (MASS, swept()))
     for i, begin in enumerate(begins):
-        np.testing.assert_array_equal(run.z[..., i], sw.integrate(mass, "rk4", t0=begin, **start).z)
+        np.testing.assert_array_equal(run.z[..., i], sw.integrate(MASS, "rk4", t0=begin, **start).z)
         alone = sw.stability_along(sw.integrate(swept(), "rk4", t0=begin, **start))
         assert sw.stability_along(nonlinear).when[i] == alone.when
     with pytest.raises(UnsupportedError, match="at: expected a run whose members have their times in common"):
@@ -409,15 +322,16 @@ def run_of(which: str) -> sw.Run:
 
 
 @pytest.mark.parametrize("use", USES)
-@pytest.mark.parametrize("which", OF_OWN_TIMES)
-def test_a_run_of_own_times_is_used_or_refused_in_words(which: str, use: str, tmp_path: Path) -> None:
+def test_a_run_of_own_times_is_used_or_refused_in_words(use: str, tmp_path: Path) -> None:
     function, refusal = USES[use]
-    words = ""
-    try:
-        function(run_of(which), tmp_path)
-    except sw.StepwellError as error:
-        words = str(error)
-    assert not words or (refusal and re.search(refusal, words)), words
+    for which in OF_OWN_TIMES:
+        folder, words = tmp_path / which, ""
+        folder.mkdir()
+        try:
+            function(run_of(which), folder)
+        except sw.StepwellError as error:
+            words = str(error)
+        assert not words or (refusal and re.search(refusal, words)), f"{which}: {words}"
 
 
 def test_every_public_name_of_a_run_is_tried() -> None:
@@ -426,9 +340,9 @@ def test_every_public_name_of_a_run_is_tried() -> None:
     assert public <= tried, public - tried
 
 
-@pytest.mark.parametrize(
-    ("options", "kind", "message"),
-    [
+def test_what_is_wrong_with_times_is_said_of_their_member() -> None:
+    """The first of them, by its index."""
+    wrong: list[tuple[dict[str, Any], Any, str]] = [
         ({"y": np.ones(3), "at": np.ones((2, 5))}, ShapeError, r"do not broadcast to one: y \(3,\), at \(5,\)"),
         ({"t0": np.zeros(3), "at": np.ones((2, 5))}, ShapeError, r"do not broadcast to one: t0 \(3,\), at \(5,\)"),
         ({"t0": np.zeros((3, 2)), "at": np.ones((1, 3, 3))}, ShapeError, r"t0 \(3, 2\), at \(3, 3\)"),
@@ -443,12 +357,10 @@ def test_every_public_name_of_a_run_is_tried() -> None:
             r"ascend from t0 = 5 on, got \[4.0, 8.0\] of member \(0, 1\)$",
         ),
         ({"at": [2.0, 1.0], "y": np.ones(3)}, ArgumentError, r"ascend from t0 = 0 on, got \[2.0, 1.0\]$"),
-    ],
-    ids=str,
-)
-def test_what_is_wrong_with_times_is_said_of_their_member(options: dict[str, Any], kind: Any, message: str) -> None:
-    with pytest.raises(kind, match=message):
-        sw.integrate(swept(), "dop853", **ADAPTIVE | options)
+    ]
+    for options, kind, message in wrong:
+        with pytest.raises(kind, match=message):
+            sw.integrate(swept(), "dop853", **ADAPTIVE | options)
 
 
 def test_a_run_that_goes_on_says_which_member_was_further() -> None:
