@@ -20,8 +20,9 @@ import pytest
 import stepwell as sw
 from stepwell.analysis import stability
 from stepwell.views import charts
-from support import families
 from support import own_systems as own
+from support.cases import number
+from support.families import family
 from support.wrong_calls import A_RUN, CALLS, JUNK, SAVED, SAVED_OWN
 
 #: What a call may take: ten times what the slowest right one does on a busy machine. What takes longer was accepted and works.
@@ -80,7 +81,7 @@ def wrong(call: Callable[..., Any], options: dict[str, Any], argument: str, make
             return f"refused after {took:.1f} s: {text[:200]}"
         if len(text) > 1500:
             return f"a message of {len(text)} characters: {text[:200]}"
-        names = [argument, *options, "method", "scene", "peers", "not installed"]
+        names = [argument, *options, "elements", "method", "scene", "peers", "not installed"]
         return None if any(name in text for name in names) else f"names no argument: {text[:200]}"
     except BaseException as error:  # a panic of the core is no Exception
         return f"{type(error).__name__}: {str(error)[:200]}"
@@ -95,33 +96,21 @@ def wrong(call: Callable[..., Any], options: dict[str, Any], argument: str, make
 KNOWN = {("analyse at", "dt", "10**12"), ("analyse v y", "dt", "10**12")}
 
 #: An ordinary run of the tests takes every SHARE-th of them, others for each argument; the long one takes all.
-SHARE = 7
-
-
-def calls() -> list[Any]:
-    """Calls with one strange argument, and the values that it gets."""
-    share = 1 if families.LONG else SHARE
-    arguments = [(name, call, options, argument) for name, (call, options) in CALLS.items() for argument in options]
-    return [
-        pytest.param(
-            call,
-            options,
-            argument,
-            [each for each in list(JUNK)[i % share :: share] if (name, argument, each) not in KNOWN],
-            id=f"{name}: {argument}",
-            marks=[pytest.mark.long] * families.LONG,
-        )
-        for i, (name, call, options, argument) in enumerate(arguments)
-    ]
+SHARE = 19
 
 
 @timer
-@pytest.mark.parametrize(("call", "options", "argument", "junk"), calls())
-def test_calls_work_or_say_what_is_wrong(
-    call: Callable[..., Any], options: dict[str, Any], argument: str, junk: list[str]
-) -> None:
-    bad = {name: text for name in junk if (text := wrong(call, options, argument, JUNK[name])) is not None}
-    assert not bad, "\n" + "\n".join(f"{argument} = {name}: {text}" for name, text in bad.items())
+@pytest.mark.parametrize("share", family((SHARE, 1), lambda share: share > 1))
+@pytest.mark.parametrize("name", CALLS)
+def test_calls_work_or_say_what_is_wrong(name: str, share: int) -> None:
+    call, options = CALLS[name]
+    bad = {
+        f"{argument} = {junk}": text
+        for i, argument in enumerate(options)
+        for junk in list(JUNK)[(i + number(name)) % share :: share]
+        if (name, argument, junk) not in KNOWN and (text := wrong(call, options, argument, JUNK[junk])) is not None
+    }
+    assert not bad
 
 
 @timer
@@ -129,7 +118,7 @@ def test_several_strange_arguments_at_once() -> None:
     """What is looked at first may hide what comes next: two to four arguments of ``integrate``, drawn once and for all."""
     draw = random.Random(1)
     names = [name for name in CALLS if name.startswith("integrate")]
-    for _ in range(2000):
+    for _ in range(700):
         call, options = CALLS[name := draw.choice(names)]
         chosen = {argument: draw.choice(list(JUNK)) for argument in draw.sample(list(options), draw.randint(2, 4))}
         (last, junk), *others = chosen.items()
