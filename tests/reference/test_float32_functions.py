@@ -4,75 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from fractions import Fraction
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
-from hypothesis import given
-from hypothesis import strategies as st
 from stepwell import _core
 from stepwell.reference import bits, functions, trig
-from stepwell.reference.fma import fma, odd_sum
 from stepwell.reference.functions import exponential, logarithms, trigonometric
 from stepwell.reference.tape.evaluate import Evaluation
 from support.cases import assert_same
 
 F = np.float32
-
-
-# ---- fused multiply-adds of float32
-
-SINGLES = st.floats(width=32, allow_nan=True, allow_infinity=True)
-
-
-def rounded_once(a: float, b: float, c: float) -> np.float32:
-    """a·b + c rounded to float32 by rational arithmetic, or as IEEE 754 has it where that has no answer."""
-    if not (math.isfinite(a) and math.isfinite(b)):
-        return F(a * b + c)
-    if not math.isfinite(c):
-        return F(c)
-    exact = Fraction(a) * Fraction(b) + Fraction(c)
-    if not exact:
-        return F(a * b + c)
-    size = abs(exact)
-    exponent = max(-126, math.floor(math.log2(size.numerator) - math.log2(size.denominator)))
-    exponent += (Fraction(2) ** (exponent + 1) <= size) - (Fraction(2) ** exponent > size and exponent > -126)
-    unit = Fraction(2) ** (exponent - 23)
-    whole = round(size / unit)  # Python rounds halves to even
-    with np.errstate(over="ignore"):
-        return F(math.copysign(float(whole * unit), exact)) if whole * unit < 2**128 else F(math.copysign(np.inf, exact))
-
-
-def same(a: Any, b: Any) -> bool:
-    return bool((np.isnan(a) and np.isnan(b)) or (a == b and np.signbit(a) == np.signbit(b)))
-
-
-@given(SINGLES, SINGLES, SINGLES)
-def test_a_product_and_a_sum_are_rounded_once(a: float, b: float, c: float) -> None:
-    with np.errstate(all="ignore"):
-        assert same(fma(F(a), F(b), F(c)), rounded_once(a, b, c)), (a, b, c)
-
-
-def test_where_two_roundings_would_differ() -> None:
-    """Sums near the middle between two numbers of float32: rounded to float64 first, some would go the wrong way."""
-    rng = np.random.default_rng(2)
-    a = F(1.0) + F(2.0**-23) * rng.integers(0, 2**12, 4000).astype(F)
-    b = F(1.0) + F(2.0**-23) * rng.integers(0, 2**12, 4000).astype(F)
-    c = (F(2.0) ** rng.integers(24, 34, 4000)).astype(F) * rng.integers(1, 4, 4000).astype(F)
-    c[::2] = -np.nextafter((a.astype(float) * b)[::2].astype(F), F(9.0)) * F(2.0**-3)
-    want = np.array([rounded_once(*map(float, each)) for each in zip(a, b, c, strict=True)])
-    np.testing.assert_array_equal(fma(a, b, c), want)
-    tiny = F(2.0**-60) * rng.choice([-1, 1], 4000).astype(F)
-    halves = (F(1.0) + F(2.0**-23) * rng.integers(0, 99, 4000).astype(F)).astype(F)
-    # The product is half a last place of the sum, and the tiny rest decides.
-    small = np.array([rounded_once(float(h), 1.0 + 2.0**-23, float(t)) for h, t in zip(halves, tiny, strict=True)])
-    np.testing.assert_array_equal(fma(halves, F(1.0 + 2.0**-23), tiny), small)
-    twice = (halves.astype(float) * float(F(1.0 + 2.0**-23)) + tiny).astype(F)
-    assert odd_sum(np.array([1.0]), np.array([2.0**-60]))[0] > 1.0
-    assert (twice != small).any() or (np.asarray(a * b + c) != want).any()
 
 
 # ---- functions
