@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import pickle
 import sys
 from collections import Counter
@@ -16,13 +17,17 @@ from stepwell.errors import ArgumentError, DTypeError, FixedError, ShapeError, U
 from stepwell.reference import around
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
-from support import families
-from support.cases import ADAPTIVE, SOME, SYSTEMS, drawn, fits
+from support.cases import ADAPTIVE, SOME, SYSTEMS, assert_same, drawn, fits
 from support.graphs import assert_one_graph, methods
+from support.looped import looped
+from support.springs import lattice
 from support.tracing import made
+from support.ways import assert_equal_ways
 
 PUSHED = [name for name, make in SYSTEMS.items() if make(np.random.default_rng(0), 1).v_shape != (0,)]
 METHODS = [method.name for method in sw.methods()]
+#: A method of each structure: of one stage and more, carried in two ways, implicit, a series.
+STRUCTURES = ["false_euler", "leapfrog", "verlet", "rk4", "implicit_midpoint", "rodas4", "pefrl", "taylor"]
 
 
 def forced(name: str, members: int = 5, seed: int = 3) -> tuple[sw.System, Any, Any, Any]:
@@ -33,20 +38,16 @@ def forced(name: str, members: int = 5, seed: int = 3) -> tuple[sw.System, Any, 
     return (system, *(rng.normal(size=(*shape, members)) for shape in shapes))
 
 
-def able(system: sw.System, method: str) -> bool:
-    return not sw.method(method).needs_acceleration or (system.second_order and system.velocity_term is None)
-
-
 # ---- the reference, and the core
 
 
 def tried(system: sw.System, some: int | None, name: str) -> list[sw.Method]:
-    """By default four methods of each system: without a force test_graphs.py compares all."""
-    return drawn(list(methods(system)), some and 2 * some, "force", name)
+    """By default two methods of each system: without a force test_graphs.py compares all."""
+    return drawn(list(methods(system)), some, "force", name)
 
 
 @SOME
-@pytest.mark.parametrize("name", PUSHED)
+@looped("name", PUSHED)
 def test_one_graph(name: str, some: int | None) -> None:
     """For every input: the core's step and the reference's are one graph of operations, and so is what a method carries."""
     system, v, _ = made(name)
@@ -73,7 +74,7 @@ def otherwise(name: str) -> bool:
 
 
 @SOME
-@pytest.mark.parametrize("name", [name for name in PUSHED if not otherwise(name)])
+@looped("name", [name for name in PUSHED if not otherwise(name)])
 def test_without_a_force_the_step_is_the_one_before(name: str, some: int | None) -> None:
     """With one, each rate evaluation takes an addition more for each number of v, and nothing else is done in a step."""
     system, _, _ = made(name)
@@ -98,113 +99,87 @@ def test_without_a_force_the_step_is_the_one_before(name: str, some: int | None)
         assert {each: without[each] for each in others} == {each: pushed[each] for each in others}
 
 
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize("method", METHODS)
-def test_a_world_equals_pieces_of_a_run(method: str, backend: str) -> None:
+def assert_a_world_goes_as_pieces(
+    system: sw.System, method: str, v: Any, y: Any, force: Any, pieces: tuple[int, ...], backend: str = "rust", **options: Any
+) -> None:
     """The force changes between the calls of step; the run is made in pieces, each with the force of its own."""
     rng = np.random.default_rng(1)
-    for name in ("free", "pendulum, damped", "friction", "three bodies", "chain of nineteen", "linear, masses", "own: Duffing"):
-        for members in (1, 5, 97):
-            system, v, y, force = forced(name, members)
-            if not able(system, method):
-                continue
-            world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=0.1, t0=0.3, force=force)
-            state: dict[str, Any] = {"v": v, "y": y, "t0": 0.3}
-            for steps in (3, 1, 7):
-                world.step(steps)
-                run = sw.integrate(system, method, dt=0.1, steps=steps, backend=backend, **state | {"force": force})
-                np.testing.assert_array_equal(world.y, run.y[-1])
-                np.testing.assert_array_equal(world.v, run.v[-1])
-                state = {"resume": run}
-                force[...] = rng.normal(size=force.shape)
-
-
-@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "verlet", "rk4"])
-@pytest.mark.parametrize(
-    ("system", "members"),
-    [
-        (sw.NBody(np.full(60, 1 / 60), softening=0.1), 1),
-        (sw.NBody(np.full(60, 1 / 60), softening=0.1, dim=3), 3),
-        (sw.NBody(np.full(40, 1 / 40), softening=0.1), 9),
-        (sw.Chain(3000), 1),
-        (sw.Chain(1500), 2),
-        (sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80), 1),
-        (sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80), 9),
-        (
-            SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().for_state_shapes(None, np.zeros((300, 3))),
-            2,
-        ),  # type: ignore[attr-defined]
-    ],
-    ids=repr,
-)
-def test_large_systems(system: sw.System, members: int, method: str) -> None:
-    """By kernels written by hand and by tapes of the rates, with more numbers than are copied."""
-    rng = np.random.default_rng(2)
-    system = system.for_state_shapes(np.zeros(system.v_shape or 1), np.zeros(system.y_shape)) if system.v_shape else system
-    shape, shape_y = ((*each, members) if members > 1 else each for each in (system.v_shape, system.y_shape))
-    if not able(system, method):
-        pytest.skip("the method needs an acceleration")
-    v, y, force = rng.normal(size=shape), rng.normal(size=shape_y), rng.normal(size=shape)
-    world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=0.01, force=force)
-    state: dict[str, Any] = {"v": v, "y": y}
-    for steps in (2, 1):
+    world = sw.World(system, method, v=v.copy(), y=y.copy(), force=force, **options)
+    state: dict[str, Any] = {"v": v, "y": y} | options
+    for steps in pieces:
         world.step(steps)
-        run = sw.integrate(system, method, dt=0.01, steps=steps, backend="numpy", **state | {"force": force})
+        run = sw.integrate(system, method, steps=steps, backend=backend, force=force, **state)
         np.testing.assert_array_equal(world.y, run.y[-1])
         np.testing.assert_array_equal(world.v, run.v[-1])
         state = {"resume": run}
         force[...] = rng.normal(size=force.shape)
 
 
-@pytest.mark.parametrize("control", [sw.EnergyControl(0.3), sw.Projection(), sw.Projection("nacozy")], ids=repr)
-@pytest.mark.parametrize("bodies", [3, 30, 60])
-@pytest.mark.parametrize("members", [1, 2, 9])
-def test_under_control(control: Any, bodies: int, members: int) -> None:
-    """The force is no part of the energy that is kept; the same to the bit in every way of stepping."""
-    rng = np.random.default_rng(5)
-    system = sw.NBody(np.full(bodies, 1.0), softening=0.2)
-    v, y, force = (rng.normal(size=(bodies, 2, members)) for _ in range(3))
-    for method in ("false_euler", "rk4"):
-        world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=0.01, force=force, control=control)
-        world.step(4)
-        run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=4, backend="numpy", force=force, control=control)
-        np.testing.assert_array_equal(world.y, run.y[-1])
-        np.testing.assert_array_equal(world.v, run.v[-1])
-        other = sw.integrate(
-            system, method, v=v, y=y, dt=0.01, steps=4, force=force, control=control, every=1, record=["energy", "momentum"]
-        )
-        np.testing.assert_array_equal(other.y[-1], run.y[-1])
-        np.testing.assert_array_equal(other.work, run.work)
-        plain = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=4, force=force, control=control)
-        np.testing.assert_array_equal(plain.y[-1], run.y[-1])
+@looped("method", STRUCTURES)
+def test_a_force_may_change_between_steps(method: str) -> None:
+    names = ("free", "pendulum, damped", "friction", "three bodies", "chain of nineteen", "linear, masses", "own: Duffing")
+    for name in names:
+        for members in (5, 97) if method in ("leapfrog", "rk4") else (1,):
+            system, *blocks = forced(name, members)
+            if fits(system, sw.method(method)):
+                assert_a_world_goes_as_pieces(system, method, *blocks, (3, 1, 7), dt=0.1, t0=0.3)
 
 
-@pytest.mark.parametrize("method", ["false_euler", "rk4"])
-@pytest.mark.parametrize("bodies", [12, 16, 24, 30])
+def springs_in_space(n: int) -> sw.System:
+    return SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().for_state_shapes(None, np.zeros((n, 3)))  # type: ignore[attr-defined]
+
+
+MATRIX = sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80)
+
+
+@looped(
+    "system, members, names",
+    [
+        (sw.NBody(np.full(60, 1 / 60), softening=0.1), 1, ("verlet", "rk4")),
+        (sw.NBody(np.full(60, 1 / 60), softening=0.1, dim=3), 3, ("false_euler", "leapfrog")),
+        (sw.NBody(np.full(40, 1 / 40), softening=0.1), 9, ("verlet", "rk4")),
+        (sw.Chain(3000), 1, ("leapfrog", "rk4")),
+        (sw.Chain(1500), 2, ("false_euler", "verlet")),
+        (MATRIX, 1, ("false_euler",)),
+        (MATRIX, 9, ("rk4",)),
+        (springs_in_space(300), 2, ("leapfrog", "rk4")),
+    ],
+)
+def test_large_systems(system: sw.System, members: int, names: tuple[str, ...]) -> None:
+    """By kernels written by hand and by tapes of the rates, with more numbers than are copied."""
+    rng = np.random.default_rng(2)
+    system = system.for_state_shapes(np.zeros(system.v_shape or 1), np.zeros(system.y_shape)) if system.v_shape else system
+    shapes = [(*each, members) if members > 1 else each for each in (system.v_shape, system.y_shape, system.v_shape)]
+    for method in names:
+        blocks = (rng.normal(size=shape) for shape in shapes)
+        assert_a_world_goes_as_pieces(system, method, *blocks, (2, 1), "numpy", dt=0.01)
+
+
+@looped("bodies, method", itertools.product([12, 16, 24, 30], ["false_euler", "rk4"]))
 def test_a_rate_that_was_kept_is_not_used_with_another_force(bodies: int, method: str) -> None:
     """Whatever is kept from one step for the next, the next has the new force."""
     rng = np.random.default_rng(5)
     system = sw.NBody(np.full(bodies, 1.0), force="newton", softening=0.2)
+    blocks = (rng.normal(size=(bodies, 2, 9)) for _ in range(3))
+    assert_a_world_goes_as_pieces(system, method, *blocks, (1, 1, 1), "numpy", dt=0.01, control=sw.Projection())
+
+
+@looped(
+    "control, bodies",
+    itertools.product([sw.EnergyControl(0.3), sw.Projection(), sw.Projection("nacozy")], [3, 30, 60]),
+)
+def test_under_control(control: Any, bodies: int) -> None:
+    """The force is no part of the energy that is kept: by each way of stepping, on one tape and over rows by a kernel."""
+    rng = np.random.default_rng(5)
+    system = sw.NBody(np.full(bodies, 1.0), softening=0.2)
     v, y, force = (rng.normal(size=(bodies, 2, 9)) for _ in range(3))
-    state: dict[str, Any] = {"v": v, "y": y}
-    world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=0.01, force=force, control=sw.Projection())
-    state["control"] = sw.Projection()
-    for _ in range(3):
-        world.step(1)
-        run = sw.integrate(system, method, dt=0.01, steps=1, backend="numpy", **state | {"force": force})
-        np.testing.assert_array_equal(world.y, run.y[-1])
-        np.testing.assert_array_equal(world.v, run.v[-1])
-        state = {"resume": run}
-        force[...] = rng.normal(size=force.shape)
-
-
-@pytest.mark.parametrize("name", ["free", "friction", "three bodies", "sampled x, sinusoid a"])
-def test_fused(name: str) -> None:
-    system, v, y, force = forced(name)
-    world = sw.World(system, "rk4", v=v.copy(), y=y.copy(), dt=0.1, fused=True, force=force)
-    world.step(9)
-    run = sw.integrate(system, "rk4", v=v, y=y, dt=0.1, steps=9, fused=True, force=force, backend="numpy")
-    np.testing.assert_array_equal((world.v, world.y), (run.v[-1], run.y[-1]))
+    options: dict[str, Any] = {"v": v, "y": y, "force": force, "control": control}
+    steps: dict[str, Any] = {"dt": 0.01, "steps": 4, "record": ["energy", "momentum"]}
+    ways = ("by the reference", "alone", "saved more often", "in a world")
+    for method, ask in (("false_euler", steps), ("rk4", steps), ("merson", {"tolerance": 1e-4, "at": np.array([0.02, 0.05])})):
+        run = assert_equal_ways(system, method, **options, **ask, ways=ways[:1] if method == "merson" else ways)
+        reference = sw.integrate(system, method, **options, **ask, backend="numpy")
+        np.testing.assert_array_equal(run.work, reference.work)
 
 
 @pytest.mark.mutant
@@ -240,7 +215,7 @@ def test_wrong_forces_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 # ---- what it does
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", METHODS)
 def test_a_constant_force_moves_the_place_of_rest(method: str) -> None:
     """ÿ = −y + f is the free oscillator about y = f. Both runs make the same steps from v = 0, so they differ by rounding only:
     some ten operations a step of numbers below 4, over 200 steps whose map has powers below 3."""
@@ -277,7 +252,7 @@ def test_friction_resists_it() -> None:
 # ---- the world's array
 
 
-@pytest.mark.parametrize("members", [3, 700])
+@looped("members", [3, 700])
 def test_it_allocates_nothing(members: int) -> None:
     system, v, y, force = forced("free", members)
     step = sw.World(system, "rk4", v=v, y=y, dt=1e-3, force=force).step
@@ -297,8 +272,7 @@ COPIES = {
 }
 
 
-@pytest.mark.parametrize("copying", COPIES)
-@pytest.mark.parametrize("method", ["verlet", "rk4"])
+@looped("method, copying", itertools.product(["verlet", "rk4"], COPIES))
 def test_a_copy_has_a_force_of_its_own(method: str, copying: str) -> None:
     system, v, y, force = forced("pendulum")
     world = sw.World(system, method, v=v, y=y, dt=0.1, force=force)
@@ -345,8 +319,8 @@ def test_it_cannot_be_assigned() -> None:
 BOTH = np.zeros((2, 3))
 
 
-@pytest.mark.parametrize(
-    ("force", "error", "message"),
+@looped(
+    "force, error, message",
     [
         (1.0, DTypeError, "force: expected a NumPy array to read before the steps, got float"),
         (np.zeros(3, np.float32), DTypeError, "force: expected dtype float64 to read before the steps, got float32"),
@@ -355,7 +329,6 @@ BOTH = np.zeros((2, 3))
         (np.full(3, np.nan), sw.errors.NotFiniteError, "force: expected finite numbers, got nan at [0]"),
         (BOTH[1], ArgumentError, "force: expected an array of its own, got one that shares memory with v or y"),
     ],
-    ids=str,
 )
 def test_wrong_arrays(force: Any, error: Any, message: str) -> None:
     with pytest.raises(error) as caught:
@@ -383,7 +356,7 @@ def test_what_has_no_velocity_takes_no_force() -> None:
             call()
 
 
-@pytest.mark.parametrize("form", ["matrix", "power"])
+@looped("form", ["matrix", "power"])
 def test_it_goes_with_the_direct_form(form: str) -> None:
     with pytest.raises(UnsupportedError, match="force: works with form='direct' only"):
         sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, force=1.0, form=form)
@@ -395,22 +368,13 @@ ABLE = [method.name for method in sw.methods() if method.error_order is not None
 PACED = [name for name in ADAPTIVE if name in PUSHED]
 
 
-def equal(one: sw.Run, other: sw.Run) -> None:
-    np.testing.assert_array_equal(one.v, other.v)
-    np.testing.assert_array_equal(one.y, other.y)
-    np.testing.assert_array_equal(one.status, other.status)
-    for ours, theirs in zip(one.paces, other.paces, strict=True):  # type: ignore[arg-type]
-        np.testing.assert_array_equal(ours, theirs)
-
-
-@pytest.mark.parametrize("name", PACED)
-def test_one_graph_of_an_attempt(name: str) -> None:
+@SOME
+@looped("name", PACED)
+def test_one_graph_of_an_attempt(name: str, some: int | None) -> None:
     """Forward and backward in time, and where a member stands at the start."""
     system = SYSTEMS[name](np.random.default_rng(3), 1).uncontrolled
     force = np.ones((*system.v_shape, *system.batch))
-    for method in map(sw.method, ABLE):
-        if not fits(system, method):
-            continue
+    for method in drawn([each for each in map(sw.method, ABLE) if fits(system, each)], some, "attempt", name):
         # Derivatives have their signs elsewhere: the core takes those of −(a·b) on its tape, the reference those of (−a)·b.
         for backward in (False,) if method.has_derivatives else (False, True):
             plan = engine.Plan(system, method, system.batch, 1.0, force=force, backward=backward)
@@ -420,72 +384,7 @@ def test_one_graph_of_an_attempt(name: str) -> None:
                 assert_one_graph(tape, tape.trace(engine.model(plan), what), traced)
 
 
-#: Systems of small steps. The reference takes long for fused multiply-adds, so that by default it makes those of two of them.
-SMALL = {"pendulum, damped": True, "linear, masses": True, "free": False, "three bodies": False, "own: Duffing": False}
-
-
-@pytest.mark.parametrize(
-    ("fused", "names"),
-    [
-        (False, list(SMALL)),
-        (True, [name for name, is_quick in SMALL.items() if is_quick]),
-        pytest.param(True, [name for name, is_quick in SMALL.items() if not is_quick], marks=pytest.mark.long),
-    ],
-    ids=["plain", "fused", "fused, others"],
-)
-@pytest.mark.parametrize("method", ABLE)
-def test_adaptive_steps_equal_the_reference(method: str, fused: bool, names: list[str]) -> None:
-    """Under a force of each member, forward and backward, in pieces and in one."""
-    if fused and sw.method(method).is_implicit:
-        # NumPy computes their fused multiply-adds one by one: of the smallest system, and in the long run of the others.
-        names = list(SMALL)[1:] if families.LONG else names[:1]
-    for name in names:
-        system, v, y, force = forced(name, 9)
-        if not fits(system, sw.method(method)):
-            continue
-        for at in (np.array([0.1, 0.25, 0.4]), np.array([-0.1, -0.25, -0.4])):
-            ask: dict[str, Any] = {"tolerance": 1e-5, "fused": fused, "max_steps": 200}
-            one, other = (
-                sw.integrate(system, method, v=v, y=y, at=at, force=force, backend=backend, **ask)
-                for backend in ("rust", "numpy")
-            )
-            equal(one, other)
-            first = sw.integrate(system, method, v=v, y=y, at=at[:1], force=force, **ask)
-            rest = sw.integrate(system, method, at=at[1:], max_steps=200, resume=first)
-            np.testing.assert_array_equal(rest.y, one.y[1:])
-            alone = (
-                sw.integrate(system, method, v=v[..., 4], y=y[..., 4], at=at, force=force[..., 4], **ask)
-                if not system.batch
-                else None
-            )
-            if alone is not None:
-                np.testing.assert_array_equal(alone.y, one.y[..., 4])
-
-
-@pytest.mark.parametrize("control", [None, sw.EnergyControl(0.3), sw.Projection(), sw.Projection("nacozy")], ids=repr)
-@pytest.mark.parametrize("bodies", [3, 30, 60])
-def test_adaptive_steps_under_control(bodies: int, control: Any) -> None:
-    """The push, the projection and the force: on one tape, and over rows by a kernel written by hand."""
-    rng = np.random.default_rng(5)
-    system = sw.NBody(np.full(bodies, 1.0), softening=0.2)
-    v, y, force = (rng.normal(size=(bodies, 2, 2)) for _ in range(3))
-    ask: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-4, "at": [0.02, 0.05], "force": force, "control": control}
-    one, other = (sw.integrate(system, "merson", backend=backend, **ask) for backend in ("rust", "numpy"))
-    equal(one, other)
-    if control is not None:
-        np.testing.assert_array_equal(one.work, other.work)
-
-
-@pytest.mark.parametrize("method", ["dop853", "merson"])
-@pytest.mark.parametrize(
-    "system",
-    [
-        sw.Chain(3000),
-        sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80),
-        SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().for_state_shapes(None, np.zeros((100, 3))),  # type: ignore[attr-defined]
-    ],
-    ids=repr,
-)
+@looped("system, method", [(sw.Chain(3000), "dop853"), (MATRIX, "merson"), (springs_in_space(100), "dop853")])
 def test_adaptive_steps_of_large_systems(system: sw.System, method: str) -> None:
     """By kernels written by hand and by tapes of the rates, forward and backward."""
     rng = np.random.default_rng(2)
@@ -493,26 +392,29 @@ def test_adaptive_steps_of_large_systems(system: sw.System, method: str) -> None
     v, y, force = (rng.normal(size=shape) for shape in (system.v_shape, system.y_shape, system.v_shape))
     for end in (0.02, -0.02):
         ask: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-3, "at": [end], "force": force}
-        equal(*(sw.integrate(system, method, backend=backend, **ask) for backend in ("rust", "numpy")))
+        assert_same(*(sw.integrate(system, method, backend=backend, **ask) for backend in ("rust", "numpy")))
 
 
-@pytest.mark.parametrize("side", [3, 30])
-def test_adaptive_steps_of_fixed_particles(side: int) -> None:
-    """Fixed particles feel no force, in either direction of time, on a tape and over rows."""
-    place = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), axis=-1).reshape(-1, 2) / side
-    number = np.arange(side * side).reshape(side, side)
-    pairs = np.concatenate(
-        [np.stack([number[1:], number[:-1]], -1).reshape(-1, 2), np.stack([number[:, 1:], number[:, :-1]], -1).reshape(-1, 2)]
-    )
-    net = sw.Springs(pairs, stiffness=50.0, rest=1.0 / side, fixed=[0, side - 1])
-    for end in (0.05, -0.05):
-        ask: dict[str, Any] = {"v": 0.0, "y": place, "tolerance": 1e-4, "at": [end], "force": np.ones_like(place)}
-        one, other = (sw.integrate(net, "merson", backend=backend, **ask) for backend in ("rust", "numpy"))
-        equal(one, other)
-        np.testing.assert_array_equal(one.y[-1][[0, side - 1]], place[[0, side - 1]])
+@looped("side", [4, 40])
+def test_fixed_particles_feel_no_force(side: int) -> None:
+    """On a tape and over rows, forward and backward: wind on all of it moves what is free, and not what holds it."""
+    pairs, places = lattice(side, side, 2)
+    corners, places = [0, side - 1], places / side
+    net = sw.Springs(pairs, stiffness=50.0, rest=1.0 / side, fixed=corners)
+    for method, ask in (
+        ("leapfrog", {"dt": 0.01, "steps": 5}),
+        ("merson", {"tolerance": 1e-4, "at": [0.05]}),
+        ("merson", {"tolerance": 1e-4, "at": [-0.05]}),
+    ):
+        options: dict[str, Any] = {"v": 0.0, "y": places, "force": np.ones_like(places)} | ask
+        run, reference = (sw.integrate(net, method, backend=backend, **options) for backend in ("rust", "numpy"))
+        assert_same(run, reference)
+        assert np.array_equal(run.y[-1][corners], places[corners])
+        assert np.array_equal(run.v[-1][corners], np.zeros((2, 2)))
+        assert (np.delete(run.y[-1], corners, axis=0) > np.delete(places, corners, axis=0)).all()
 
 
-@pytest.mark.parametrize("method", ABLE)
+@looped("method", ABLE)
 def test_adaptive_steps_are_as_right_as_without(method: str) -> None:
     """ÿ = −y + f is the free oscillator about y = f, of which the tolerance counts the size; forward and backward."""
     force, y = np.linspace(-1.0, 1.0, 7), np.linspace(1.5, 2.0, 7)
@@ -535,17 +437,14 @@ def test_another_force_begins_anew() -> None:
     assert abs(on.y[-1] - sw.integrate(sw.Pendulum(), "dop853", at=[2.0], resume=first).y[-1]) > 0.1
 
 
-@pytest.mark.parametrize("method", ABLE)
+@looped("method", ABLE)
 def test_events_of_adaptive_steps_under_a_force(method: str) -> None:
-    """A throw, ÿ = f: it is back at 0 at t = −2v/f; the change is located in the run's own steps, alike by both backends."""
+    """A throw, ÿ = f: it is back at 0 at t = −2v/f; the change is located in the run's own steps."""
     event = sw.Event(lambda t, v, y: y, name="back", direction=-1, terminal=True)
     force = np.array([-1.0, -2.0, -4.0])
     ask: dict[str, Any] = {"v": 3.0, "y": 0.0, "tolerance": 1e-9, "at": [10.0], "force": force, "events": event}
-    one, other = (
-        sw.integrate(sw.Oscillator(0.0, form="physical"), method, backend=backend, **ask) for backend in ("rust", "numpy")
-    )
-    equal(one, other)
-    np.testing.assert_allclose(one.stopped_at, -6.0 / force, rtol=1e-9)
+    run = sw.integrate(sw.Oscillator(0.0, form="physical"), method, **ask)
+    np.testing.assert_allclose(run.stopped_at, -6.0 / force, rtol=1e-9)
 
 
 def test_a_force_changes_the_energy_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
@@ -567,25 +466,3 @@ def test_a_sweep_over_forces_with_a_tolerance() -> None:
     dataset = sw.sweep(sw.Pendulum(), {"force": force}, "merson", v=0.0, y=1.0, tolerance=1e-6, at=[0.5, 1.0])
     run = sw.integrate(sw.Pendulum(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[0.5, 1.0], force=force)
     np.testing.assert_array_equal(dataset.y_last, run.y[-1])
-
-
-@pytest.mark.parametrize("side", [4, 40])
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-def test_fixed_particles_feel_no_force(side: int, backend: str) -> None:
-    """On a tape (4 × 4) and over rows (40 × 40): wind on all of it moves what is free, and not what holds it."""
-    place = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), axis=-1).reshape(-1, 2) / side
-    number = np.arange(side * side).reshape(side, side)
-    pairs = np.concatenate(
-        [np.stack([number[1:], number[:-1]], -1).reshape(-1, 2), np.stack([number[:, 1:], number[:, :-1]], -1).reshape(-1, 2)]
-    )
-    corners = [0, side - 1]
-    net = sw.Springs(pairs, stiffness=50.0, rest=1.0 / side, fixed=corners)
-    wind = np.ones_like(place)
-    run = sw.integrate(net, "leapfrog", v=0.0, y=place, dt=0.01, steps=5, force=wind, backend=backend)
-    assert np.array_equal(run.y[-1][corners], place[corners])
-    assert np.array_equal(run.v[-1][corners], np.zeros((2, 2)))
-    assert (np.delete(run.y[-1], corners, axis=0) > np.delete(place, corners, axis=0)).all()
-    world = sw.World(net, "leapfrog", v=np.zeros_like(place), y=place.copy(), dt=0.01, force=wind.copy())
-    for _ in range(5):
-        world.step(1)
-    assert np.array_equal(world.y, run.y[-1])
