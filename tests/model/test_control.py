@@ -1,9 +1,10 @@
-"""Energy control: its two forms, their limits, how they decay, and that they keep every promise that a run makes."""
+"""Energy control and projections: their forms and limits, how energies decay, by fixed and chosen steps, and by PEFRL."""
 
 from __future__ import annotations
 
 import itertools
 import math
+import re
 import warnings
 from typing import Any
 
@@ -11,16 +12,25 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, UnknownNameError, UnsupportedError
+from stepwell.reference import adaptive
+from stepwell.reference.acceptance import Acceptance
 from stepwell.runs import engine
 from stepwell.runs.engine.plan import per_step
+from support import own_systems as own
 from support.cases import assert_same
-from support.families import family
+from support.looped import looped
+from support.ways import assert_equal_ways
 
 FORMS = ("limited", "printed")
 FORCES = ("logarithmic", "newton", "printed")
 STEPPED = [m.name for m in sw.methods() if m.carry is None]
-#: More bodies than this make a series too long for one tape, which is refused.
-MOST_IN_SERIES = 8
+ABLE = [m.name for m in sw.methods() if m.error_order is not None and not m.has_series]  # a series is not pushed within a step
+CONTROLS: dict[str, Any] = {
+    "limited": sw.EnergyControl(0.7),
+    "printed": sw.EnergyControl(0.7, "printed", target=0.1),
+    "scaling": sw.Projection(),
+    "nacozy": sw.Projection("nacozy"),
+}
 
 #: Appendix D: places of the clover, thrown outward, the third a little aside.
 CORNERS = np.radians([210.0, 330.0, 90.0])
@@ -53,8 +63,7 @@ def circle(off: float = 0.0) -> tuple[sw.NBody, dict[str, Any]]:
 
 
 @pytest.mark.filterwarnings("ignore::stepwell.AccuracyWarning")  # no step of 0.01 follows the encounters
-@pytest.mark.parametrize("method", ["standard_euler", "false_euler"])
-@pytest.mark.parametrize("force", FORCES)
+@looped("force, method", itertools.product(FORCES, ["standard_euler", "false_euler"]))
 def test_the_limited_form_stays_finite_in_all_36_runs(force: str, method: str) -> None:
     """100 000 steps; the velocities are at most doubled in a step, and no gain makes the form overshoot."""
     control = sw.EnergyControl(GAINS)
@@ -105,8 +114,7 @@ def test_a_gain_that_overshoots_is_warned_of_in_the_printed_form_only() -> None:
 # ---- what it does
 
 
-@pytest.mark.parametrize("method", STEPPED)
-@pytest.mark.parametrize("form", FORMS)
+@looped("form, method", itertools.product(FORMS, STEPPED))
 def test_the_energy_decays_as_it_should(form: str, method: str) -> None:
     """dE/dt = −C·ΔE·Σmv² = −2CK·ΔE, with K the circle's to 1e-3: over a time with 2CKt = 1 to 1/e."""
     system, start = circle(1e-3)
@@ -120,7 +128,7 @@ def test_the_energy_decays_as_it_should(form: str, method: str) -> None:
     assert left == pytest.approx(math.exp(-1.0), rel=2e-3)
 
 
-@pytest.mark.parametrize("method", STEPPED)
+@looped("method", STEPPED)
 def test_both_forms_agree_to_first_order(method: str) -> None:
     """g = hC·ΔE in one, hC·ΔE·(1 + O(hCK) + O(hCΔE)) in the other: halving the gain takes three quarters of the difference."""
     target = float(sw.NBody().energy(START["v"], START["y"])) - 0.3
@@ -138,9 +146,7 @@ def test_both_forms_agree_to_first_order(method: str) -> None:
     assert apart[0] / apart[1] == pytest.approx(4.0, rel=0.01)
 
 
-@pytest.mark.parametrize("method", STEPPED)
-@pytest.mark.parametrize("force", FORCES)
-@pytest.mark.parametrize("form", FORMS)
+@looped("method, force, form", zip(STEPPED, itertools.cycle(FORCES), itertools.cycle(FORMS)))
 def test_no_gain_no_change(form: str, force: str, method: str) -> None:
     """g is 0 then, and dv − 0·v is dv."""
     free = sw.integrate(sw.NBody(force=force), method, **START, dt=0.01, steps=50, every=7)
@@ -185,8 +191,7 @@ def test_momentum_decays_with_the_velocities() -> None:
 # ---- what every run promises
 
 
-@pytest.mark.parametrize("method", STEPPED)
-@pytest.mark.parametrize("form", FORMS)
+@looped("form, method", itertools.product(FORMS, ["false_euler", "rk4", "rodas4", "pefrl", "taylor"]))
 def test_a_gain_for_each_member_equals_single_runs(form: str, method: str) -> None:
     gains, targets = np.geomspace(1e-3, 30.0, 11), np.linspace(2.5, 3.5, 11)
     control = sw.EnergyControl(gains, form, target=targets)
@@ -200,49 +205,34 @@ def test_a_gain_for_each_member_equals_single_runs(form: str, method: str) -> No
         assert one.first_bad_step == batch.first_bad_step[i]
 
 
-SIZES = [(3, 2, 1), (3, 2, 13), (2, 3, 5), (9, 3, 9), (40, 2, 1), (40, 3, 3)]
-TURNS = {turn: i for i, turn in enumerate(itertools.product(SIZES, FORMS, FORCES))}
+def bodies(n: int, members: int = 5, dim: int = 2, force: str = "newton") -> tuple[sw.NBody, dict[str, Any]]:
+    rng = np.random.default_rng(n)
+    v, y = rng.normal(size=(2, n, dim, members))
+    return sw.NBody(np.ones(n) / n, force=force, softening=0.3), {"v": v, "y": y}
 
 
-def takes_its_turn(size: tuple[int, int, int], form: str, force: str, method: str) -> bool:
-    """By default two methods for each of the others, which take turns."""
-    return (TURNS[size, form, force] - STEPPED.index(method)) % len(STEPPED) < 2
+@pytest.mark.parametrize("control", CONTROLS)
+def test_fixed_steps_have_the_same_bits_in_every_way(control: str) -> None:
+    """On one tape and row by row; in pieces the target is the energy of the very first start, not that of the piece's."""
+    for (n, dim, method), force in zip(
+        [(2, 2, "taylor"), (3, 2, "rodas4"), (3, 3, "pefrl"), (9, 3, "rk4"), (40, 2, "false_euler"), (40, 3, "rk4")],
+        itertools.cycle(FORCES),
+        strict=False,
+    ):
+        system, start = bodies(n, dim=dim, force=force)
+        options: dict[str, Any] = {"dt": 0.01, "steps": 12, "every": 5, "control": CONTROLS[control]}
+        assert_equal_ways(system, method, **start, **options, ways=("by the reference", "alone", "in pieces", "in a world"))
 
 
-@pytest.mark.parametrize(
-    ("size", "form", "force", "method"),
-    family(itertools.product(SIZES, FORMS, FORCES, STEPPED), takes_its_turn),
-)
-def test_both_backends_agree_to_the_bit(size: tuple[int, int, int], form: str, force: str, method: str) -> None:
-    """In batches of one and more, and alone."""
-    bodies, dim, members = size
-    if sw.method(method).has_derivatives and bodies > MOST_IN_SERIES:
-        pytest.skip("a series of so many bodies is refused, and the reference of an implicit step goes number by number")
-    rng = np.random.default_rng([bodies, dim, members])
-    system = sw.NBody(rng.uniform(0.5, 2.0, bodies) / bodies, force=force, softening=0.1)
-    v, y = rng.normal(size=(2, bodies, dim, members))
-    control = sw.EnergyControl(rng.uniform(0.0, 3.0, members), form, target=rng.normal(size=members))
-    options: dict[str, Any] = {"dt": 0.01, "steps": 12, "every": 5}
-    runs = [quiet(system, method, v=v, y=y, **options, control=control, backend=name) for name in ("rust", "numpy")]
-    assert_same(*runs)
-    alone = sw.EnergyControl(0.7, form)
-    runs = [quiet(system, method, v=v[..., 0], y=y[..., 0], **options, control=alone, backend=name) for name in ("rust", "numpy")]
-    assert_same(*runs)
-
-
-@pytest.mark.parametrize("method", STEPPED)
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("members", [None, 5])
-def test_a_run_in_pieces_goes_on_to_the_bit(members: int | None, form: str, method: str) -> None:
-    """The target is the energy of the very first start, and the gain that of its kinetic energy, not those of the piece's."""
-    start = START if members is None else spread(members, **START)
-    control = sw.EnergyControl(relative=0.3 if members is None else np.linspace(0.1, 0.9, members), form=form)
-    whole = sw.integrate(sw.NBody(), method, **start, dt=0.01, steps=100, every=10, control=control)
-    first = sw.integrate(sw.NBody(), method, **start, dt=0.01, steps=40, every=10, control=control)
-    rest = sw.integrate(sw.NBody(), method, resume=first, dt=0.01, steps=60, every=10)
-    np.testing.assert_array_equal(whole.v[4:], rest.v)
-    np.testing.assert_array_equal(whole.y[4:], rest.y)
-    np.testing.assert_array_equal(whole.t[4:], rest.t)
+def test_the_gain_of_a_run_in_pieces_is_that_of_its_first_kinetic_energy() -> None:
+    for form, members in itertools.product(FORMS, (None, 5)):
+        start = START if members is None else spread(members, **START)
+        control = sw.EnergyControl(relative=0.3 if members is None else np.linspace(0.1, 0.9, members), form=form)
+        whole = sw.integrate(sw.NBody(), "rk4", **start, dt=0.01, steps=100, every=10, control=control)
+        first = sw.integrate(sw.NBody(), "rk4", **start, dt=0.01, steps=40, every=10, control=control)
+        rest = sw.integrate(sw.NBody(), "rk4", resume=first, dt=0.01, steps=60, every=10)
+        for name in ("v", "y", "t"):
+            np.testing.assert_array_equal(getattr(whole, name)[4:], getattr(rest, name))
 
 
 def test_the_control_that_is_given_is_not_changed() -> None:
@@ -258,8 +248,7 @@ def test_the_control_that_is_given_is_not_changed() -> None:
 # ---- projection
 
 
-@pytest.mark.parametrize("method", STEPPED)
-@pytest.mark.parametrize("force", FORCES)
+@looped("method, force", zip(STEPPED, itertools.cycle(FORCES)))
 def test_scaling_keeps_the_energy_to_rounding(force: str, method: str) -> None:
     """E is a sum of six terms below 10 in size: some roundings of 1e-15 each. Methods of order up to 5 leave it by more alone."""
     options: dict[str, Any] = {"dt": 0.01, "steps": 100, "every": 1}
@@ -269,52 +258,278 @@ def test_scaling_keeps_the_energy_to_rounding(force: str, method: str) -> None:
     assert alone > 4e-13 or sw.method(method).order > 5
 
 
-@pytest.mark.parametrize("method", STEPPED)
+@looped("method", STEPPED)
 def test_nacozys_way_is_one_step_of_newton(method: str) -> None:
     """What is left of a step's error ε is of second order in it: after every step below ε², with ε ≤ h²·|a|²·3 < 1e-3 here."""
     run = sw.integrate(sw.NBody(), method, **START, dt=0.01, steps=50, every=1, control=sw.Projection("nacozy"))
     assert np.ptp(run.energy) < 1e-6
 
 
-@pytest.mark.parametrize("method", STEPPED)
-@pytest.mark.parametrize("way", ["scaling", "nacozy"])
-@pytest.mark.parametrize("bodies", [2, 3, 20])
-def test_projections_keep_the_promises(bodies: int, way: str, method: str) -> None:
-    """The same by both backends, in a batch and alone, in one piece and in two."""
-    if sw.method(method).has_derivatives and bodies > MOST_IN_SERIES:
-        pytest.skip("a series of so many bodies is refused, and the reference of an implicit step goes number by number")
-    rng = np.random.default_rng(bodies)
-    system = sw.NBody(np.ones(bodies) / bodies, force="newton", softening=0.1)
-    v, y = rng.normal(size=(2, bodies, 2, 5))
-    options: dict[str, Any] = {"dt": 0.01, "every": 5}
-    batch = sw.integrate(system, method, v=v, y=y, **options, steps=20, control=sw.Projection(way))
-    assert_same(batch, sw.integrate(system, method, v=v, y=y, **options, steps=20, control=sw.Projection(way), backend="numpy"))
-    one = {"v": v[..., 3], "y": y[..., 3]}
-    alone = sw.integrate(system, method, **one, **options, steps=20, control=sw.Projection(way))
-    np.testing.assert_array_equal(alone.y, batch.y[..., 3])
-    first = sw.integrate(system, method, **one, **options, steps=10, control=sw.Projection(way))
-    rest = sw.integrate(system, method, resume=first, **options, steps=10)
-    np.testing.assert_array_equal(alone.y[2:], rest.y)
+# ---- with a tolerance
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_chosen_steps_have_the_same_bits_in_every_way(control: str) -> None:
+    """On one tape and row by row; the work is told, too, and that of two pieces is that of the whole."""
+    for n, method in ((2, "rodas5p"), (3, "merson"), (6, "dop853"), (9, "fehlberg_5"), (20, "fehlberg")):
+        system, start = bodies(n)
+        ask: dict[str, Any] = {"tolerance": 1e-5, "control": CONTROLS[control]}
+        ways = ("by the reference", "alone", "in pieces", "saved more often")
+        whole = assert_equal_ways(system, method, **start, **ask, at=np.array([0.3, 0.7]), ways=ways)
+        reference = sw.integrate(system, method, **start, at=[0.3, 0.7], **ask, backend="numpy")
+        np.testing.assert_array_equal(whole.work, reference.work)  # type: ignore[arg-type]
+        first = sw.integrate(system, method, **start, at=[0.3], **ask)
+        rest = sw.integrate(system, method, at=[0.7], resume=first)
+        assert first.work + rest.work == pytest.approx(whole.work, rel=1e-12, abs=1e-15)  # type: ignore[operator]
+        if n < 4:
+            assert_equal_ways(system, method, **start, **ask, at=np.array([0.7]), fused=True, ways=("by the reference",))
+
+
+@looped("method, way", itertools.product(ABLE, ["scaling", "nacozy"]))
+def test_a_projection_keeps_the_energy_of_every_saved_state(method: str, way: str) -> None:
+    """Also at output times, which a step of their own reaches. Free the same tolerance lets it drift."""
+    eight = sw.scenes.figure_eight()
+    ask: dict[str, Any] = {"v": eight.v, "y": eight.y, "tolerance": 1e-4, "at": np.linspace(1.0, 30.0, 13)}
+    run, free = (sw.integrate(eight.system, method, **ask, control=each) for each in (sw.Projection(way), None))
+    # Scaling: a few roundings of sums of some ten numbers of size 1. Nacozy: the square of a step's energy error of some 1e-4.
+    assert np.ptp(run.energy) < (1e-14 if way == "scaling" else 1e-7)
+    assert np.ptp(free.energy) > 1e-5
+    assert free.work is None
+    # What the steps did to the energy the projections took back.
+    assert run.work is not None
+    assert abs(run.work) > 1e-6
+
+
+@looped("method, form", itertools.product(ABLE, FORMS))
+def test_the_energy_decays_as_it_should_with_a_tolerance(method: str, form: str) -> None:
+    """dE/dt = −2CK·ΔE on a circle with K to 1e-3: over a time with 2CKt = 1 to 1/e.
+
+    The limited form takes the step of the attempt: its rate is 1/(1 + 2hCK) of that, and 2CK = 1. With the step 1 to which
+    systems are scaled for adaptive steps it would be half of it, e^−½.
+    """
+    system, start = circle(1e-3)
+    target = -0.125
+    control = sw.EnergyControl(1.0 / (2.0 * 0.125), form, target=target)
+    run = sw.integrate(system, method, **start, tolerance=1e-9, at=[1.0], control=control)
+    assert run.paces is not None
+    step = 1.2 * float(run.paces.h) if form == "limited" else 0.0  # steps hardly change on a circle
+    left = (run.energy[-1] - target) / (system.energy(**start) - target)
+    assert math.exp(-1.0) * (1.0 - 2e-3) < left < math.exp(-1.0 / (1.0 + step)) * (1.0 + 2e-3) < 0.55
+    # The push counts alike in all stages, which have other weights in the result, and decays by a sixth within the longest steps.
+    assert run.work == pytest.approx(run.energy[-1] - system.energy(**start), rel=0.1)
+
+
+@looped("control", [sw.Control("energy", 0.5), sw.Control("energy", 0.5, "printed"), sw.Projection("energy")])
+def test_invariants_of_own_systems_with_a_tolerance(control: Any) -> None:
+    """The invariant of a pendulum, kept from where it starts, or approached; by both backends."""
+    runs = [
+        sw.integrate(
+            own.pendulum(), "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[5.0, 20.0], control=control, backend=backend
+        )
+        for backend in ("rust", "numpy")
+    ]
+    assert_same(*runs)
+    free = sw.integrate(own.pendulum(), "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[5.0, 20.0])
+    start = own.pendulum().for_state_shapes(0.0, 0.0).energy(np.zeros(2), np.array([1.0, 2.0]))
+    assert (abs(runs[0].energy - start).max() < 0.2 * abs(free.energy - start).max()).all()
+
+
+def test_a_relative_gain_needs_a_step() -> None:
+    system, start = bodies(3)
+    with pytest.raises(UnsupportedError, match=r"tolerance: EnergyControl\(relative=.* give gain in place of relative"):
+        sw.integrate(system, "merson", **start, tolerance=1e-3, at=[1.0], control=sw.EnergyControl(relative=0.1))
+    with pytest.raises(UnsupportedError, match=r"tolerance: LengthControl.* relative to steps of fixed length"):
+        sw.integrate(system, "merson", **start, tolerance=1e-3, at=[1.0], control=sw.LengthControl(0.5))
+
+
+def test_a_constraint_of_its_own_is_kept_by_the_same_projection() -> None:
+    """The reference of a system that projects onto its own constraint: accepted states are on it, rejected ones are not taken."""
+
+    class Wheel:
+        def dv(self, t: Any, v: Any, y: Any) -> Any:
+            return -(v * v).sum(axis=0) * y
+
+        def dy(self, t: Any, v: Any, y: Any) -> Any:
+            return v
+
+        def project(self, v: Any, y: Any) -> Any:
+            y = y / np.sqrt((y * y).sum(axis=0))
+            return v - (v * y).sum(axis=0) * y, y
+
+    merson: Any = sw.method("merson").steps
+    v, y = np.array([0.0, 1.0]), np.array([1.0, 0.0])
+    samples = math.inf, -math.inf
+    pace = adaptive.begin(Wheel(), adaptive.waiting(0.0, 0.5, (1e-3, 0.0, 1.0), samples), v, y, (1, 1))
+    pace = pace._replace(target=np.array(10.0))
+    system = adaptive.Attempted(Wheel())
+    tried = 0
+    while pace.t < 9.0:
+        before = y
+        pace, v, y = adaptive.attempt(merson, system, 5, (1, 1), Acceptance(), pace, 1000, v, y)
+        tried += 1
+        assert np.hypot(*y) == pytest.approx(1.0, abs=1e-15)
+        assert v @ y == pytest.approx(0.0, abs=1e-15)
+        assert (before == y).all() == (float(pace.accepted + pace.rejected) == tried and float(pace.error) > 1.0)
+    assert pace.work == 0.0
+    assert math.atan2(y[1], y[0]) == pytest.approx(math.remainder(float(pace.t), 2 * math.pi), abs=0.02)
+
+
+# ---- PEFRL
+
+
+def test_pefrl_pushes_between_steps() -> None:
+    """One step by hand: the free step, and then v less g·v, with g of the energies where it ends."""
+    system, start = bodies(3, 1)
+    v, y = start["v"][..., 0], start["y"][..., 0]
+    target, h, gain = 0.3, 0.05, 0.9
+    free = sw.integrate(system, "pefrl", v=v, y=y, dt=h, steps=1)
+    energy, kinetic = system.energy(free.v[-1], free.y[-1]), system.kinetic(free.v[-1])
+    control = sw.EnergyControl(gain, target=target)
+    for form, g in (
+        ("printed", h * gain * (energy - target)),
+        ("limited", 1.0 - math.sqrt(1.0 - 2 * h * gain * (energy - target) / (1.0 + 2 * h * gain * kinetic))),
+    ):
+        control = sw.EnergyControl(gain, form, target=target)
+        run = sw.integrate(system, "pefrl", v=v, y=y, dt=h, steps=1, control=control)
+        np.testing.assert_array_equal(run.y, free.y)
+        np.testing.assert_allclose(run.v, (1.0 - g) * free.v, rtol=1e-14)
+        assert run.work == pytest.approx(((1.0 - g) ** 2 - 1.0) * kinetic, rel=1e-12)
+    assert not control.between  # the control that was given is not changed
+
+
+def test_pefrl_keeps_its_order_under_control() -> None:
+    """A control at the energy of the start pushes by what the step erred, h⁵, and not by the h of stages with v and y apart."""
+    eight = sw.scenes.figure_eight()
+    errors = []
+    for steps in (200, 400):
+        run = eight.run("pefrl", eight.period / steps, steps=steps, control=sw.EnergyControl(1.0))
+        errors.append(eight.state_error(run)[-1])
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.4)
+
+
+def test_a_control_is_that_of_the_method_that_goes_on() -> None:
+    """By PEFRL between steps, by Runge-Kutta 4 in its stages, also where one goes on from the other."""
+    system, start = bodies(3)
+    first = sw.integrate(system, "pefrl", **start, dt=0.01, steps=5, control=sw.EnergyControl(0.5))
+    rest = sw.integrate(system, "rk4", steps=5, resume=first)
+    control = sw.EnergyControl(0.5, target=first.system.keeper.target)  # type: ignore[union-attr]
+    anew = sw.integrate(system, "rk4", v=first.v[-1], y=first.y[-1], dt=0.01, t0=0.0, start_step=5, steps=5, control=control)
+    np.testing.assert_array_equal(rest.y, anew.y)
+
+
+def test_a_world_and_an_explanation_of_pefrl_under_control() -> None:
+    system, start = bodies(3)
+    control = sw.EnergyControl(0.5, target=0.2)
+    run = sw.integrate(system, "pefrl", **start, dt=0.01, steps=7, control=control)
+    world = sw.World(system, "pefrl", v=start["v"].copy(), y=start["y"].copy(), dt=0.01, control=control)
+    world.step(7)
+    np.testing.assert_array_equal(world.y, run.y[-1])
+    assert "work" in str(sw.explain(system.for_state_shapes(start["v"], start["y"]), "pefrl", control=control).listing)
+
+
+# ---- when h·C·K passes 1
+
+
+def test_a_control_that_begins_to_overshoot_is_told_of_when_it_does() -> None:
+    """On an ellipse of e = 0.9 K is 9.5 where the bodies are nearest and 0.026 where they begin: h·C·K passes 1 on the way."""
+    system = sw.NBody([1.0, 0.0], force="newton")
+    v, y = np.array([[0.0, 0.0], [0.0, math.sqrt(1.0 / 19.0)]]), np.array([[0.0, 0.0], [1.9, 0.0]])
+    system = sw.NBody([1.0, 1e-9], force="newton")
+    kinetic = 0.5e-9 * v[1, 1] ** 2
+    gain = 0.02 / (0.001 * kinetic)
+    options: dict[str, Any] = {"v": v, "y": y, "dt": 0.001, "steps": 3300, "control": sw.EnergyControl(gain, "printed")}
+    whole = sw.integrate(system, "rk4", **options | {"control": sw.EnergyControl(0.0)}, every=1)
+    strength = 0.001 * gain * np.array([system.kinetic(state) for state in whole.v])
+    first = int(np.argmax(strength >= 1.0))
+    assert 0 < first < 3200
+    options["steps"] = first + 20
+    for every in (None, 10):
+        with pytest.warns(sw.ControlWarning, match=re.escape("gain: h·C·K = 1")) as warned:
+            sw.integrate(system, "rk4", **options, every=every)
+        # The control has hardly changed the orbit by then.
+        step = int(re.search(r"at step (\d+)", str(warned[0].message))[1])  # type: ignore[index]
+        assert abs(step - first) <= 3
+    sw.integrate(system, "rk4", **options | {"steps": first - 20}, every=10)  # no warning, which would be an error
+    sw.integrate(system, "rk4", **options | {"control": sw.EnergyControl(gain)}, every=10)  # nor in the limited form
+
+
+def test_what_is_refused_names_what_to_do() -> None:
+    system, start = bodies(3)
+    with pytest.raises(UnsupportedError, match="control: leapfrog carries v_half in place of v"):
+        sw.integrate(system, "leapfrog", **start, dt=0.1, steps=1, control=sw.Projection())
+    with pytest.raises(UnsupportedError, match="pefrl needs a second-order system"):
+        sw.integrate(own.pendulum(), "pefrl", v=0.0, y=1.0, dt=0.1, steps=1, control=sw.Control("energy", 1.0))
+    run = sw.integrate(own.pendulum(), "pefrl", v=0.0, y=1.0, dt=0.1, steps=300, every=1, control=sw.Projection("energy"))
+    assert np.ptp(run.energy) < 1e-9
+    with pytest.raises(ArgumentError, match="control"):
+        sw.integrate(own.pendulum(), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0], control=sw.Projection("momentum"))
+
+
+# ---- at rest
+
+
+def _one_place(n: int) -> tuple[sw.NBody, dict[str, Any]]:
+    return sw.NBody(np.ones(n), force="newton", softening=0.1), {"v": np.zeros((n, 2)), "y": np.ones((n, 2))}
+
+
+AT_REST: dict[str, tuple[Any, dict[str, Any], str]] = {
+    "own pendulum": (own.pendulum(), {"v": 0.0, "y": 0.0}, "energy"),
+    "aircraft": (sw.Aircraft(), {"v": np.zeros(3), "y": np.zeros(3)}, "energy"),
+    "springs": (sw.Springs([(0, 1)], rest=1.0), {"v": np.zeros((2, 2)), "y": np.array([[0.0, 0.0], [1.0, 0.0]])}, "nacozy"),
+    "bodies, scaled": (*_one_place(3), "scaling"),
+    "bodies": (*_one_place(3), "nacozy"),
+    "bodies, row by row, scaled": (*_one_place(40), "scaling"),
+    "bodies, row by row": (*_one_place(40), "nacozy"),
+}
+
+
+@looped("case, fixed", itertools.product(AT_REST, [True, False]))
+def test_a_projection_leaves_a_state_at_rest_as_it_is(case: str, fixed: bool) -> None:
+    """No velocity to scale and no gradient to go along: 0/0. Nothing is added, also where the target is out of reach.
+
+    With a tolerance no step from rest is longer than a 32nd of the time so far: there are a hundred to 2e-4.
+    """
+    system, start, way = AT_REST[case]
+    ask: dict[str, Any] = {"dt": 0.1, "steps": 20} if fixed else {"tolerance": 1e-5, "at": [1e-4, 2e-4]}
+    reach = float(np.asarray(sw.integrate(system, "rk4", **start, dt=0.1, steps=1, control=sw.Projection(way)).energy)[-1])
+    for target in (None, reach + 1.0) if fixed or "row" not in case else (reach + 1.0,):
+        control = sw.Projection(way, target=target)
+        for backend in ("rust", "numpy"):
+            run = sw.integrate(system, "rk4" if fixed else "merson", **start, **ask, control=control, backend=backend)
+            assert not np.any(run.status)
+            np.testing.assert_array_equal(run.y[-1], start["y"])
+            np.testing.assert_array_equal(run.v[-1], start["v"])
+            assert run.work == 0.0
+
+
+def test_members_at_rest_leave_the_others_as_they_are() -> None:
+    options: dict[str, Any] = {"dt": 0.1, "steps": 50, "control": sw.Projection("energy")}
+    alone = sw.integrate(own.pendulum(), "false_heun", v=0.0, y=1.0, **options)
+    both = sw.integrate(own.pendulum(), "false_heun", v=0.0, y=[0.0, 1.0], **options)
+    assert both.y[-1, 0] == 0.0
+    assert both.y[-1, 1] == alone.y[-1]
 
 
 # ---- what is refused
 
 
-@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.carry is not None])
-@pytest.mark.parametrize("control", [sw.EnergyControl(0.3), sw.Projection(), sw.Projection("nacozy")])
+@looped(
+    "method, control",
+    itertools.product([m.name for m in sw.methods() if m.carry is not None], [sw.EnergyControl(0.3), CONTROLS["scaling"]]),
+)
 def test_methods_that_go_on_without_a_velocity_are_refused(method: str, control: Any) -> None:
     with pytest.raises(UnsupportedError, match=rf"control: {method} carries (y_prev|v_half) in place of v.*use pefrl"):
         sw.integrate(sw.NBody(), method, **START, dt=0.01, steps=1, control=control)
 
 
-@pytest.mark.parametrize("system", [sw.Oscillator(), sw.Chain(3)], ids=["oscillator", "chain"])
+@looped("system", [sw.Oscillator(), sw.Chain(3)])
 def test_other_systems_are_refused(system: sw.System) -> None:
     with pytest.raises(UnsupportedError, match="control"):
         sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.01, steps=1, control=sw.EnergyControl(0.3))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
+@looped(
+    "arguments, error, message",
     [
         ({}, ArgumentError, "expected one of them, got neither"),
         ({"gain": 1.0, "relative": 1.0}, ArgumentError, "expected one of them, got both"),
@@ -338,7 +553,7 @@ def test_what_a_run_cannot_use_is_named() -> None:
         sw.integrate(sw.NBody(), "rk4", v=0.0, y=OUT, dt=0.01, steps=1, control=sw.EnergyControl(relative=0.1))
 
 
-@pytest.mark.parametrize("argument", ["gain", "relative", "target"])
+@looped("argument", ["gain", "relative", "target"])
 def test_what_is_given_per_member_makes_a_batch_or_must_fit_one(argument: str) -> None:
     values = np.array([0.1, 0.2, 0.3])
     control = sw.EnergyControl(**({"gain": 1.0} if argument == "target" else {}), **{argument: values})
