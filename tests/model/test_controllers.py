@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import pickle
 from typing import Any
 
@@ -21,7 +22,9 @@ from support.abroad import Journey, run
 from support.export import assert_same as assert_same_bits
 from support.export import languages
 from support.graphs import assert_one_graph
+from support.looped import looped
 from support.own_methods import adams_bashforth_2
+from support.ways import assert_equal_ways
 
 
 @sw.system
@@ -62,7 +65,6 @@ GAINS = np.array([0.5, 1.0, 2.0])
 TIMES = [(1, 0), (1, 1), (1, 3), (10, 0), (10, 10), (10, 30), (10, 3), (10, 13), (4, 7)]
 #: Methods of all kinds that carry v.
 METHODS = ["false_euler", "standard_heun", "rk4", "dop853", "taylor", "implicit_midpoint", "rodas4", "rosenbrock23"]
-WAYS: list[dict[str, Any]] = [{}, {"fused": True}, {"dtype": "float32"}, {"fused": True, "dtype": "float32"}]
 STATE: dict[str, Any] = {"v": np.zeros((2, 3)), "y": np.array([[1.0, 0.5, 0.2], [0.1, 1.0, 2.0]])}
 
 
@@ -110,34 +112,42 @@ def assert_same(one: sw.Run, other: sw.Run) -> None:
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), strict=True)
 
 
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize(("period", "delay"), TIMES)
-def test_it_is_the_loop_that_users_write_over_a_world(period: int, delay: int, backend: str) -> None:
-    np.testing.assert_array_equal(run_of(loop(period, delay), backend=backend).y[1:], by_hand(period, delay, 97))
+@looped("period, delay", TIMES)
+def test_it_is_the_loop_that_users_write_over_a_world(period: int, delay: int) -> None:
+    for backend in ("rust", "numpy"):
+        np.testing.assert_array_equal(run_of(loop(period, delay), backend=backend).y[1:], by_hand(period, delay, 97))
 
 
-@pytest.mark.parametrize("wrong", [(11, 13), (9, 13), (10, 12), (10, 14)])
-def test_a_period_or_delay_that_is_off_by_a_step_is_another_motion(wrong: tuple[int, int]) -> None:
-    assert not np.array_equal(run_of(loop(*wrong)).y[1:], by_hand(10, 13, 97))
+@looped("period, delay", [(11, 13), (9, 13), (10, 12), (10, 14)])
+def test_a_period_or_delay_that_is_off_by_a_step_is_another_motion(period: int, delay: int) -> None:
+    assert not np.array_equal(run_of(loop(period, delay)).y[1:], by_hand(10, 13, 97))
 
 
-@pytest.mark.parametrize(("period", "delay"), [(4, 0), (4, 4), (4, 7)])
-@pytest.mark.parametrize("method", METHODS)
-def test_core_and_reference_have_equal_bits(method: str, period: int, delay: int) -> None:
-    for way in WAYS:
-        if way.get("dtype") == "float32" and method == "taylor":
-            continue
-        options = {"dt": 0.05, "steps": 21, "every": 3, **way}
-        runs = [sw.integrate(loop_of_two(period, delay), method, **STATE, **options, backend=each) for each in ("rust", "numpy")]
-        assert np.isfinite(runs[0].y).all()
-        assert_same(*runs)
+@looped(
+    "method, delay, numbers",
+    [
+        ("false_euler", 4, {"fused": True, "dtype": "float32"}),
+        ("standard_heun", 7, {}),
+        ("rk4", 0, {"fused": True}),
+        ("dop853", 7, {"dtype": "float32"}),
+        ("taylor", 4, {}),
+        ("implicit_midpoint", 0, {"dtype": "float32"}),
+        ("rodas4", 7, {}),
+        ("rosenbrock23", 4, {"fused": True}),
+        (adams_bashforth_2, 7, {}),
+        (adams_bashforth_2, 0, {"dtype": "float32"}),
+    ],
+)
+def test_it_has_the_same_bits_in_every_way(method: Any, delay: int, numbers: dict[str, Any]) -> None:
+    """What it remembers goes along with a run, its file and its world; a method may keep blocks beside it."""
+    run = assert_equal_ways(loop_of_two(4, delay), method, **STATE, dt=0.05, steps=21, every=3, **numbers)
+    assert np.isfinite(run.y).all()
 
 
-@pytest.mark.parametrize(("period", "delay"), [(4, 0), (4, 7)])
-@pytest.mark.parametrize("method", [*METHODS, adams_bashforth_2])
-def test_a_step_is_one_graph(method: Any, period: int, delay: int) -> None:
+@looped("method, delay", itertools.product([*METHODS, adams_bashforth_2], [0, 7]))
+def test_a_step_is_one_graph(method: Any, delay: int) -> None:
     single: dict[str, Any] = {"v": np.zeros(2), "y": np.ones(2), "dt": 0.05, "steps": 1}
-    plan = Request.of(loop_of_two(period, delay), method, Options(**single)).plan
+    plan = Request.of(loop_of_two(4, delay), method, Options(**single)).plan
     tape = _core.Tape()
     core = tape.trace(engine.model(plan), "step")
     assert_one_graph(tape, core, Tracer(plan.system, tape).step(plan.method))
@@ -152,7 +162,7 @@ def test_what_it_sets_has_no_derivative_in_a_step() -> None:
     np.testing.assert_allclose(ends[1], ends[2], rtol=1e-9)
 
 
-@pytest.mark.parametrize("samples", [0, 1, 3])
+@looped("samples", [0, 1, 3])
 def test_without_saturation_it_is_the_loop_of_samples(samples: int) -> None:
     """``sampled_loop`` has the exact solution of the plant between samples; a series of order 25 is exact but for rounding."""
     plant = sw.LinearSystem([[-0.4, 0.0], [1.0, 0.0]], [[4.0], [0.0]], [[0.0, 1.0]], x=0.0)
@@ -165,55 +175,6 @@ def test_without_saturation_it_is_the_loop_of_samples(samples: int) -> None:
     for k in range(51):
         np.testing.assert_allclose(run.y[k], state[:2], rtol=0.0, atol=2e-12)
         state = steps.P @ state
-
-
-def test_threads_and_the_batch_do_not_matter() -> None:
-    gain = np.linspace(0.1, 4.0, 20_011)
-    runs = [run_of(loop(7, 9, gain=gain), 60, every=60, threads=threads) for threads in (1, 2, 3)]
-    assert_same(runs[0], runs[1])
-    assert_same(runs[0], runs[2])
-    for k in (0, 7, 20_010):
-        alone = run_of(loop(7, 9, gain=gain[k]), 60, every=60)
-        assert alone.y[-1] == runs[0].y[-1, k]
-
-
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-@pytest.mark.parametrize(("period", "delay"), [(10, 0), (10, 13)])
-def test_a_run_in_parts_is_the_same(period: int, delay: int, dtype: str, backend: str) -> None:
-    system, options = loop(period, delay), {"dtype": dtype, "backend": backend}
-    whole, run = run_of(system, 60, **options), None
-    for steps in (1, 6, 13, 40):
-        run = run_of(system, steps, **options) if run is None else sw.integrate(system, "rk4", resume=run, steps=steps, every=1)
-    assert run is not None
-    np.testing.assert_array_equal(run.y[-1], whole.y[-1])
-    np.testing.assert_array_equal(run.carry, whole.carry)
-
-
-def test_a_method_that_keeps_blocks_goes_on_with_both() -> None:
-    system = loop(10, 13)
-    runs = [
-        sw.integrate(system, adams_bashforth_2, v=0.0, y=0.0, dt=0.01, steps=60, backend=backend) for backend in ("rust", "numpy")
-    ]
-    assert_same(*runs)
-    part = sw.integrate(system, adams_bashforth_2, v=0.0, y=0.0, dt=0.01, steps=23)
-    assert_same(sw.integrate(system, adams_bashforth_2, resume=part, steps=37), runs[0])
-    v, y = np.zeros(3), np.zeros(3)
-    world = sw.World(system, adams_bashforth_2, v=v, y=y, dt=0.01)
-    for steps in (1, 10, 12, 37):
-        world.step(steps)
-        world = copy.copy(world)
-    np.testing.assert_array_equal(world.y, runs[0].y[-1])
-
-
-def test_a_saved_run_goes_on(tmp_path: Any) -> None:
-    system = loop(10, 13)
-    run_of(system, 23).save(tmp_path / "run.npz")
-    again = sw.load(tmp_path / "run.npz")
-    assert again.system == run_of(system, 23).system
-    np.testing.assert_array_equal(sw.integrate(system, "rk4", resume=again, steps=37).y[-1], run_of(system, 60).y[-1])
-    again = pickle.loads(pickle.dumps(run_of(system, 23)))
-    np.testing.assert_array_equal(sw.integrate(system, "rk4", resume=again, steps=37).y[-1], run_of(system, 60).y[-1])
 
 
 def test_with_other_parameters_it_goes_on_with_what_it_remembers() -> None:
@@ -232,19 +193,20 @@ def test_with_other_parameters_it_goes_on_with_what_it_remembers() -> None:
     np.testing.assert_array_equal(anew.y, fresh.y)
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-@pytest.mark.parametrize(("period", "delay"), [(1, 0), (10, 0), (10, 13)])
-def test_a_world_is_the_same(period: int, delay: int, dtype: str) -> None:
-    v, y = np.zeros(3, dtype), np.zeros(3, dtype)
-    world = sw.World(loop(period, delay), "rk4", v=v, y=y, dt=0.01, dtype=dtype)
-    for _ in range(3):
-        for steps in (1, 6, 13):
+@looped("period, delay, method", [(1, 0, "rk4"), (10, 13, "rk4"), (10, 13, adams_bashforth_2)])
+def test_a_world_that_is_copied_or_goes_on_from_a_run_is_the_same(period: int, delay: int, method: Any) -> None:
+    system = loop(period, delay)
+    worlds = [
+        sw.World(system, method, v=np.zeros(3), y=np.zeros(3), dt=0.01),
+        sw.World(system, method, resume=run_of(system, 23, method)),
+    ]
+    worlds[0].step(23)
+    for copied in (copy.copy, copy.deepcopy, lambda world: pickle.loads(pickle.dumps(world))):
+        worlds = [copied(world) for world in worlds]
+        for world, steps in itertools.product(worlds, (1, 13)):
             world.step(steps)
-        world = pickle.loads(pickle.dumps(world))
-    np.testing.assert_array_equal(world.y, run_of(loop(period, delay), 60, dtype=dtype).y[-1])
-    resumed = sw.World(loop(period, delay), "rk4", resume=run_of(loop(period, delay), 23, dtype=dtype))
-    resumed.step(37)
-    np.testing.assert_array_equal(resumed.y, world.y)
+    for world in worlds:
+        np.testing.assert_array_equal(world.y, run_of(system, 65, method).y[-1])
 
 
 def test_a_push_in_a_world_is_seen_at_the_next_sample_and_forgets_nothing() -> None:
@@ -370,14 +332,7 @@ def test_a_long_step_is_one_tape() -> None:
     assert_same(*runs)
 
 
-@pytest.mark.parametrize(
-    "mistake",
-    [
-        {"last": 1.0},
-        {"waiting": 1},
-        {"later": -1.0},
-    ],
-)
+@pytest.mark.parametrize("mistake", [{"last": 1.0}, {"waiting": 1}, {"later": -1.0}])
 def test_a_reference_with_a_mistake_is_noticed(monkeypatch: pytest.MonkeyPatch, mistake: dict[str, float]) -> None:
     """A period that is a step too long, a result that waits a sample less, and one that is put out a step too soon."""
     right, system = sampled.Loop.step, loop(10, 13)
@@ -413,8 +368,7 @@ def test_its_period_is_found_by_the_nearest_whole_number_of_steps() -> None:
     assert part.over_steps(-0.1).timing == Timing(3, 2, 1)
 
 
-@pytest.mark.parametrize("samples", [0, 1, 3])
-@pytest.mark.parametrize("dt", [0.1, 0.2, 0.3])
+@looped("dt, samples", itertools.product([0.1, 0.2, 0.3], [0, 1, 3]))
 def test_near_a_state_it_is_the_loop_of_samples(dt: float, samples: int) -> None:
     plant = sw.LinearSystem([[-0.4, 0.0], [1.0, 0.0]], [[4.0], [0.0]], [[0.0, 1.0]], x=0.0)
     system = plant.surrounded(proportional(sets="x", period=dt, delay=samples * dt))
@@ -425,7 +379,7 @@ def test_near_a_state_it_is_the_loop_of_samples(dt: float, samples: int) -> None
         assert near.period == pytest.approx(dt)
 
 
-@pytest.mark.parametrize(("gain", "grows"), [(10.0, False), (14.0, False), (15.5, True), (20.0, True)])
+@looped("gain, grows", [(10.0, False), (14.0, False), (15.5, True), (20.0, True)])
 def test_a_loop_grows_where_its_radius_is_above_one(gain: float, grows: bool) -> None:
     """From both sides, by a controller with a delay between samples and a state; at rest it does not saturate."""
     system = mass().surrounded(limited(gain=gain, period=0.12, delay=0.06))
@@ -609,7 +563,7 @@ def bad_random(t: Any, v: Any, y: Any) -> Any:
     return y + np.random.default_rng().uniform()
 
 
-@pytest.mark.parametrize(("call", "error", "words"), WRONG)
+@looped("call, error, words", WRONG)
 def test_what_is_wrong_is_refused_before_any_work(call: Any, error: type[StepwellError], words: str) -> None:
     with pytest.raises(error, match=words):
         call()
