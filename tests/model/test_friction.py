@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -13,12 +14,14 @@ from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference import bits, friction
 from stepwell.views import charts
 from stepwell.views.charts.verlet_friction import secant_verlet
+from support.looped import looped
+from support.ways import assert_equal_ways
 
 ABLE = [method for method in sw.methods() if not method.needs_acceleration]
 REFUSED = [method.name for method in sw.methods() if method.needs_acceleration]
 EULER = {"standard_euler": 0.5, "damped_euler": 0.5, "false_euler": -0.5}
 
-every_method = pytest.mark.parametrize("method", ABLE, ids=lambda method: method.name)
+every_method = looped("method", ABLE)
 
 
 def block(friction: Any = 0.5 * 9.81, **more: Any) -> sw.Oscillator:
@@ -28,7 +31,7 @@ def block(friction: Any = 0.5 * 9.81, **more: Any) -> sw.Oscillator:
 # ---- stopping distances (FACTS §5)
 
 
-@pytest.mark.parametrize(("method", "stop"), [("false_euler", 0.8926), ("standard_euler", 0.9426)])
+@looped("method, stop", [("false_euler", 0.8926), ("standard_euler", 0.9426)])
 def test_where_a_block_stops_by_eulers_methods(method: str, stop: float) -> None:
     """v₀ = 3, μ = 0.5, h = 1/60; the exact place is 0.9174."""
     run = sw.integrate(block(), method, v=3.0, y=0.0, dt=1 / 60, steps=60, every=1)
@@ -38,8 +41,7 @@ def test_where_a_block_stops_by_eulers_methods(method: str, stop: float) -> None
     assert run.t[np.argmax(run.v == 0.0)] == pytest.approx(3.0 / 4.905, abs=1 / 60)
 
 
-@every_method
-@pytest.mark.parametrize("h", [1 / 60, 0.01, 0.003])
+@looped("method, h", itertools.product(ABLE, [1 / 60, 0.01, 0.003]))
 def test_where_a_block_stops_by_every_method(method: sw.Method, h: float) -> None:
     """Euler's methods err by ∓½hv₀ and less than the way of a step at a speed of l = hμg.
 
@@ -86,8 +88,7 @@ def test_a_block_on_a_spring_sticks_where_the_facts_say() -> None:
     assert (run.v[moved + 1 :] == 0.0).all()
 
 
-@every_method
-@pytest.mark.parametrize("form", ["canonical", "physical"])
+@looped("method, form", itertools.product(ABLE, ["canonical", "physical"]))
 def test_each_half_swing_is_shorter_by_the_same_length(method: sw.Method, form: str) -> None:
     """By 2μN/k: 1, −0.74, 0.48, −0.22, −0.04. In units of Φ = ωh: a turn moves the velocity by at most 2Φ·0.13, which changes an
     amplitude of 0.09 or more by 2Φ² at most, and a sample is off the peak by Φ²/2 at most. A method of first order changes the
@@ -166,8 +167,7 @@ def test_what_friction_holds_stays_for_ever(method: sw.Method) -> None:
     np.testing.assert_array_equal(on_spring.v[-1], 0.0)
 
 
-@every_method
-@pytest.mark.parametrize("side", [1.0, -1.0])
+@looped("method, side", itertools.product(ABLE, [1.0, -1.0]))
 def test_it_slides_when_the_drive_exceeds_friction(method: sw.Method, side: float) -> None:
     """a = 2·sin(0.1·t) passes 0.5 at t₁ = 10·asin(¼); the first step that begins after that moves the block."""
     drive, h = sw.Sinusoid(side * 2.0, 0.1), 0.01
@@ -200,19 +200,12 @@ def test_a_push_within_a_live_loop(method: sw.Method) -> None:
     assert y[1] == place[1]
 
 
-def test_core_and_reference_alone_and_in_company() -> None:
-    """Also fused; every case of cases.py is compared elsewhere, these rest within the run."""
+def test_core_and_reference_where_most_members_rest() -> None:
     friction, y = np.linspace(0.05, 0.5, 37), np.linspace(-2.0, 2.0, 37)
-    for method in ABLE:
-        for fused in (False, True) if method.order < 5 else (False,):
-            arguments: dict[str, Any] = {"dt": 0.05, "steps": 250, "every": 50, "fused": fused}
-            run = sw.integrate(sw.Oscillator(friction=friction), method, v=0.0, y=y, **arguments)
-            reference = sw.integrate(sw.Oscillator(friction=friction), method, v=0.0, y=y, backend="numpy", **arguments)
-            np.testing.assert_array_equal(run.y, reference.y)
-            np.testing.assert_array_equal(run.v, reference.v)
-            alone = sw.integrate(sw.Oscillator(friction=friction[20]), method, v=0.0, y=y[20], **arguments)
-            np.testing.assert_array_equal(alone.y, run.y[:, 20])
-            assert (run.v[-1] == 0.0).sum() > 15
+    for method, fused in (("false_euler", True), ("rk4", False), ("semi_false_heun", True), ("linearly_implicit_euler", False)):
+        options: dict[str, Any] = {"v": np.zeros(37), "y": y, "dt": 0.05, "steps": 250, "every": 50, "fused": fused}
+        run = assert_equal_ways(sw.Oscillator(friction=friction), method, **options, ways=("by the reference", "alone"))
+        assert (run.v[-1] == 0.0).sum() > 15
 
 
 # ---- what is wrong would be noticed
@@ -274,10 +267,9 @@ def test_a_wrong_friction_does_not_rest_there(wrong: Any, monkeypatch: pytest.Mo
 # ---- refusals
 
 
-@pytest.mark.parametrize("method", REFUSED)
-@pytest.mark.parametrize(("terms", "named"), [({"friction": 0.1}, "friction"), ({"drag": 0.1}, "drag")])
-def test_methods_for_accelerations_refuse_it_by_name(method: str, terms: dict[str, float], named: str) -> None:
-    system = sw.Oscillator(1.0, **terms)  # type: ignore[arg-type]
+@looped("method, named", itertools.product(REFUSED, ["friction", "drag"]))
+def test_methods_for_accelerations_refuse_it_by_name(method: str, named: str) -> None:
+    system = sw.Oscillator(1.0, **{named: 0.1})  # type: ignore[arg-type]
     for call in (
         lambda: sw.integrate(system, method, v=0.0, y=1.0, dt=0.1, steps=1),
         lambda: sw.World(system, method, v=np.zeros(1), y=np.ones(1), dt=0.1),
@@ -290,46 +282,44 @@ def test_methods_for_accelerations_refuse_it_by_name(method: str, terms: dict[st
             call()
 
 
-REFUSALS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
-    "adaptive steps": (
-        lambda: sw.integrate(sw.Oscillator(friction=0.1), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0]),
-        UnsupportedError,
-        "tolerance: .* has friction that sticks; what it does depends on the step",
-    ),
-    "an attempt": (
-        lambda: sw.explain(sw.Oscillator(friction=0.1), "merson", attempt=True),
-        UnsupportedError,
-        "attempt: adaptive steps do not work with friction that sticks",
-    ),
-    "a matrix": (
-        lambda: sw.integrate(sw.Oscillator(friction=0.1), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, form="matrix"),
-        UnsupportedError,
-        "form: only linear systems have a transition matrix",
-    ),
-    "rates": (
-        lambda: sw.jacobian(sw.Oscillator(friction=0.1), v=0.0, y=1.0),
-        UnsupportedError,
-        "rates: .* has friction that sticks; what it does depends on the step",
-    ),
-    "an analysis": (
-        lambda: sw.analyse(sw.Oscillator(friction=0.1), "rk4", dt=0.1, v=0.0, y=1.0),
-        UnsupportedError,
-        "rates: .* has friction that sticks",
-    ),
-    "both": (lambda: sw.Oscillator(1.0, 0.1, drag=0.2), ArgumentError, "damping, drag: expected one of them, got both"),
-    "below zero": (
-        lambda: sw.Oscillator(friction=[0.1, -1.0]),
-        ArgumentError,
-        "friction: expected numbers of zero or more, got -1",
-    ),
-    "a drag below zero": (lambda: sw.Oscillator(drag=-1.0), ArgumentError, "drag: expected numbers of zero or more, got -1"),
-    "no spring": (lambda: sw.Oscillator(0.0), ArgumentError, "omega: expected numbers above zero"),
-}
+RUBBED = sw.Oscillator(friction=0.1)
 
 
-@pytest.mark.parametrize("name", REFUSALS)
-def test_refusals(name: str) -> None:
-    call, error, message = REFUSALS[name]
+@looped(
+    "call, error, message",
+    [
+        (
+            lambda: sw.integrate(RUBBED, "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0]),
+            UnsupportedError,
+            "tolerance: .* has friction that sticks; what it does depends on the step",
+        ),
+        (
+            lambda: sw.explain(RUBBED, "merson", attempt=True),
+            UnsupportedError,
+            "attempt: adaptive steps do not work with friction that sticks",
+        ),
+        (
+            lambda: sw.integrate(RUBBED, "rk4", v=0.0, y=1.0, dt=0.1, steps=1, form="matrix"),
+            UnsupportedError,
+            "form: only linear systems have a transition matrix",
+        ),
+        (
+            lambda: sw.jacobian(RUBBED, v=0.0, y=1.0),
+            UnsupportedError,
+            "rates: .* has friction that sticks; what it does depends on the step",
+        ),
+        (
+            lambda: sw.analyse(RUBBED, "rk4", dt=0.1, v=0.0, y=1.0),
+            UnsupportedError,
+            "rates: .* has friction that sticks",
+        ),
+        (lambda: sw.Oscillator(1.0, 0.1, drag=0.2), ArgumentError, "damping, drag: expected one of them, got both"),
+        (lambda: sw.Oscillator(friction=[0.1, -1.0]), ArgumentError, "friction: expected numbers of zero or more, got -1"),
+        (lambda: sw.Oscillator(drag=-1.0), ArgumentError, "drag: expected numbers of zero or more, got -1"),
+        (lambda: sw.Oscillator(0.0), ArgumentError, "omega: expected numbers above zero"),
+    ],
+)
+def test_refusals(call: Callable[[], Any], error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
         call()
 

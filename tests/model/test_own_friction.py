@@ -12,6 +12,8 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, StepwellError, TraceError, UnsupportedError
 from stepwell.reference import friction as reference
 from support import own_systems as own
+from support.looped import looped
+from support.ways import assert_equal_ways
 
 ABLE = [method.name for method in sw.methods() if not method.needs_acceleration]
 G = 9.81
@@ -70,7 +72,7 @@ def of_no_weight(t: Any, v: Any, y: Any) -> Any:
 # ---- closed forms
 
 
-@pytest.mark.parametrize(("method", "stop"), [("false_euler", 0.8926), ("standard_euler", 0.9426)])
+@looped("method, stop", [("false_euler", 0.8926), ("standard_euler", 0.9426)])
 def test_a_block_stops_where_the_built_in_one_does(method: str, stop: float) -> None:
     run = sw.integrate(block(), method, v=3.0, y=0.0, dt=1 / 60, steps=60, every=1)
     assert round(float(run.y[-1]), 4) == stop
@@ -80,7 +82,7 @@ def test_a_block_stops_where_the_built_in_one_does(method: str, stop: float) -> 
     np.testing.assert_array_equal(run.y, same.y)
 
 
-@pytest.mark.parametrize("method", ABLE)
+@looped("method", ABLE)
 def test_a_slope_holds_a_block_up_to_its_angle_of_friction(method: str) -> None:
     """tan slope ≤ μ holds; steeper, v = −g(sin − μ·cos)t, which every method has but for roundings, here below 1000 · 2⁻⁵²."""
     slope = np.arctan(0.5) * np.array([-0.99, 0.99, 1.01, 1.5])
@@ -91,7 +93,7 @@ def test_a_slope_holds_a_block_up_to_its_angle_of_friction(method: str) -> None:
     np.testing.assert_allclose(run.v[-1, 2:], fast, rtol=1e-11)
 
 
-@pytest.mark.parametrize("method", ["false_euler", "rk4", "merson"])
+@looped("method", ["false_euler", "rk4", "merson"])
 def test_a_puck_slides_straight_in_every_direction(method: str) -> None:
     """It stops after v²/2μg, but for a way of 6lh, or by Euler's method the half step ½hv more; see test_friction."""
     h, angles = 0.01, np.linspace(0.0, 2.0 * np.pi, 13)
@@ -166,50 +168,22 @@ def test_a_number_alone_changes_no_other() -> None:
     assert (run.v[-1] != 0.0).tolist() == [True, False]
 
 
-# ---- bits, with all options
+# ---- with all options
 
 
-CASES: dict[str, tuple[Callable[[Any], Any], tuple[int, ...]]] = {
-    "slope": (lambda mu: own.sloping(mu=mu), ()),
-    "pucks": (lambda mu: own.pucks(mu=mu), (3, 2)),
-    "cart": (lambda mu: own.cart(mu=mu), (2,)),
+#: How it is made of a coefficient, and the shape of its state; with each a method and numbers.
+CASES: dict[str, tuple[Callable[[Any], Any], tuple[int, ...], str, dict[str, Any]]] = {
+    "slope": (lambda mu: own.sloping(mu=mu), (), "merson", {"fused": True, "dtype": "float32"}),
+    "pucks": (lambda mu: own.pucks(mu=mu), (3, 2), "rosenbrock23", {}),
+    "cart": (lambda mu: own.cart(mu=mu), (2,), "rk4", {"dtype": "float32"}),
 }
 
 
-def started(name: str, members: int) -> tuple[Any, dict[str, Any]]:
-    make, shape = CASES[name]
-    rng = np.random.default_rng(7)
-    state = {each: rng.normal(size=(*shape, members)) for each in "vy"}
-    return make(np.linspace(0.0, 0.3, members)), {**state, "dt": 0.05}
-
-
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("method", ABLE)
-def test_core_and_reference_have_equal_bits(method: str, name: str) -> None:
-    system, start = started(name, 5)
-    run = sw.integrate(system, method, **start, steps=40, every=10)
-    reference = sw.integrate(system, method, **start, steps=40, every=10, backend="numpy")
-    np.testing.assert_array_equal(run.v, reference.v)
-    np.testing.assert_array_equal(run.y, reference.y)
-
-
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("options", [{}, {"fused": True}, {"dtype": "float32"}, {"fused": True, "dtype": "float32"}])
-def test_options_have_equal_bits(options: dict[str, Any], name: str) -> None:
-    """In precision, fused, on two threads, in parts, in a world."""
-    system, start = started(name, 37)
-    run = sw.integrate(system, "rk4", **start, steps=60, **options)
-    reference = sw.integrate(system, "rk4", **start, steps=60, backend="numpy", **options)
-    np.testing.assert_array_equal(run.v, reference.v)
-    threads = sw.integrate(system, "rk4", **start, steps=60, threads=2, **options)
-    np.testing.assert_array_equal(run.v, threads.v)
-    half = sw.integrate(system, "rk4", **start, steps=30, **options)
-    np.testing.assert_array_equal(run.v, sw.integrate(system, "rk4", resume=half, steps=30).v)
-    kind = options.get("dtype", "float64")
-    blocks = {each: start[each].astype(kind) for each in "vy"}
-    world = sw.World(system, "rk4", **blocks, dt=0.05, **options)
-    world.step(60)
-    np.testing.assert_array_equal(run.v[-1], world.v)
+@looped("name", CASES)
+def test_it_has_the_same_bits_in_every_way(name: str) -> None:
+    make, shape, method, numbers = CASES[name]
+    v, y = np.random.default_rng(7).normal(size=(2, *shape, 5))
+    assert_equal_ways(make(np.linspace(0.0, 0.3, 5)), method, v=v, y=y, dt=0.05, steps=40, every=10, **numbers)
 
 
 def test_a_world_takes_another_coefficient() -> None:
@@ -241,11 +215,11 @@ def test_it_is_pickled_and_has_its_own_digest() -> None:
     assert plain().digest != block().digest
 
 
-@pytest.mark.parametrize("name", CASES)
+@looped("name", CASES)
 def test_an_exported_step_has_its_bits(name: str) -> None:
-    _, start = started(name, 1)
-    v, y = (start[each][..., 0] for each in "vy")
-    one = CASES[name][0](0.1)
+    make, shape, *_ = CASES[name]
+    one = make(0.1)
+    v, y = np.random.default_rng(7).normal(size=(2, *shape))
     space: dict[str, Any] = {}
     exec(sw.export(one, "rk4", "python", v=v, y=y, dt=0.05, name="one").source, space)
     m = space["One"]()
@@ -348,66 +322,65 @@ def declared(function: Callable[..., Any], v: Any = (0.0, 0.0), **options: Any) 
     return call
 
 
-REFUSALS: dict[str, tuple[Callable[[], Any], type[StepwellError], str]] = {
-    "no velocities": (
+REFUSALS: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
+    (
         lambda: rate().friction(lambda t, v, y: 1.0),
         ArgumentError,
         "decay: friction acts on velocities, and a system of first order has none",
     ),
-    "twice": (lambda: pair.friction(rubbing), ArgumentError, "pair: expected one function for friction, and rubbing is declared"),
-    "no function": (lambda: fresh()(3), DTypeError, "bare: expected a function as friction, got int"),
-    "no state": (lambda: fresh()(lambda v, y: 1.0), ArgumentError, r"expected a function \(t, v, y, \*, …\), got \(v, y\)"),
-    "an unknown parameter": (
+    (lambda: pair.friction(rubbing), ArgumentError, "pair: expected one function for friction, and rubbing is declared"),
+    (lambda: fresh()(3), DTypeError, "bare: expected a function as friction, got int"),
+    (lambda: fresh()(lambda v, y: 1.0), ArgumentError, r"expected a function \(t, v, y, \*, …\), got \(v, y\)"),
+    (
         lambda: fresh()(lambda t, v, y, mu: 1.0),
         ArgumentError,
         "parameters of the system, got 'mu'. Known: k",
     ),
-    "of what": (lambda: fresh(of="body"), ArgumentError, "of: there is no 'body'. Known: component, row"),
-    "both": (lambda: fresh(of="row", component=0), ArgumentError, "component: one number of v is no row"),
-    "no such number": (
+    (lambda: fresh(of="body"), ArgumentError, "of: there is no 'body'. Known: component, row"),
+    (lambda: fresh(of="row", component=0), ArgumentError, "component: one number of v is no row"),
+    (
         declared(lambda t, v, y: 1.0, component=2),
         TraceError,
         r"component=2 is no number of a v of shape \(2,\)",
     ),
-    "no rows": (declared(lambda t, v, y: 1.0, v=0.0, of="row"), TraceError, 'of="row" needs vectors along the last axis of v'),
-    "a wrong shape": (
+    (declared(lambda t, v, y: 1.0, v=0.0, of="row"), TraceError, 'of="row" needs vectors along the last axis of v'),
+    (
         declared(lambda t, v, y: np.ones(3)),
         TraceError,
         r"expected a deceleration of shape \(2,\), or one number, got shape \(3,\)",
     ),
-    "three values": (declared(lambda t, v, y: (1.0, 2.0, 3.0), component=0), TraceError, "expected a deceleration, or a pair"),
-    "no value": (declared(lambda t, v, y: None), TraceError, r"expected a deceleration of shape \(2,\), got nothing"),
-    "adaptive steps": (
+    (declared(lambda t, v, y: (1.0, 2.0, 3.0), component=0), TraceError, "expected a deceleration, or a pair"),
+    (declared(lambda t, v, y: None), TraceError, r"expected a deceleration of shape \(2,\), got nothing"),
+    (
         lambda: sw.integrate(pair(), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0]),
         UnsupportedError,
         "tolerance: .* has friction that sticks; what it does depends on the step",
     ),
-    "a control": (
+    (
         lambda: sw.integrate(pair(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=sw.Control("energy", 1.0)),
         UnsupportedError,
         "control: .* keeps an invariant of .*, from which friction takes energy for good; leave one out",
     ),
-    "a projection": (
+    (
         lambda: sw.integrate(pair(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=sw.Projection("energy")),
         UnsupportedError,
         "from which friction takes energy for good",
     ),
-    "rates": (lambda: sw.jacobian(pair(), v=0.0, y=1.0), UnsupportedError, "rates: .* has friction that sticks"),
-    "the past": (
+    (lambda: sw.jacobian(pair(), v=0.0, y=1.0), UnsupportedError, "rates: .* has friction that sticks"),
+    (
         lambda: sw.integrate(pair(), "rk4", v=0.0, y=1.0, dt=-0.1, steps=1),
         UnsupportedError,
         "dt: a negative step needs a unique past",
     ),
-    "an acceleration": (
+    (
         lambda: sw.integrate(pair(), "leapfrog", v=0.0, y=1.0, dt=0.1, steps=1),
         UnsupportedError,
         "leapfrog needs forces that do not depend on the velocity, but .* has friction; use false_euler, or leave friction out",
     ),
-}
+]
 
 
-@pytest.mark.parametrize("name", REFUSALS)
-def test_what_does_not_go_is_refused(name: str) -> None:
-    call, kind, text = REFUSALS[name]
+@looped("call, kind, text", REFUSALS)
+def test_what_does_not_go_is_refused(call: Callable[[], Any], kind: type[StepwellError], text: str) -> None:
     with pytest.raises(kind, match=text):
         call()
