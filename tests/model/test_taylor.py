@@ -18,7 +18,9 @@ from stepwell.reference import series, series_pace
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
 from support.graphs import assert_one_graph
+from support.looped import looped
 from support.truths import DRIVE, END, FORCE, OMEGA, forced_exact
+from support.ways import assert_same_run
 
 from benches.compare.chosen import solar
 
@@ -62,6 +64,11 @@ def polynomial(t: Any) -> Any:
     return 0.4 + t * (0.25 + t * (-0.125 + t * 0.5))
 
 
+@sw.system(order=1)
+def squared(t: Any, y: Any) -> Any:
+    return y * y
+
+
 def of_time(name: str) -> sw.System:
     function = FUNCTIONS[name][0]
 
@@ -92,12 +99,12 @@ def assert_known(name: str) -> None:
         assert abs(computed[k] * (k + 1) - true[k]) <= 40 * (k + 1) * EPS * size, (name, k)
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@looped("name", FUNCTIONS)
 def test_coefficients_of_functions(name: str) -> None:
     assert_known(name)
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@looped("name", FUNCTIONS)
 def test_core_and_reference_are_one_graph(name: str) -> None:
     system, tape = of_time(name), _core.Tape()
     for what, of in (("step", Tracer(system, tape).step), ("attempt", Tracer(system, tape).attempt)):
@@ -105,13 +112,12 @@ def test_core_and_reference_are_one_graph(name: str) -> None:
         assert_one_graph(tape, tape.trace(model, what), of(TAYLOR))
 
 
-@pytest.mark.parametrize(
-    ("system", "v", "y"),
+@looped(
+    "system, v, y",
     [
         (sw.Pendulum(1.2, 0.1, a=sw.Sinusoid(0.3, 2.0)), [0.1], [0.4]),
         (sw.NBody([1.0, 2.0, 3.0]), [[0.1, 0.2], [0.0, -0.1], [0.3, 0.0]], [[0.0, 0.0], [1.0, 0.2], [-0.5, 1.0]]),
     ],
-    ids=["pendulum", "three bodies"],
 )
 def test_numbers_one_by_one_are_those_of_the_tape(system: sw.System, v: Any, y: Any) -> None:
     """The reference as it is read, of numbers; the NumPy backend evaluates its tape, for all members at once."""
@@ -159,13 +165,8 @@ def test_a_wrong_derivative_of_a_function_is_noticed(monkeypatch: pytest.MonkeyP
 
 def test_a_step_is_the_series_cut_off_at_order_eight() -> None:
     """Of ẏ = y², y(0) = 1: 1/(1 − t) = Σ tᵏ. Every power and every sum is rounded: some 40 times in all, each term below 1.3."""
-
-    @sw.system(order=1)
-    def growth(t: Any, y: Any) -> Any:
-        return y * y
-
     for h in (0.1, 0.2):
-        run = sw.integrate(growth, "taylor", y=1.0, dt=h, steps=1)
+        run = sw.integrate(squared, "taylor", y=1.0, dt=h, steps=1)
         assert abs(run.y[-1] - sum(h**k for k in range(9))) < 40 * EPS
         assert abs(run.y[-1] - sum(h**k for k in range(8))) > 0.5 * h**8
 
@@ -201,8 +202,7 @@ def _clover(steps: int, backend: Any) -> tuple[Any, Any]:
     return run.v[-1] - v[0], run.y[-1] - y[0]
 
 
-@pytest.mark.parametrize("error", [_forced, _clover])
-@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@looped("error, backend", itertools.product([_forced, _clover], ["rust", "numpy"]))
 def test_the_order_is_eight(error: Callable[[int, Any], tuple[Any, Any]], backend: str) -> None:
     """Of a damped oscillator under a sinusoid, whose derivatives in time the series needs; and of bodies."""
     assert _cleaned_slopes(lambda steps: error(steps, backend)) == pytest.approx([8.0, 8.0], abs=0.1)
@@ -232,7 +232,7 @@ def test_growth_above_the_limit() -> None:
     np.testing.assert_allclose(np.hypot(run.v[-1], run.y[-1]), radius**4000, rtol=4000 * 50 * EPS * 10)
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
+@looped("tolerance", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
 def test_order_and_step_by_the_tolerance(tolerance: float) -> None:
     """Of ẏ = y the coefficients are y/k!, so the step is known.
 
@@ -271,15 +271,7 @@ def test_rough_powers_and_logarithms() -> None:
     assert series_pace.rough_log2(np.float64(1.0)) == 0.0
 
 
-def squared() -> sw.System:
-    @sw.system(order=1)
-    def growth(t: Any, y: Any) -> Any:
-        return y * y
-
-    return growth().for_state_shapes(None, np.zeros(()))
-
-
-@pytest.mark.parametrize("order", [4, 8, 12, 20])
+@looped("order", [4, 8, 12, 20])
 def test_evaluations_are_operations_over_those_of_one_evaluation(order: int) -> None:
     """Of a linear system each order is its matrix once more: p evaluations.
 
@@ -289,7 +281,11 @@ def test_evaluations_are_operations_over_those_of_one_evaluation(order: int) -> 
     for linear in (sw.Oscillator(1.3), sw.Oscillator(1.3, 0.2, form="physical")):
         assert engine.evaluations(TAYLOR, linear, order=order, paced=True) == order
     counted = sum(2 * (k // 2) + 1 for k in range(order)) + order // 2
-    assert engine.evaluations(TAYLOR, squared(), order=order, paced=True) == counted > order**2 / 2
+    assert (
+        engine.evaluations(TAYLOR, squared().for_state_shapes(None, np.zeros(())), order=order, paced=True)
+        == counted
+        > order**2 / 2
+    )
 
 
 def operations_of(tape: _core.Tape, values: list[Any]) -> int:
@@ -304,9 +300,7 @@ def operations_of(tape: _core.Tape, values: list[Any]) -> int:
     )
 
 
-@pytest.mark.parametrize(
-    "system", [sw.Pendulum(), sw.NBody([1.0, 0.5], force="newton"), sw.NBody(), sw.RestrictedThreeBody(0.1)], ids=repr
-)
+@looped("system", [sw.Pendulum(), sw.NBody([1.0, 0.5], force="newton"), sw.NBody(), sw.RestrictedThreeBody(0.1)])
 def test_evaluations_counted_by_the_reference(system: sw.System) -> None:
     """Its operations but for the product that makes a coefficient of the state of one of the rates.
 
@@ -413,7 +407,7 @@ def test_what_is_refused() -> None:
     assert sw.integrate(bouncing, "taylor", v=0.0, y=1.0, dt=0.1, steps=3).status == 0  # within a step the choice stays
 
 
-@pytest.mark.parametrize("absolute", [None, 0.0, np.array([1e-9, 1e-12])])
+@looped("absolute", [None, 0.0, np.array([1e-9, 1e-12])])
 def test_tolerances_of_components(absolute: Any) -> None:
     """The least of a member chooses the order, which is that of a run with this for all; before they were refused as members'.
 
@@ -461,14 +455,14 @@ PIECES: dict[str, Callable[[Any, Any, Any], Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", PIECES)
+@looped("name", PIECES)
 def test_pieces_are_refused_alike(name: str) -> None:
     rates = sw.system(PIECES[name])
     with pytest.raises(UnsupportedError, match=r"tolerance: .* chooses between values .*; use another method, such as dop853"):
         sw.integrate(rates, "taylor", v=0.3, y=1.3, tolerance=1e-9, at=[4.0])
 
 
-@pytest.mark.parametrize("name", sorted({*FUNCTIONS} - {"abs"}))
+@looped("name", sorted({*FUNCTIONS} - {"abs"}))
 def test_functions_are_no_pieces_however_they_are_signed(name: str) -> None:
     """Roundings and operations on bits within a function do not count, and its negative may be made of another one of them."""
     of_p = FUNCTIONS[name][0]
@@ -506,10 +500,6 @@ def pole_of_time() -> sw.System:
     return driven()
 
 
-def head_on() -> sw.System:
-    return sw.NBody([1.0, 1.0], force="newton")
-
-
 #: Motions that end in a singularity from y = 1 and v = 0, and when.
 ENDS: dict[str, tuple[Callable[[], sw.System], float]] = {
     "collision": (lambda: fall(2, 0.0), math.pi / math.sqrt(8.0)),
@@ -526,8 +516,7 @@ ENDS: dict[str, tuple[Callable[[], sw.System], float]] = {
 }
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
-@pytest.mark.parametrize("name", ENDS)
+@looped("name, tolerance", itertools.product(ENDS, [1e-2, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15]))
 def test_no_step_crosses_a_singularity(name: str, tolerance: float) -> None:
     """However small the last terms are there, and though coefficients pass all bounds of numbers.
 
@@ -546,11 +535,9 @@ def test_no_step_crosses_a_singularity(name: str, tolerance: float) -> None:
     assert abs(float(run.paces.t) / end - 1.0) < 4.0 * steps * (tolerance + EPS)
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
-@pytest.mark.parametrize("backward", [False, True])
-def test_one_singular_component_among_others_ends_the_run(tolerance: float, backward: bool) -> None:
+@looped("tolerance, sign", itertools.product([1e-3, 1e-6, 1e-9, 1e-12], [1.0, -1.0]))
+def test_one_singular_component_among_others_ends_the_run(tolerance: float, sign: float) -> None:
     """Components that are larger and move smoothly hide no pole of another, forward or backward in time: as above, 4nτ."""
-    sign = -1.0 if backward else 1.0
 
     @sw.system(order=1)
     def among_others(t: Any, y: Any) -> Any:
@@ -564,7 +551,7 @@ def test_one_singular_component_among_others_ends_the_run(tolerance: float, back
     assert abs(abs(float(run.paces.t)) - 1.0) < 4.0 * steps * (tolerance + EPS)
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+@looped("tolerance", [1e-3, 1e-9])
 def test_steps_end_at_jumps_and_at_branches(tolerance: float) -> None:
     """ẏ = |t − 1.3| has the integral (t − 1.3)·|t − 1.3|/2; no step crosses 0.9 and 2.1, nor goes on behind 1.3 as before."""
 
@@ -581,20 +568,19 @@ def test_steps_end_at_jumps_and_at_branches(tolerance: float) -> None:
     assert np.max(np.abs(run.y - true)) < 2.0 * tolerance * true.max() * float(run.paces.accepted)
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-9, 1e-15])
-@pytest.mark.parametrize("offset", [0.0, 1e3])
+@looped("tolerance, offset", itertools.product([1e-3, 1e-9, 1e-15], [0.0, 1e3]))
 def test_bodies_that_collide_head_on_stop(tolerance: float, offset: float) -> None:
     """Two of mass 1 at rest at distance 1: they meet after π/√16, and neither passes through the other."""
     y = np.array([[-0.5, offset], [0.5, offset]])
     with pytest.warns(ToleranceWarning, match=r"a collision"):
-        run = sw.integrate(head_on(), "taylor", v=0.0 * y, y=y, tolerance=tolerance, at=[3.0])
+        run = sw.integrate(sw.NBody([1.0, 1.0], force="newton"), "taylor", v=0.0 * y, y=y, tolerance=tolerance, at=[3.0])
     assert run.paces is not None
     # As above, with the tolerance relative to the length of y, 1 or more.
     size = max(1.0, math.sqrt(2.0) * offset)
     assert abs(float(run.paces.t) / (math.pi / 4.0) - 1.0) < 4.0 * float(run.paces.accepted) * size * (tolerance + EPS)
 
 
-@pytest.mark.parametrize("octaves", [-200, -40, 300])
+@looped("octaves", [-200, -40, 300])
 def test_steps_do_not_depend_on_the_unit_of_time(octaves: int) -> None:
     """A unit that is a power of two changes no bit of y, though the coefficients of order 20 differ by 2⁶⁰⁰⁰."""
     unit = 2.0**octaves
@@ -623,8 +609,7 @@ BRANCHED: dict[str, Callable[[Any, Any, Any], Any]] = {
 }
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
-@pytest.mark.parametrize("name", BRANCHED)
+@looped("name, tolerance", itertools.product(BRANCHED, [1e-3, 1e-6, 1e-9]))
 def test_a_step_does_not_leave_a_branch(name: str, tolerance: float) -> None:
     """|y| as a root, and others: as right as the tolerance says.
 
@@ -642,8 +627,14 @@ def test_a_step_does_not_leave_a_branch(name: str, tolerance: float) -> None:
     assert error < 10.0 * tolerance  # and in fact: such errors do not all add up
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
-@pytest.mark.parametrize(("inverse", "of"), [(np.arcsin, np.sin), (np.arccos, np.cos), (np.arctan, np.tan)])
+@looped(
+    "inverse, of, tolerance",
+    [
+        (*pair, tolerance)
+        for pair in ((np.arcsin, np.sin), (np.arccos, np.cos), (np.arctan, np.tan))
+        for tolerance in (1e-3, 1e-6, 1e-9, 1e-12)
+    ],
+)
 def test_a_branch_that_ends_at_a_rounding_is_right_or_said(inverse: Any, of: Any, tolerance: float) -> None:
     """Within 1e-8 of its turns a sine is rounded to ±1, where the inverse has no derivative; a tangent has a pole."""
     rates = sw.system(lambda t, v, y: -inverse(of(2.0 * y)))
@@ -665,10 +656,8 @@ def test_branches_of_a_batch_are_those_of_the_reference() -> None:
     ask: dict[str, Any] = {"v": 0.3, "y": y, "tolerance": 1e-6, "at": np.linspace(0.1, 3.0, 40)}
     ours, theirs = (sw.integrate(kinked, "taylor", backend=backend, **ask) for backend in ("rust", "numpy"))
     assert ours.paces is not None
-    assert theirs.paces is not None
     assert ours.paces.rejected.min() > 0
-    assert np.array_equal(ours.y, theirs.y)
-    assert all(np.array_equal(a, b) for a, b in zip(ours.paces, theirs.paces, strict=True))
+    assert_same_run(theirs, ours)
 
 
 def test_tame_motions_meet_no_bound() -> None:
@@ -690,8 +679,7 @@ def three_bodies(members: int) -> dict[str, Any]:
     return {"v": rng.normal(size=(3, 2, members)), "y": 2.0 * rng.normal(size=(3, 2, members))}
 
 
-@pytest.mark.parametrize("control", [None, sw.Projection()], ids=["free", "projected"])
-@pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
+@looped("control, fused", [(None, True), (sw.Projection(), False)])
 def test_many_saved_states_of_a_batch_are_those_of_the_reference(control: Any, fused: bool) -> None:
     """Several within a step, and steps without any; a projection acts on the saved states, too, and counts its work once."""
     bodies = sw.NBody([1.0, 0.5, 0.2], force="newton", softening=0.1)
@@ -700,11 +688,7 @@ def test_many_saved_states_of_a_batch_are_those_of_the_reference(control: Any, f
     ours = sw.integrate(bodies, "taylor", **ask)
     few = {name: ask[name][..., :2] for name in ("v", "y")}
     theirs = sw.integrate(bodies, "taylor", **ask | few, backend="numpy")
-    assert np.array_equal(ours.v[..., :2], theirs.v)
-    assert np.array_equal(ours.y[..., :2], theirs.y)
-    assert ours.paces is not None
-    assert theirs.paces is not None
-    assert all(np.array_equal(a[:2], b) for a, b in zip(ours.paces, theirs.paces, strict=True))
+    assert_same_run(theirs, ours, slice(2))
     if control is not None:
         assert np.array_equal(ours.work[:2], theirs.work)
 
@@ -722,8 +706,7 @@ def test_a_run_that_goes_on_finds_the_coefficients_of_its_held_step_again() -> N
     assert all(np.array_equal(a, b) for a, b in zip(run.paces, whole.paces, strict=True))
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
-@pytest.mark.parametrize("angle", [np.pi / 2, np.pi / 3, 1.0, 3.0])
+@looped("angle, tolerance", itertools.product([np.pi / 2, np.pi / 3, 1.0, 3.0], [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8]))
 def test_coefficients_that_vanish_by_chance_are_not_believed(angle: float, tolerance: float) -> None:
     """At a right angle the series of a pendulum has every fourth term alone; for some orders the last two are not among them.
 
@@ -743,9 +726,5 @@ def test_steps_that_overflow_are_tried_again_alike() -> None:
         arguments: dict[str, Any] = {"v": v, "y": y, "tolerance": 1e-6, "at": [1.0], "max_steps": 50}
         by_core, by_numpy = (sw.integrate(system, "taylor", backend=name, **arguments) for name in ("rust", "numpy"))
     assert by_core.paces is not None
-    assert by_numpy.paces is not None
     assert (by_core.paces.rejected > 5).any()
-    for one, other in zip(by_core.paces, by_numpy.paces, strict=True):
-        assert np.array_equal(one, other, equal_nan=True)
-    assert np.array_equal(by_core.status, by_numpy.status)
-    assert np.array_equal(by_core.y, by_numpy.y, equal_nan=True)
+    assert_same_run(by_numpy, by_core)
