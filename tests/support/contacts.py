@@ -1,4 +1,4 @@
-"""What must hold of contact, as functions that raise: of the library, and not of a wrong version of it (test_contact_mutants.py).
+"""What must hold of contact, as functions that raise: of the library, and not of a wrong version of it (test_contact.py).
 
 In a uniform field every method makes y₁ = y₀ + h·(v₀ + v₁)/2 + h·c, where the lag c is 0 or ±½·h·g (of the Euler family). So the
 velocity w = v + c lies on the parabola through y, and ½w² + g·y is constant in flight. A bounce "safe" leaves the surface with
