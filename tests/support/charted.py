@@ -26,7 +26,6 @@ SHOWN = ("clover", "oscillator")
 @functools.cache
 def _made(some):
     with pytest.MonkeyPatch.context() as patched:
-        hasty(patched)
         patched.setattr(LADDER, "SMALLEST", 1 / 30)
         return {scene.name: sw.charts.work_precision(scene) for scene in SCENES if scene.name in SHOWN or not some}
 
@@ -42,19 +41,20 @@ def the_charts(request):
 @pytest.fixture(scope="module", name="whole")
 def the_whole():
     """These scenes, when they are asked for, on the whole ladder."""
-
-    @functools.cache
-    def chart(name):
-        with pytest.MonkeyPatch.context() as patched:
-            hasty(patched)
-            return sw.charts.work_precision(name, tolerances=[])
-
-    return chart
+    return functools.cache(lambda name: sw.charts.work_precision(name, tolerances=[]))
 
 
 def hasty(patched):
     """Times of steps are not what is looked at."""
-    patched.setattr(timing, "CHARTS", timing.CHARTS._replace(repeats=2, seconds=1e-4))
+    patched.setattr(timing, "CHARTS", timing.CHARTS._replace(members=64, repeats=2, seconds=1e-4))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _hasty_times():
+    """Of all charts of a file that imports this."""
+    with pytest.MonkeyPatch.context() as patched:
+        hasty(patched)
+        yield
 
 
 @pytest.fixture(scope="module", name="small")

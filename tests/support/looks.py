@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-from io import BytesIO
 
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.text import Text
-from PIL import Image
 from stepwell.views.charts.style import CONTRAST, contrast
 
 #: The width in pixels at which the site shows a picture, and the least size of its letters there.
@@ -39,11 +37,10 @@ def drawn_texts(figure):
 
     Text.draw = record
     try:
-        written = BytesIO()
-        figure.savefig(written, format="png", facecolor="white")
+        figure.canvas.draw()
     finally:
         Text.draw = draw
-    return np.asarray(Image.open(written).convert("RGB")), list(texts.values())
+    return np.asarray(figure.canvas.buffer_rgba())[..., :3], list(texts.values())
 
 
 def faults(figure):
@@ -82,9 +79,12 @@ def faults(figure):
 def ground(pixels, box):
     """The colour of most of the pixels in a text's box."""
     height = len(pixels)
-    part = pixels[max(0, int(height - box.y1)) : int(height - box.y0) + 1, max(0, int(box.x0)) : int(box.x1) + 1].reshape(-1, 3)
-    colours, times = np.unique(part, axis=0, return_counts=True)
-    return tuple(colours[times.argmax()] / 255.0) if len(part) else (1.0, 1.0, 1.0)
+    part = pixels[max(0, int(height - box.y1)) : int(height - box.y0) + 1, max(0, int(box.x0)) : int(box.x1) + 1]
+    colours, times = np.unique(part.reshape(-1, 3) @ [1 << 16, 1 << 8, 1], return_counts=True)
+    if not len(colours):
+        return (1.0, 1.0, 1.0)
+    most = int(colours[times.argmax()])
+    return tuple((most >> shift & 255) / 255.0 for shift in (16, 8, 0))
 
 
 def blank(pixels):

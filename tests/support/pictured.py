@@ -1,7 +1,13 @@
 """Pictures of runs that several tests look at."""
 
+import random
+from collections import defaultdict
+
 import pytest
 import stepwell as sw
+from stepwell.views.charts.kinds import kind_of
+
+from .covering import seed
 
 
 def looked_at(scene, method="false_euler", dt=None, **options):
@@ -42,6 +48,13 @@ KINDS = ("body", "top", "orbits", "long", "space", "two", "gone", "swing", "stea
 ATTITUDES = ("attitude", "trapped")
 #: By default one of each way to lay out, and one that ends in what cannot be drawn.
 SHOWN = ("attitude", "body", "orbits", "space", "swing", "rows", "crash")
+
+
+#: A scene of each kind of picture, drawn by the seed; each has the choice of its kind.
+_OF_A_KIND = defaultdict(list)
+for _scene in sw.scenes.scenes():
+    _OF_A_KIND[kind_of(_scene.system).picture].append(_scene.name)
+DRAWN = [random.Random(seed()).choice(names) for names in _OF_A_KIND.values()]
 
 
 def each_of(kinds):
