@@ -38,12 +38,6 @@ def the_charts(request):
     return _made(request.param)
 
 
-@pytest.fixture(scope="module", name="whole")
-def the_whole():
-    """These scenes, when they are asked for, on the whole ladder."""
-    return functools.cache(lambda name: sw.charts.work_precision(name, tolerances=[]))
-
-
 def hasty(patched):
     """Times of steps are not what is looked at."""
     patched.setattr(timing, "CHARTS", timing.CHARTS._replace(members=64, repeats=2, seconds=1e-4))

@@ -1,5 +1,6 @@
 """Work-precision charts: peers, the panel, what is refused, files and the picture; of all scenes in test_charts.py."""
 
+import itertools
 import json
 import math
 import sys
@@ -12,7 +13,7 @@ from stepwell.base import tables
 from stepwell.errors import ArgumentError, DTypeError, UnknownNameError, UnsupportedError
 from stepwell.studies.measuring import data, measure, peers, timing
 from stepwell.views.charts import style
-from support.charted import METHODS, read, the_small  # noqa: F401
+from support.charted import METHODS, _hasty_times, read, the_small  # noqa: F401
 
 # ---- peers
 
@@ -56,11 +57,11 @@ def test_a_peer_that_is_not_installed_says_so(monkeypatch):
     ("package", "make", "scene"),
     [
         ("scipy", lambda: peers.scipy("DOP853", (1e-4, 1e-10)), "oscillator"),
-        ("scipy", lambda: peers.scipy("RK45", (1e-4, 1e-10)), "figure_eight"),
-        ("heyoka", lambda: peers.heyoka((1e-4, 1e-10)), "chain"),
-        ("heyoka", lambda: peers.heyoka((1e-4, 1e-10)), "figure_eight"),
         ("rebound", lambda: peers.rebound("bs", (1e-4, 1e-10)), "figure_eight"),
-        ("rebound", lambda: peers.rebound("leapfrog", (0.1, 0.001)), "figure_eight"),
+        pytest.param("scipy", lambda: peers.scipy("RK45", (1e-4, 1e-10)), "figure_eight", marks=pytest.mark.long),
+        ("heyoka", lambda: peers.heyoka((1e-4, 1e-10)), "chain"),
+        pytest.param("heyoka", lambda: peers.heyoka((1e-4, 1e-10)), "figure_eight", marks=pytest.mark.long),
+        pytest.param("rebound", lambda: peers.rebound("leapfrog", (0.1, 0.001)), "figure_eight", marks=pytest.mark.long),
     ],
 )
 def test_a_real_peer_solves_the_scene(package, make, scene):
@@ -74,31 +75,28 @@ def test_a_real_peer_solves_the_scene(package, make, scene):
 # ---- a right energy does not make a motion right
 
 
-@pytest.mark.parametrize("of", ["chart", "panel"])
-def test_the_energy_error_is_never_alone(of, tmp_path):
+def test_the_energy_error_is_never_alone(tmp_path):
     """Beside the curves of the energy error are those of the state error, in a picture of one scene and in a panel."""
     panel = sw.charts.panel(["clover", "oscillator"], methods=["false_euler", "rk4"], steps=[100, 400, 1600], tolerances=[])
-    shown = panel if of == "panel" else panel.charts[0]
-    figure = shown.plot(tmp_path / "energy.png", error="energy_error")
-    for chart in panel.charts[: len(panel.charts) if of == "panel" else 1]:
-        for kind in ("energy_error", "state_error"):
+    for shown, charts in ((panel, panel.charts), (panel.charts[0], panel.charts[:1])):
+        figure = shown.plot(tmp_path / "energy.png", error="energy_error")
+        for chart, kind in itertools.product(charts, ("energy_error", "state_error")):
             for curve in chart.curves:
                 wanted = [point.error(kind) if point.usable else math.nan for point in curve.points]
                 drawn = [line for axes in figure.axes for line in axes.lines if list(line.get_xdata()) == curve.costs()]
                 assert any(np.array_equal(line.get_ydata(), wanted, equal_nan=True) for line in drawn), (kind, curve.name)
-    labels = " ".join([*(text.get_text() for text in figure.texts), *(axes.get_ylabel() for axes in figure.axes)]).replace(
-        "\n", " "
-    )
-    assert "largest energy error of the run, relative" in labels
-    assert "largest state error of the run, relative" in labels
+        words = [*(text.get_text() for text in figure.texts), *(axes.get_ylabel() for axes in figure.axes)]
+        for kind in ("energy", "state"):
+            assert f"largest {kind} error of the run, relative" in " ".join(words).replace("\n", " ")
 
 
 # ---- the panel
 
 
 def test_a_panel_is_its_charts(tmp_path):
-    panel = sw.charts.panel(["oscillator", "clover", "chain", "kepler"], methods=["rk4", "merson"], steps=[400, 4000])
-    assert [chart.scene.name for chart in panel.charts] == ["oscillator", "clover", "chain", "kepler"]
+    names = ["oscillator", "clover", "chain", "kepler"]
+    panel = sw.charts.panel(names, methods=["rk4", "merson"], steps=[400, 4000], tolerances=[1e-3, 1e-6])
+    assert [chart.scene.name for chart in panel.charts] == names
     figure = panel.plot(tmp_path / "panel.png")
     assert [axes.get_title(loc="left").strip() for axes in figure.axes] == [chart.scene.title for chart in panel.charts]
     assert not figure.legends
@@ -146,15 +144,11 @@ def test_a_refused_method_is_named_with_the_reason(small, tmp_path):
     assert list(small.refused) == ["verlet"]
     assert "has damping" in small.refused["verlet"]
     small.to_csv(tmp_path / "chart.csv")
-    rows = read(tmp_path / "chart.csv")
-    assert [(row["method"], row["refused"], row["cost"]) for row in rows if row["refused"]] == [
-        ("verlet", small.refused["verlet"], "")
-    ]
+    refused = [row for row in read(tmp_path / "chart.csv") if row["refused"]]
+    assert [(row["method"], row["refused"], row["cost"]) for row in refused] == [("verlet", small.refused["verlet"], "")]
     said = " ".join(text.get_text() for text in small.plot().texts).replace("\n", " ")
     assert "Not applicable: Verlet (needs forces that do not depend on the velocity; here: damping)." in said
-
-
-def test_a_scene_that_only_refuses_can_still_be_drawn_and_written(tmp_path):
+    # One that only refuses can still be drawn and written.
     chart = sw.charts.work_precision("forced_oscillator", ["verlet"], [100])
     assert (chart.curves, chart.summary()) == ((), [])
     chart.plot(tmp_path / "chart.png")
@@ -162,9 +156,8 @@ def test_a_scene_that_only_refuses_can_still_be_drawn_and_written(tmp_path):
     assert "verlet" in (tmp_path / "chart.csv").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
-    [
+def test_what_cannot_be_charted_is_said(small, tmp_path):
+    for arguments, error, message in (
         (("clovr",), UnknownNameError, "did you mean 'clover'"),
         ((3,), DTypeError, "scene: expected a Scene or its name, got int"),
         (("clover", ["rk5"]), UnknownNameError, "did you mean 'rk4'"),
@@ -173,12 +166,15 @@ def test_a_scene_that_only_refuses_can_still_be_drawn_and_written(tmp_path):
         (("clover", None, []), ArgumentError, "steps: expected at least one, got none"),
         (("clover", None, [3]), ArgumentError, "steps: expected 4 or more"),
         (("clover", None, [4.5]), DTypeError, "steps: expected a whole number"),
-        (("clover", None, None, [0.0]), ArgumentError, "tolerances: expected"),
-    ],
-)
-def test_what_cannot_be_charted_is_said(arguments, error, message):
-    with pytest.raises(error, match=message):
-        sw.charts.work_precision(*arguments[:3], **({"tolerances": arguments[3]} if len(arguments) > 3 else {}))
+    ):
+        with pytest.raises(error, match=message):
+            sw.charts.work_precision(*arguments)
+    with pytest.raises(ArgumentError, match="tolerances: expected"):
+        sw.charts.work_precision("clover", tolerances=[0.0])
+    with pytest.raises(UnknownNameError, match="fused: there is no 'all'"):
+        sw.charts.work_precision("oscillator", fused="all")
+    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
+        small.plot(tmp_path / "chart.docx")
 
 
 # ---- files
@@ -201,7 +197,12 @@ def test_the_json_is_strict_and_whole(small, tmp_path):
     whole = json.loads((tmp_path / "chart.json").read_text(encoding="utf-8"), parse_constant=refuse)
     assert whole["scene"]["name"] == "forced_oscillator"
     assert whole["refused"] == small.refused
-    assert whole["measured_on"] == {"members": 4096, "threads": 1, "repeats": timing.CHARTS.repeats, "isa": sw.isa()}
+    assert whole["measured_on"] == {
+        "members": timing.CHARTS.members,
+        "threads": 1,
+        "repeats": timing.CHARTS.repeats,
+        "isa": sw.isa(),
+    }
     assert [row["state_error"] for row in whole["rows"][:3]] == [p.state_error for p in small.curves[0].points]
     assert [row["method"] for row in whole["summary"]] == ["false_euler", "rk4"]
     assert tables.finite({"a": [math.inf, 1.0], "b": math.nan}) == {"a": [None, 1.0], "b": None}
@@ -218,13 +219,8 @@ def test_methods_are_told_apart_without_colour():
     assert len({str(look["linestyle"]) for look in looks}) == len(orders)
 
 
-def test_an_unknown_kind_of_picture_is_refused(small, tmp_path):
-    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
-        small.plot(tmp_path / "chart.docx")
-
-
 def test_without_matplotlib_the_numbers_are_still_there(small, monkeypatch, tmp_path):
-    monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(UnsupportedError, match=r"pip install 'stepwell\[chart\]'"):
         small.plot()
     small.to_csv(tmp_path / "chart.csv")
@@ -239,5 +235,3 @@ def test_both_arithmetics_are_charted():
     np.testing.assert_allclose([p.state_error for p in plain], [p.state_error for p in fused], rtol=1e-3)
     assert {row["method"] for row in chart.rows()} == {curve.name for curve in chart.curves}
     chart.plot()
-    with pytest.raises(sw.errors.UnknownNameError, match="fused: there is no 'all'"):
-        sw.charts.work_precision("oscillator", fused="all")

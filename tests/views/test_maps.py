@@ -23,7 +23,7 @@ IMPLICIT = [method for method in sw.methods() if method.is_implicit]
 DAMPED = [method for method in METHODS if not method.needs_acceleration]
 UNDAMPED = [method for method in METHODS if method.needs_acceleration]
 
-#: By default one that is never stable undamped, one of one evaluation, one of a closed form with damping, and one with more stages.
+#: By default one that is never stable undamped, one of one evaluation, and two of more stages.
 SOME = ("standard_euler", "false_euler", "rk4", "merson")
 some_damped = pytest.mark.parametrize("method", family(DAMPED, lambda method: method.name in SOME, lambda method: method.name))
 

@@ -1,10 +1,9 @@
 """Stability charts and the document's figures: data against closed forms, files and pictures."""
 
-import csv
 import dataclasses
-import itertools
 import json
 import math
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +13,8 @@ from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameEr
 from stepwell.views.charts import curves_picture, figures_picture, style, zplane_picture
 from stepwell.views.charts.zplane import ladder, largest
 from support import ROOT
-from support.looks import faults
+from support.charted import read
+from support.families import family
 from support.truths import CLOSED_FORMS
 
 METHODS = sw.methods()
@@ -41,16 +41,8 @@ RATIOS = {
     "semi_false_heun": {2: -1 / 12, 4: 7 / 160},
 }
 
-LIMITS = {
-    "standard_euler": 0.0,
-    "damped_euler": 2.0,
-    "false_euler": 2.0,
-    "verlet": 2.0,
-    "standard_heun": 0.0,
-    "false_heun": math.sqrt(2.0),
-    "semi_false_heun": math.sqrt(2.0 * math.sqrt(5.0) - 2.0),
-    "rk4": 2.0 * math.sqrt(2.0),
-}
+LIMITS = {"standard_euler": 0.0, "damped_euler": 2.0, "false_euler": 2.0, "verlet": 2.0, "standard_heun": 0.0}
+LIMITS |= {"false_heun": math.sqrt(2.0), "semi_false_heun": math.sqrt(2.0 * math.sqrt(5.0) - 2.0), "rk4": 2.0 * math.sqrt(2.0)}
 
 EPS = np.finfo(float).eps
 
@@ -65,17 +57,16 @@ def figures():
     return sw.charts.figures()
 
 
+@pytest.fixture(scope="module")
+def written(chart, figures, tmp_path_factory):
+    """The pictures of all methods, each drawn once, and their files."""
+    folder = tmp_path_factory.mktemp("pictures")
+    draw = {kind: partial(chart.plot, kind=kind) for kind in ("loci", "curves")} | {"figures": figures.plot}
+    return {name: (plot(folder / f"{name}.png"), folder / f"{name}.png") for name, plot in draw.items()}
+
+
 def of(chart, name):
     return next(locus for locus in chart.loci if locus.method.name == name)
-
-
-def read(path):
-    with path.open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
-def refuse(constant):
-    raise AssertionError(constant)
 
 
 def lines(axes):
@@ -125,44 +116,40 @@ def test_every_method_is_there_by_itself(chart, figures):
     assert sorted(CLOSED) == sorted(set(CLOSED) & {method.name for method in METHODS})
 
 
-@pytest.mark.parametrize("name", CLOSED)
-def test_the_eigenvalues_are_the_roots_of_the_documents_equation(chart, name):
-    """Sum 2p and product q. An element of P is wrong by a few eps of its largest term, and the product by that times another."""
-    locus = of(chart, name)
-    p, q = (f(locus.phi) for f in CLOSED[name])
-    z1, z2 = locus.eigenvalues
-    rounding = 64 * EPS * np.maximum(1.0, locus.phi) ** 8
-    assert (np.abs(z1 + z2 - 2 * p) <= rounding).all()
-    assert (np.abs(z1 * z2 - q) <= rounding).all()
-    assert (np.abs(z1) >= np.abs(z2) * (1 - 1e-9)).all()
-    pair = z1.imag != 0
-    assert pair.any()
-    assert (np.abs(locus.r1_squared - q)[pair] <= rounding[pair]).all()
-    assert np.array_equal(locus.r1_squared, np.abs(z1) ** 2)
+def test_the_eigenvalues_are_the_roots_of_the_documents_equation(chart):
+    """Sum 2p and product q. An element of P is wrong by a few eps of its largest term, and the product by that times another.
+
+    Ψ = atan2(√(q − p²), p), away from where both roots meet: there the root magnifies rounding.
+    """
+    for name, closed in CLOSED.items():
+        locus = of(chart, name)
+        p, q = (f(locus.phi) for f in closed)
+        z1, z2 = locus.eigenvalues
+        rounding = 64 * EPS * np.maximum(1.0, locus.phi) ** 8
+        assert (np.abs(z1 + z2 - 2 * p) <= rounding).all(), name
+        assert (np.abs(z1 * z2 - q) <= rounding).all(), name
+        assert (np.abs(z1) >= np.abs(z2) * (1 - 1e-9)).all(), name
+        pair = z1.imag != 0
+        assert pair.any(), name
+        assert (np.abs(locus.r1_squared - q)[pair] <= rounding[pair]).all(), name
+        assert np.array_equal(locus.r1_squared, np.abs(z1) ** 2), name
+        pair = q - p**2 > 1e-3
+        psi = np.arctan2(np.sqrt(q - p**2, where=pair, out=np.zeros_like(p)), p)
+        assert pair.sum() > 100, name
+        assert locus.ratio[pair] == pytest.approx(psi[pair] / locus.phi[pair], rel=1e-10), name
+        assert set(np.round(locus.ratio * locus.phi, 12)[p**2 - q > 1e-3]) <= {0.0, round(math.pi, 12)}, name
 
 
-@pytest.mark.parametrize("name", CLOSED)
-def test_the_angle_is_that_of_a_pair(chart, name):
-    """Ψ = atan2(√(q − p²), p), away from where both roots meet: there the root magnifies rounding."""
-    locus = of(chart, name)
-    p, q = (f(locus.phi) for f in CLOSED[name])
-    pair = q - p**2 > 1e-3
-    psi = np.arctan2(np.sqrt(q - p**2, where=pair, out=np.zeros_like(p)), p)
-    assert pair.sum() > 100
-    assert locus.ratio[pair] == pytest.approx(psi[pair] / locus.phi[pair], rel=1e-10)
-    assert set(np.round(locus.ratio * locus.phi, 12)[p**2 - q > 1e-3]) <= {0.0, round(math.pi, 12)}
-
-
-@pytest.mark.parametrize("name", RATIOS)
-def test_the_series_have_two_terms(chart, name):
-    locus = of(chart, name)
-    ratio = 1 + sum(c * locus.phi**k for k, c in RATIOS[name].items())
-    assert locus.ratio_series == pytest.approx(ratio, rel=1e-13)
-    # Here q has at most two powers of Φ besides 1, so the series of r₁² is q.
-    assert locus.r1_squared_series == pytest.approx(CLOSED[name][1](locus.phi), rel=1e-13, abs=1e-13)
-    small = locus.phi <= 0.1
-    # What is left out begins with Φ⁶, in no series with a coefficient above 1.
-    assert (np.abs(locus.ratio - locus.ratio_series)[small] <= locus.phi[small] ** 6 + 1e-10).all()
+def test_the_series_have_two_terms(chart):
+    for name, terms in RATIOS.items():
+        locus = of(chart, name)
+        ratio = 1 + sum(c * locus.phi**k for k, c in terms.items())
+        assert locus.ratio_series == pytest.approx(ratio, rel=1e-13), name
+        # Here q has at most two powers of Φ besides 1, so the series of r₁² is q.
+        assert locus.r1_squared_series == pytest.approx(CLOSED[name][1](locus.phi), rel=1e-13, abs=1e-13), name
+        small = locus.phi <= 0.1
+        # What is left out begins with Φ⁶, in no series with a coefficient above 1.
+        assert (np.abs(locus.ratio - locus.ratio_series)[small] <= locus.phi[small] ** 6 + 1e-10).all(), name
 
 
 @pytest.mark.parametrize("name", LIMITS)
@@ -200,9 +187,8 @@ def test_angles_may_be_given():
     assert len(chart.rows()) == 2
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
-    [
+def test_what_cannot_be_charted_is_said(chart, tmp_path):
+    for arguments, error, message in (
         ({"methods": ["rk5"]}, UnknownNameError, "did you mean 'rk4'"),
         ({"methods": "rk4"}, DTypeError, "methods: expected a list of names, got 'rk4'"),
         ({"methods": []}, ArgumentError, "methods: expected at least one, got none"),
@@ -210,17 +196,31 @@ def test_angles_may_be_given():
         ({"phi": 1.0}, ShapeError, "phi: expected a list of angles in rad"),
         ({"phi": []}, (ShapeError, DTypeError), "phi: expected"),
         ({"phi": [1.0, 1.0]}, ArgumentError, "phi: expected angles that rise"),
-    ],
-)
-def test_what_cannot_be_charted_is_said(arguments, error, message):
-    with pytest.raises(error, match=message):
-        sw.charts.stability(**arguments)
+    ):
+        with pytest.raises(error, match=message):
+            sw.charts.stability(**arguments)
+    for arguments, error, message in (
+        ({"methods": ["rk5"]}, UnknownNameError, "did you mean 'rk4'"),
+        ({"phi": -1.0}, ArgumentError, "phi: expected numbers above zero in rad"),
+        ({"phi": [1.0]}, ShapeError, "phi: expected one number in rad"),
+        ({"periods": 0}, ArgumentError, "periods: expected numbers above zero"),
+        ({"phi": 1e-9}, ArgumentError, "periods: 4 periods with Φ = 1e-09 are 2.51e.10 steps, expected 100000 or fewer"),
+    ):
+        with pytest.raises(error, match=message):
+            sw.charts.figures(**arguments)
+    with pytest.raises(ArgumentError, match="method: expected one of these figures, rk4, got 'verlet'"):
+        sw.charts.figures(["rk4"]).plot(method="verlet")
+    with pytest.raises(UnknownNameError, match="kind: there is no 'locus'; did you mean 'loci'"):
+        chart.plot(kind="locus")
+    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
+        chart.plot(tmp_path / "chart.docx")
 
 
 # ---- files
 
 
-def test_the_csv_reads_back_as_the_same_numbers(chart, tmp_path):
+def test_the_csv_reads_back_as_the_same_numbers(figures, tmp_path):
+    chart = sw.charts.stability(phi=[0.5, 1.0, 3.0])
     chart.to_csv(tmp_path / "stability.csv")
     rows = read(tmp_path / "stability.csv")
     assert len(rows) == len(METHODS) * len(chart.phi)
@@ -232,18 +232,27 @@ def test_the_csv_reads_back_as_the_same_numbers(chart, tmp_path):
             assert [float(row[name]) for row in own] == values.tolist()
         assert [row["kind"] for row in own] == locus.kind.tolist()
         assert [row["stable"] == "True" for row in own] == locus.stable.tolist()
+    figures.to_csv(tmp_path / "figures.csv")
+    rows = read(tmp_path / "figures.csv")
+    for samples in figures.samples:
+        own = [row for row in rows if row["method"] == samples.method.name]
+        for name, values in (("t", samples.t), ("v", samples.v), ("y", samples.y), ("exact", np.cos(samples.t))):
+            assert [float(row[name]) for row in own] == values.tolist()
+    for case in figures.harmonic:
+        assert [float(row["y"]) for row in rows if row["method"] == case.name] == case.y.tolist()
 
 
-def test_the_json_is_strict_and_whole(chart, figures, tmp_path):
+def test_the_json_is_strict_and_whole(figures, tmp_path):
+    chart = sw.charts.stability(phi=[0.5, 1.0])
     chart.to_json(tmp_path / "stability.json")
-    whole = json.loads((tmp_path / "stability.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    whole = json.loads((tmp_path / "stability.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
     assert len(whole["rows"]) == len(chart.rows())
     assert [row["method"] for row in whole["summary"]] == [method.name for method in METHODS]
     euler, rk4 = (next(row for row in whole["summary"] if row["method"] == name) for name in ("standard_euler", "rk4"))
     assert (euler["samples_per_period"], euler["r1_squared_minus_1"]) == (None, "Φ²")
     assert (rk4["r1_squared_minus_1"], rk4["frequency_deviation"]) == ("−Φ⁶/72 + Φ⁸/576", "−Φ⁴/120 + Φ⁶/336")
     figures.to_json(tmp_path / "figures.json")
-    whole = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    whole = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
     assert (whole["phi"], len(whole["summary"]), len(whole["rows"])) == (0.5, len(METHODS), len(figures.rows()))
 
 
@@ -256,18 +265,16 @@ def panels(figure, chart):
     return {locus.method.name: axes for same, axes in zip(zplane_picture.groups(chart), used, strict=True) for locus in same}
 
 
-@pytest.mark.parametrize(
-    ("methods", "kind"),
-    [
-        (None, "loci"),
-        *itertools.product([["false_heun"], ["verlet", "rk4", "standard_euler"]], ["loci", "curves"]),
-    ],
-    ids=str,
-)
-def test_a_picture_is_whole(kind, methods, tmp_path):
-    chart = sw.charts.stability(methods)
-    figure = chart.plot(tmp_path / "chart.png", kind=kind)
-    check_page(figure, tmp_path / "chart.png")
+@pytest.mark.parametrize("methods", [None, ["false_heun"], ["verlet", "rk4", "standard_euler"]], ids=str)
+@pytest.mark.parametrize("kind", ["loci", "curves"])
+def test_a_picture_is_whole(chart, written, kind, methods, tmp_path):
+    figure, path = written[kind]
+    if methods:
+        chart, path = sw.charts.stability(methods), tmp_path / "chart.png"
+        figure = chart.plot(path, kind=kind)
+    check_page(figure, path)
+    if not methods and kind == "curves":
+        return  # of many methods, looked at below
     titles = [axes.get_title().splitlines() for axes in figure.axes if axes.get_visible() and axes.get_title()]
     shared = zplane_picture.groups(chart)
     names = [[c.method.title for c in same] if len(same) > 1 else [style.named(same[0].method)] for same in shared]
@@ -280,20 +287,21 @@ def test_a_picture_is_whole(kind, methods, tmp_path):
     ]
 
 
-def test_what_is_the_same_shares_a_panel():
+def test_what_is_the_same_shares_a_panel(chart):
     """Damped and False Euler, leapfrog and Verlet have p = 1 − Φ²/2 and q = 1 (§6 to §8); no two others are alike."""
     named = list(CLOSED_FORMS)
-    chart = sw.charts.stability(named)
+    chart = dataclasses.replace(chart, loci=tuple(locus for locus in chart.loci if locus.method.name in named))
     shared = [{locus.method.name for locus in same} for same in zplane_picture.groups(chart)]
     assert [same for same in shared if len(same) > 1] == [{"damped_euler", "false_euler", "leapfrog", "verlet"}]
     assert len(shared) == len(named) - 3
     never = sum(not LIMITS.get(locus.method.name, locus.limit) for locus in chart.loci)
     title = f"{never} of {len(named)} methods are never stable; 4 others have the same eigenvalues"
-    assert chart.plot().texts[0].get_text() == title
+    assert zplane_picture.finding(chart) == title
 
 
-def test_the_loci_are_the_eigenvalues_with_their_angles_and_where_they_leave(chart):
-    figure = chart.plot()
+def test_the_loci_are_the_eigenvalues_with_their_angles_and_where_they_leave(chart, written):
+    figure, _ = written["loci"]
+    assert zplane_picture.finding(chart) == figure.texts[0].get_text()
     first = {same[0].method.name for same in zplane_picture.groups(chart)}
     for name, axes in panels(figure, chart).items():
         locus = of(chart, name)
@@ -332,10 +340,9 @@ def test_branches_do_not_jump(chart):
             assert np.abs(np.diff(line)).max() < 4 * math.sqrt(locus.phi[1] - locus.phi[0])
 
 
-def test_the_curves_of_many_methods_share_two_panels(chart, tmp_path):
+def test_the_curves_of_many_methods_share_two_panels(chart, written):
     """Of eight that are not the same; each ends at its limit, with a dot, and what keeps the energy is named below."""
-    figure = chart.plot(tmp_path / "curves.png", kind="curves")
-    assert faults(figure) == []
+    figure, _ = written["curves"]
     chosen = curves_picture.choose(zplane_picture.groups(chart))
     assert len(chosen) == curves_picture.MOST
     energy, turns = figure.axes
@@ -376,13 +383,6 @@ def test_the_curves_of_few_methods_are_exact_and_series_with_the_limit():
     assert figure.axes[0].get_ylabel() == "r₁² − 1"
     assert figure.axes[1].get_ylabel() == "Ψ/Φ"
     assert figure.axes[-1].get_xlabel() == "Φ = ω₀·dt (rad)"
-
-
-def test_an_unknown_kind_of_picture_is_refused(chart, tmp_path):
-    with pytest.raises(UnknownNameError, match="kind: there is no 'locus'; did you mean 'loci'"):
-        chart.plot(kind="locus")
-    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
-        chart.plot(tmp_path / "chart.docx")
 
 
 def test_without_matplotlib_the_numbers_are_still_there(chart, figures, monkeypatch, tmp_path):
@@ -459,56 +459,48 @@ def test_the_figures_show_what_the_document_says(figures):
     assert figures.samples[0].t[-1] >= 4 * 2 * math.pi > figures.samples[0].t[-2]
 
 
-def test_the_csv_of_the_figures_reads_back(figures, tmp_path):
-    figures.to_csv(tmp_path / "figures.csv")
-    rows = read(tmp_path / "figures.csv")
-    for samples in figures.samples:
-        own = [row for row in rows if row["method"] == samples.method.name]
-        for name, values in (("t", samples.t), ("v", samples.v), ("y", samples.y), ("exact", np.cos(samples.t))):
-            assert [float(row[name]) for row in own] == values.tolist()
-    for case in figures.harmonic:
-        own = [row for row in rows if row["method"] == case.name]
-        assert [float(row["y"]) for row in own] == case.y.tolist()
-
-
-def test_a_picture_for_each_method_and_one_of_all(figures, tmp_path):
-    paths = figures.save(tmp_path / "to" / "be")
+def test_files_of_the_figures(figures, tmp_path):
+    """One of each method and one of all, of a few methods."""
+    few = sw.charts.figures(["standard_euler", "false_euler"])
+    paths = few.save(tmp_path / "to" / "be")
     names = [path.name for path in paths]
-    assert names[0] == "overview.png"
-    assert {"05-standard_euler.png", "07-false_euler.png", "11-semi_false_heun.png"} <= set(names)
-    assert names[1 + len(METHODS) :] == ["04-harmonic.png", "figures.csv", "figures.json"]
-    assert len(read(paths[-2])) == len(figures.rows())
-    assert len(json.loads(paths[-1].read_text(encoding="utf-8"))["rows"]) == len(figures.rows())
+    assert names == ["overview.png", "05-standard_euler.png", "07-false_euler.png", "figures.csv", "figures.json"]
+    assert len(read(paths[-2])) == len(few.rows())
+    assert len(json.loads(paths[-1].read_text(encoding="utf-8"))["rows"]) == len(few.rows())
     assert sorted(names) == sorted(path.name for path in (tmp_path / "to" / "be").iterdir())
-    check_page(figures.plot(), paths[0])
-    for path, samples in zip(paths[1 : 1 + len(METHODS)], figures.samples, strict=True):
-        figure = figures.plot(method=samples.method.name)
-        check_page(figure, path)
-        texts = [text.get_text() for text in figure.texts]
-        assert f"{style.named(samples.method)}: {figures_picture.in_words(samples)}" in texts
-        sentence = next(text for text in texts if text.startswith("r₁² − 1 = "))
-        change, turn = samples.r1_squared - 1, 100 * (samples.ratio - 1)
-        change = "0" if abs(change) < 1e-13 else f"{change:+.3g}"
-        assert sentence.startswith(f"r₁² − 1 = {change}, Ψ/Φ − 1 = {turn:+.3g} %: {samples.kind}".replace("-", "−"))
-        # What grows does not look as if it stayed: Fehlberg's 8e-5 a step.
-        assert ("unstable" in sentence) == change.startswith("+")
+    assert len({samples.file for samples in figures.samples}) == len(METHODS)
+    method = SimpleNamespace(name="new_one", section="no section")
+    assert dataclasses.replace(figures.samples[0], method=method).file == "99-new_one.png"
 
 
-def test_both_curves_are_in_a_figure_and_what_grows_is_told(figures):
-    for samples in figures.samples:
-        figure = figures.plot(method=samples.method)
-        axes = figure.axes[0]
-        if np.abs(samples.y - np.cos(samples.t)).max() <= figures_picture.SEEN:  # what looks exact has the difference below
-            assert np.array_equal(figure.axes[1].lines[1].get_ydata(), samples.y - np.cos(samples.t))
-        else:
-            assert len(figure.axes) == 1
-        dots = [line for line in axes.lines if line.get_marker() == "o"]
-        assert len(dots) == 1
-        assert np.array_equal(dots[0].get_xydata(), np.stack([samples.t / (2 * math.pi), samples.y], axis=1))
-        assert any(np.allclose(line[:, 1], np.cos(2 * math.pi * line[:, 0])) for line in lines(axes) if len(line) > 100)
-        assert axes.get_ylim() == (-2.2, 2.2)
-        labels = [text.get_text() for text in axes.texts]
-        assert labels == ([f"|y| up to {np.abs(samples.y).max():.3g}"] if np.abs(samples.y).max() > 2.2 else [])
+@pytest.mark.parametrize(
+    "method",
+    family(METHODS, lambda m: m.name in ("standard_euler", "false_heun", "verlet", "fehlberg"), lambda m: m.name),
+)
+def test_a_picture_of_one_method(figures, method, tmp_path):
+    """Both curves are in it, and what grows is told."""
+    samples = next(each for each in figures.samples if each.method is method)
+    figure = figures.plot(tmp_path / "one.png", method=method.name)
+    check_page(figure, tmp_path / "one.png")
+    texts = [text.get_text() for text in figure.texts]
+    assert f"{style.named(method)}: {figures_picture.in_words(samples)}" in texts
+    sentence = next(text for text in texts if text.startswith("r₁² − 1 = "))
+    change, turn = samples.r1_squared - 1, 100 * (samples.ratio - 1)
+    change = "0" if abs(change) < 1e-13 else f"{change:+.3g}"
+    assert sentence.startswith(f"r₁² − 1 = {change}, Ψ/Φ − 1 = {turn:+.3g} %: {samples.kind}".replace("-", "−"))
+    # What grows does not look as if it stayed: Fehlberg's 8e-5 a step.
+    assert ("unstable" in sentence) == change.startswith("+")
+    axes = figure.axes[0]
+    if np.abs(samples.y - np.cos(samples.t)).max() <= figures_picture.SEEN:  # what looks exact has the difference below
+        assert np.array_equal(figure.axes[1].lines[1].get_ydata(), samples.y - np.cos(samples.t))
+    else:
+        assert len(figure.axes) == 1
+    (dots,) = [line for line in axes.lines if line.get_marker() == "o"]
+    assert np.array_equal(dots.get_xydata(), np.stack([samples.t / (2 * math.pi), samples.y], axis=1))
+    assert any(np.allclose(line[:, 1], np.cos(2 * math.pi * line[:, 0])) for line in lines(axes) if len(line) > 100)
+    assert axes.get_ylim() == (-2.2, 2.2)
+    labels = [text.get_text() for text in axes.texts]
+    assert labels == ([f"|y| up to {np.abs(samples.y).max():.3g}"] if np.abs(samples.y).max() > 2.2 else [])
 
 
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
@@ -520,44 +512,18 @@ def test_a_figure_of_what_leaves_the_finite_numbers_is_still_drawn(tmp_path):
 
 
 def test_a_double_eigenvalue_has_room_in_the_titles(tmp_path):
-    figures = sw.charts.figures(phi=2.0)
+    figures = sw.charts.figures(["standard_euler", "false_euler", "verlet", "false_heun", "rk4"], phi=2.0)
     check_page(figures.plot(tmp_path / "overview.png"), tmp_path / "overview.png")
     text = figures.plot(method="false_euler").texts[2].get_text()
     assert "unstable oscillation (double eigenvalue -1)" in text
 
 
-def test_a_method_without_a_section_comes_last(figures):
-    method = SimpleNamespace(name="new_one", section="no section")
-    assert dataclasses.replace(figures.samples[0], method=method).file == "99-new_one.png"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
-    [
-        ({"methods": ["rk5"]}, UnknownNameError, "did you mean 'rk4'"),
-        ({"phi": -1.0}, ArgumentError, "phi: expected numbers above zero in rad"),
-        ({"phi": [1.0]}, ShapeError, "phi: expected one number in rad"),
-        ({"periods": 0}, ArgumentError, "periods: expected numbers above zero"),
-        ({"phi": 1e-9}, ArgumentError, "periods: 4 periods with Φ = 1e-09 are 2.51e.10 steps, expected 100000 or fewer"),
-    ],
-)
-def test_what_makes_no_figure_is_said(arguments, error, message):
-    with pytest.raises(error, match=message):
-        sw.charts.figures(**arguments)
-
-
-def test_a_figure_that_is_not_there_is_said():
-    with pytest.raises(ArgumentError, match="method: expected one of these figures, rk4, got 'verlet'"):
-        sw.charts.figures(["rk4"]).plot(method="verlet")
-
-
-def test_the_pictures_of_the_docs_show_every_method():
+def test_the_pictures_of_the_docs_show_every_method(written):
     """A picture has as many rows of panels as its methods need: one that was drawn for fewer is not as high."""
     from matplotlib.image import imread
 
-    images = ROOT / "docs" / "images"
-    chart = sw.charts.stability(phi=[1.0, 2.0])
-    drawn = {f"stability-{kind}": chart.plot(kind=kind) for kind in ("loci", "curves")} | {"figures": sw.charts.figures().plot()}
-    for name, figure in drawn.items():
-        width, height = (round(figure.dpi * inches) for inches in figure.get_size_inches())
-        assert imread(images / f"{name}.png").shape[:2] == (height, width), f"docs/images/{name}.png is older than the methods"
+    check_page(*written["figures"])
+    for name, kind in (("stability-loci", "loci"), ("stability-curves", "curves"), ("figures", "figures")):
+        size = imread(written[kind][1]).shape[:2]
+        file = ROOT / "docs" / "images" / f"{name}.png"
+        assert imread(file).shape[:2] == size, f"docs/images/{name}.png is older than the methods"
