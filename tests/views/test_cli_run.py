@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
-from stepwell.views import charts, cli
+from stepwell.views import charts
 from stepwell.views.cli.settings import scene_with
 from stepwell.views.cli.verdict import growth_of, tenfold, verdict
+from support import commands
 
 
 def run_command(capsys: Any, *words: str) -> tuple[int, str, str]:
-    code = cli.main(["run", *words])
-    return code, *capsys.readouterr()
+    return commands.run_command(capsys, "run", *words)
 
 
 def report(capsys: Any, *words: str) -> dict[str, Any]:
@@ -103,45 +103,45 @@ def test_set_changes_the_system_and_the_start(capsys: Any) -> None:
     assert moved.exact is None
 
 
-@pytest.mark.parametrize(
-    ("setting", "message"),
-    [
-        ("omega", "--set: expected NAME=VALUE, such as omega=3, got 'omega'"),
-        ("=3", "--set: expected NAME=VALUE"),
-        ("omgea=3", "--set: oscillator has no 'omgea'; known: omega, "),
-        ("omega=-1", "omega: expected 1e-100 to 1e+100 rad per unit of time"),
-        ("omega=x", "omega: expected"),
-        ("y=1,2", "--set: expected y as one number, or as numbers of shape (), got '1,2'"),
-        ("y=x", "--set: expected y as one number"),
-        ("damping=nan", "--set: expected finite numbers"),
-    ],
-)
-def test_a_wrong_setting_is_one_line(setting: str, message: str, capsys: Any) -> None:
-    code, out, err = run_command(capsys, "oscillator", "--method", "rk4", "--set", setting)
-    assert (code, out) == (2, "")
-    assert message in err
-    assert err.count("\n") == 1
+#: Wrong settings, and what is said of them.
+SETTINGS = [
+    ("omega", "--set: expected NAME=VALUE, such as omega=3, got 'omega'"),
+    ("=3", "--set: expected NAME=VALUE"),
+    ("omgea=3", "--set: oscillator has no 'omgea'; known: omega, "),
+    ("omega=-1", "omega: expected 1e-100 to 1e+100 rad per unit of time"),
+    ("omega=x", "omega: expected"),
+    ("y=1,2", "--set: expected y as one number, or as numbers of shape (), got '1,2'"),
+    ("y=x", "--set: expected y as one number"),
+    ("damping=nan", "--set: expected finite numbers"),
+]
 
 
-@pytest.mark.parametrize(
-    ("words", "verdict"),
-    [
-        (("oscillator", "--method", "false_euler", "--dt", "3", "--steps", "24"), "grew by 10²⁰: unstable"),
-        (("oscillator", "--method", "standard_euler"), "grew by 10⁴: unstable"),
-        (("oscillator", "--method", "rk4"), "bounded; the state error is at most 0.0"),
-        (("oscillator", "--method", "false_euler", "--dt", "1.9"), "bounded, but wrong: the state error is up to "),
-        (("plummer", "--method", "leapfrog", "--steps", "3"), "finite to the end; the error is unknown"),
-        (("oscillator", "--method", "false_euler", "--dt", "30", "--steps", "400"), "diverged at step "),
-    ],
-)
+def test_a_wrong_setting_is_one_line(capsys: Any) -> None:
+    for setting, message in SETTINGS:
+        code, out, err = run_command(capsys, "oscillator", "--method", "rk4", "--set", setting)
+        assert (code, out) == (2, "")
+        assert message in err
+        assert err.count("\n") == 1, setting
+
+
+VERDICTS = [
+    (("oscillator", "--method", "false_euler", "--dt", "3", "--steps", "24"), "grew by 10²⁰: unstable"),
+    (("oscillator", "--method", "standard_euler"), "grew by 10⁴: unstable"),
+    (("oscillator", "--method", "rk4"), "bounded; the state error is at most 0.0"),
+    (("oscillator", "--method", "false_euler", "--dt", "1.9"), "bounded, but wrong: the state error is up to "),
+    (("plummer", "--method", "leapfrog", "--steps", "3"), "finite to the end; the error is unknown"),
+    (("oscillator", "--method", "false_euler", "--dt", "30", "--steps", "400"), "diverged at step "),
+]
+
+
 @pytest.mark.filterwarnings("ignore")
-def test_the_verdict_is_in_words(words: tuple[str, ...], verdict: str, capsys: Any) -> None:
-    code, out, _ = run_command(capsys, *words)
-    assert code == 0
-    verdicts = [line.partition("verdict")[2].strip() for line in out.splitlines() if line.startswith("verdict")]
-    assert len(verdicts) == 1
-    assert verdicts[0].startswith(verdict)
-    assert "None" not in out
+def test_the_verdict_is_in_words(capsys: Any) -> None:
+    for words, beginning in VERDICTS:
+        code, out, _ = run_command(capsys, *words)
+        assert code == 0
+        (said,) = [line.partition("verdict")[2].strip() for line in out.splitlines() if line.startswith("verdict")]
+        assert said.startswith(beginning), words
+        assert "None" not in out
 
 
 def test_growth_is_against_the_true_motion() -> None:

@@ -21,12 +21,12 @@ class Terminal(io.StringIO):
         return True
 
 
-def on_a_terminal(monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
+def on_a_terminal(monkeypatch: pytest.MonkeyPatch, *words: str, **environment: str) -> list[str]:
     """The lines that a command prints on a terminal of 80 columns."""
     terminal = Terminal()
-    monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setenv("TERM", "xterm")
     with monkeypatch.context() as patch:
+        for name, value in ({"COLUMNS": "80", "TERM": "xterm"} | environment).items():
+            patch.setenv(name, value)
         patch.setattr(sys, "stdout", terminal)
         assert cli.main(list(words)) == 0
     return terminal.getvalue().splitlines()
@@ -51,15 +51,11 @@ def test_colours_are_for_headings_answers_and_the_best_row(monkeypatch: pytest.M
         assert f"\033[{code}m" in line
 
 
-@pytest.mark.parametrize(("name", "value"), [("NO_COLOR", "1"), ("TERM", "dumb")])
-def test_colours_can_be_turned_off(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
-    setenv = monkeypatch.setenv
-    monkeypatch.setattr(monkeypatch, "setenv", lambda key, other: setenv(key, value if key == name else other))
-    setenv(name, value)
-    assert "\033" not in "".join(on_a_terminal(monkeypatch, *ADVISE))
-
-
-def test_a_pipe_has_no_colours(capsys: Any) -> None:
+def test_colours_can_be_turned_off_and_a_pipe_has_none(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert "\033" in "".join(on_a_terminal(monkeypatch, *ADVISE))
+    assert "\033" not in "".join(on_a_terminal(monkeypatch, *ADVISE, NO_COLOR="1"))
+    assert "\033" not in "".join(on_a_terminal(monkeypatch, *ADVISE, TERM="dumb"))
     assert cli.main(list(ADVISE)) == 0
     assert "\033" not in capsys.readouterr().out
 
@@ -74,24 +70,18 @@ WRAPPED = {
 }
 
 
-@pytest.mark.parametrize("words", WRAPPED)
-def test_lines_break_between_words(words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+def test_lines_break_between_words_and_a_table_fits_as_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NO_COLOR", "1")
-    lines = on_a_terminal(monkeypatch, *words)
-    assert max(map(length, lines)) <= 80
-    assert WRAPPED[words] in " ".join(lines)
-
-
-@pytest.mark.parametrize(
-    "words",
-    [("scenes",), ("methods",), ("criteria",), ("stability",), ("figures",), ADVISE, ("bench", "--methods", "rk4,verlet")],
-)
-def test_a_table_fits_as_one(words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NO_COLOR", "1")
-    lines = on_a_terminal(monkeypatch, *words)
-    assert max(map(length, lines)) <= 80
-    assert sum(line.startswith("──") for line in lines) == 1
+    for words, text in WRAPPED.items():
+        lines = on_a_terminal(monkeypatch, *words, NO_COLOR="1")
+        assert max(map(length, lines)) <= 80, words
+        assert text in " ".join(lines), words
+    few = ("standard_euler", "dop853", "semi_false_heun")
+    tables = [("scenes",), ("methods",), *((command, *few) for command in ("criteria", "stability", "figures"))]
+    for words in (*tables, ADVISE, ("bench", "--methods", "rk4,verlet")):
+        lines = on_a_terminal(monkeypatch, *words, NO_COLOR="1")
+        assert max(map(length, lines)) <= 80, words
+        assert sum(line.startswith("──") for line in lines) == 1, words
 
 
 def test_columns_are_left_out_in_their_order_and_named() -> None:
@@ -105,15 +95,6 @@ def test_columns_are_left_out_in_their_order_and_named() -> None:
 
 
 def test_progress_says_how_long_the_rest_takes(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    left = progress._time_left()
-    assert left(0.5) == "", "too early to say"
-    now[0] = 10.0
-    assert (left(0.01), left(0.25), left(0.02), left(1.0)) == ("", "30 s left", "8 min left", "")
-
-
-def test_advice_tells_how_far_it_is() -> None:
     shares: list[float] = []
     advice = sw.advise("oscillator", 0.5, 1e-3, methods=["rk4", "leapfrog", "merson"], progress=shares.append)
     assert advice.ranked
@@ -123,3 +104,9 @@ def test_advice_tells_how_far_it_is() -> None:
     assert len(set(shares)) > 6
     with pytest.raises(DTypeError, match=re.escape("progress: expected a function or None, got 1 (int)")):
         sw.advise("oscillator", progress=1)  # type: ignore[arg-type]
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    left = progress._time_left()
+    assert left(0.5) == "", "too early to say"
+    now[0] = 10.0
+    assert (left(0.01), left(0.25), left(0.02), left(1.0)) == ("", "30 s left", "8 min left", "")

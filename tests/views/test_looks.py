@@ -3,6 +3,7 @@
 import functools
 import itertools
 import random
+import sys
 
 import numpy as np
 import pytest
@@ -212,12 +213,18 @@ def test_advice_is_drawn_in_one_line(tmp_path):
         nothing.plot()
 
 
-def test_what_cannot_be_drawn_is_said():
+def test_what_cannot_be_drawn_is_said(monkeypatch):
     batch = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=[1.0, 2.0], dt=0.1, steps=5, every=1)
     with pytest.raises(sw.errors.ArgumentError, match=r"expected a run of one member, got a batch of shape \(2,\)"):
         batch.plot()
     with pytest.raises(sw.errors.ArgumentError, match="expected two saved states or more, got 1; run with every="):
         sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5).plot()
+    analysis = sw.analyse(sw.Oscillator(), "rk4", dt=0.5)
+    advice = sw.advise("oscillator", tolerance=1e-3, methods=["rk4"], cost="evaluations")
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    for draw in (analysis.plot, advice.plot):
+        with pytest.raises(sw.errors.UnsupportedError, match=r"pip install 'stepwell\[chart\]'"):
+            draw()
 
 
 #: The document's methods and those of professionals; a method that is added gains or loses what it does.
