@@ -1,5 +1,6 @@
 """Pictures of runs that several tests look at."""
 
+import functools
 import random
 from collections import defaultdict
 
@@ -14,33 +15,46 @@ def looked_at(scene, method="false_euler", dt=None, **options):
     return sw.charts.run_picture(scene, scene.run(method, dt, **({"every": 1} | options)))
 
 
-@pytest.fixture(scope="module", name="pictures")
-def the_pictures():
-    """One of each kind of picture, and of what can go wrong in it."""
-    scenes = sw.scenes
-    with pytest.warns(sw.DivergenceWarning):
-        crash = looked_at(scenes.oscillator(), "standard_euler", 100.0, steps=400)
-    with pytest.warns(sw.AccuracyWarning, match="has another energy at the end"):
-        gone = looked_at(scenes.pythagorean(), "leapfrog", every=5)
-    with pytest.warns(sw.AccuracyWarning, match="bodies 1 and 2 met within step 349"):
-        long = looked_at(scenes.energy_control(), "standard_euler", steps=5000)
-    return {
-        "attitude": looked_at(scenes.aircraft()),
-        "body": looked_at(scenes.dzhanibekov(), "rk4"),
-        "top": looked_at(scenes.heavy_top(), "rk4"),
-        "trapped": looked_at(scenes.gimbal_trap()),
-        "orbits": looked_at(scenes.figure_eight(), "leapfrog"),
-        "long": long,
-        "space": looked_at(scenes.plummer(), "leapfrog", steps=200),
-        "two": looked_at(scenes.kepler()),
-        "gone": gone,
-        "swing": looked_at(scenes.oscillator()),
-        "steady": looked_at(scenes.forced_oscillator(), "rk4"),
-        "grown": looked_at(scenes.oscillator(), "standard_euler"),
-        "crash": crash,
-        "rows": looked_at(scenes.chain()),
-        "many rows": looked_at(scenes.chain(100, {1: 1.0, 3: 0.4}), steps=900),
-    }
+#: One of each kind of picture, and of what can go wrong in it: a scene, a method if it is not the usual one, and options.
+_LOOKED_AT = {
+    "attitude": ("aircraft", {}),
+    "body": ("dzhanibekov", {"method": "rk4"}),
+    "top": ("heavy_top", {"method": "rk4"}),
+    "trapped": ("gimbal_trap", {}),
+    "orbits": ("figure_eight", {"method": "leapfrog"}),
+    "long": ("energy_control", {"method": "standard_euler", "steps": 5000}),
+    "space": ("plummer", {"method": "leapfrog", "steps": 200}),
+    "two": ("kepler", {}),
+    "gone": ("pythagorean", {"method": "leapfrog", "every": 5}),
+    "swing": ("oscillator", {}),
+    "steady": ("forced_oscillator", {"method": "rk4"}),
+    "grown": ("oscillator", {"method": "standard_euler"}),
+    "crash": ("oscillator", {"method": "standard_euler", "dt": 100.0, "steps": 400}),
+    "rows": ("chain", {}),
+    "many rows": ("chain", {"steps": 900}),
+}
+#: What a run is warned of.
+_WARNED = {
+    "crash": (sw.DivergenceWarning, "diverged at step"),
+    "gone": (sw.AccuracyWarning, "has another energy at the end"),
+    "long": (sw.AccuracyWarning, "bodies 1 and 2 met within step 349"),
+}
+
+
+@functools.cache
+def picture_of(kind):
+    name, options = _LOOKED_AT[kind]
+    scene = sw.scenes.chain(100, {1: 1.0, 3: 0.4}) if kind == "many rows" else sw.scenes.scene(name)
+    if kind not in _WARNED:
+        return looked_at(scene, **options)
+    with pytest.warns(_WARNED[kind][0], match=_WARNED[kind][1]):
+        return looked_at(scene, **options)
+
+
+@functools.cache
+def figure_of(kind):
+    """Drawn once, for tests that look at it."""
+    return picture_of(kind).plot()
 
 
 KINDS = ("body", "top", "orbits", "long", "space", "two", "gone", "swing", "steady", "grown", "crash", "rows", "many rows")

@@ -7,31 +7,32 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import stepwell as sw
+from matplotlib import animation
 from PIL import Image
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.views.charts import frames, runs_animation
 from stepwell.views.charts.run_panels import view_of
-from support.pictured import every_kind, looked_at, said, the_pictures  # noqa: F401
+from support.pictured import every_kind, looked_at, picture_of
 
 
 @every_kind
-def test_an_animation_shows_the_states(pictures, kind, tmp_path):
-    chart = pictures[kind]
+def test_an_animation_shows_the_states(kind, tmp_path):
+    chart = picture_of(kind)
     chart.animate(tmp_path / "run.gif", seconds=0.4, fps=10)
     drawn = []
-    with Image.open(tmp_path / "run.gif") as animation:
-        assert (animation.size, animation.n_frames, animation.info["duration"]) == ((1000, 562), 4, 100)
+    with Image.open(tmp_path / "run.gif") as moving:
+        assert (moving.size, moving.n_frames, moving.info["duration"]) == ((1000, 562), 4, 100)
         for i in range(4):
-            animation.seek(i)
-            drawn.append(np.asarray(animation.convert("L"), dtype=int))
+            moving.seek(i)
+            drawn.append(np.asarray(moving.convert("L"), dtype=int))
     for one, other in pairwise(drawn):
         assert (np.abs(one - other) > 60).sum() > 30  # the bodies moved, and the clock went on
 
 
 @every_kind
-def test_nothing_in_an_animation_is_cut_off_or_covered(pictures, kind):
-    figure, show = runs_animation.stage(pictures[kind])
-    show(int(np.flatnonzero(pictures[kind].finite)[-1]))
+def test_nothing_in_an_animation_is_cut_off_or_covered(kind):
+    figure, show = runs_animation.stage(picture_of(kind))
+    show(int(np.flatnonzero(picture_of(kind).finite)[-1]))
     page = figure.bbox
     boxes = [axes.get_tightbbox() for axes in figure.axes]
     boxes += [text.get_window_extent() for text in figure.texts if text.get_text()]
@@ -41,8 +42,8 @@ def test_nothing_in_an_animation_is_cut_off_or_covered(pictures, kind):
         assert not any(box.overlaps(other) for other in boxes[:i])
 
 
-def test_a_frame_is_the_state_of_its_time(pictures):
-    chart = pictures["orbits"]
+def test_a_frame_is_the_state_of_its_time():
+    chart = picture_of("orbits")
     figure, show = runs_animation.stage(chart)
     show(70)
     assert f"t = {chart.run.t[70]:6.3f}" in [text.get_text() for text in figure.texts]
@@ -54,14 +55,14 @@ def test_a_frame_is_the_state_of_its_time(pictures):
         assert len(trail) == pytest.approx(0.3 * chart.scene.period / chart.run.dt, abs=2)
     assert len(trails) == 3
 
-    chart = pictures["rows"]
+    chart = picture_of("rows")
     figure, show = runs_animation.stage(chart)
     show(33)
     exact, mark = figure.axes[0].lines[1:3]
     assert np.array_equal(mark.get_ydata(), chart.run.y[33])
     assert np.array_equal(exact.get_ydata(), chart.scene.exact(chart.run.t[33:34])[1][0])
 
-    chart = pictures["swing"]
+    chart = picture_of("swing")
     figure, show = runs_animation.stage(chart)
     show(33)
     show(20)
@@ -73,35 +74,35 @@ def test_no_frame_is_made_up(tmp_path):
     """Six states are six frames, and the animation is as long as was asked."""
     chart = looked_at(sw.scenes.clover(), every=20)
     chart.animate(tmp_path / "run.gif", seconds=3, fps=25)
-    with Image.open(tmp_path / "run.gif") as animation:
-        assert (animation.n_frames, animation.info["duration"]) == (6, 500)
+    with Image.open(tmp_path / "run.gif") as moving:
+        assert (moving.n_frames, moving.info["duration"]) == (6, 500)
 
 
-@pytest.mark.parametrize("name", ["double_pendulum", "jelly_cube"])
-def test_rods_and_springs_are_drawn_in_the_view_of_the_page(name):
-    scene = sw.scenes.scene(name)
-    chart = looked_at(scene, "rk4", steps=40)
-    figure, show = runs_animation.stage(chart)
-    show(30)
-    (drawn,) = [line for line in figure.axes[0].lines if np.isnan(line.get_xdata()).any()]
-    pairs = drawn.get_xydata().reshape(-1, 3, 2)[:, :2]
-    places = view_of(chart).places[30]
-    if name == "double_pendulum":
-        assert pairs.tolist() == [places.tolist(), [[0.0, 0.0], places[0].tolist()]]
-    else:
-        np.testing.assert_array_equal(pairs, places[scene.system.pairs])
+def test_rods_and_springs_are_drawn_in_the_view_of_the_page():
+    for name in ("double_pendulum", "jelly_cube"):
+        scene = sw.scenes.scene(name)
+        chart = looked_at(scene, "rk4", steps=40)
+        figure, show = runs_animation.stage(chart)
+        show(30)
+        (drawn,) = [line for line in figure.axes[0].lines if np.isnan(line.get_xdata()).any()]
+        pairs = drawn.get_xydata().reshape(-1, 3, 2)[:, :2]
+        places = view_of(chart).places[30]
+        if name == "double_pendulum":
+            assert pairs.tolist() == [places.tolist(), [[0.0, 0.0], places[0].tolist()]]
+        else:
+            np.testing.assert_array_equal(pairs, places[scene.system.pairs])
 
 
-def test_only_errors_that_are_known_are_beside_the_motion(pictures):
+def test_only_errors_that_are_known_are_beside_the_motion():
     for kind, panels in (("orbits", 2), ("space", 1)):
-        figure, _ = runs_animation.stage(pictures[kind])
+        figure, _ = runs_animation.stage(picture_of(kind))
         assert len(figure.axes) == 1 + panels
         assert not any("no exact solution" in text.get_text() for axes in figure.axes for text in axes.texts)
 
 
-def test_what_moves_is_all_that_differs_from_a_whole_drawing(pictures):
+def test_what_moves_is_all_that_differs_from_a_whole_drawing():
     """The frames that are drawn over one ground are those of a figure that is drawn anew."""
-    chart = pictures["orbits"]
+    chart = picture_of("orbits")
     figure, show = runs_animation.stage(chart)
     drawn = frames.Frames(figure, show, [20, 70])
     drawn.frame(20)
@@ -115,7 +116,7 @@ def test_what_moves_is_all_that_differs_from_a_whole_drawing(pictures):
     assert (np.abs(over.astype(int) - whole.astype(int)) > 60).any(axis=2).mean() < 2e-3  # where the order of lines differs
 
 
-@pytest.mark.parametrize("name", ["double_pendulum", "cloth"])
+@pytest.mark.parametrize("name", ["double_pendulum", pytest.param("cloth", marks=pytest.mark.long)])
 def test_a_gif_is_quick_and_small_and_says_how_far_it_is(name, tmp_path):
     scene = sw.scenes.scene(name)
     chart = looked_at(scene, "leapfrog" if name == "cloth" else "rk4")
@@ -126,43 +127,24 @@ def test_a_gif_is_quick_and_small_and_says_how_far_it_is(name, tmp_path):
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     assert (tmp_path / "run.gif").stat().st_size <= 1_500_000
-    with Image.open(tmp_path / "run.gif") as animation:
-        assert animation.n_frames == len(shares)
-        assert animation.n_frames * animation.info["duration"] == pytest.approx(10_000, rel=0.05)
+    with Image.open(tmp_path / "run.gif") as moving:
+        assert moving.n_frames == len(shares)
+        assert moving.n_frames * moving.info["duration"] == pytest.approx(10_000, rel=0.05)
 
 
-def test_without_ffmpeg_an_mp4_is_refused_by_name(monkeypatch, tmp_path):
-    from matplotlib import animation
-
-    monkeypatch.setattr(animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
+def test_an_animation_that_cannot_be_is_refused(monkeypatch, tmp_path):
     chart = looked_at(sw.scenes.clover())
-    with pytest.raises(UnsupportedError, match=r"an \.mp4 needs the program ffmpeg, which is not found"):
-        chart.animate(tmp_path / "run.mp4")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_with_ffmpeg_an_mp4_is_written(tmp_path):
-    from matplotlib import animation
-
-    if not animation.FFMpegWriter.isAvailable():
-        pytest.skip("there is no ffmpeg here")
-    looked_at(sw.scenes.clover(), every=50).animate(tmp_path / "run.mp4", seconds=1, fps=2)
-    assert (tmp_path / "run.mp4").read_bytes()[4:8] == b"ftyp"
-
-
-@pytest.mark.parametrize(
-    ("path", "options", "message"),
-    [
+    for path, options, message in (
         ("run.avi", {}, r"path: expected an ending of an animation, one of \.html, \.gif, \.mp4, got"),
         ("run.gif", {"seconds": 0}, "seconds: expected numbers above zero"),
         ("run.gif", {"fps": math.inf}, "fps"),
         ("run.gif", {"seconds": 1e6, "fps": 1e3}, "expected 20000 or fewer"),
-    ],
-)
-def test_an_animation_that_cannot_be_is_refused(path, options, message, tmp_path):
-    chart = looked_at(sw.scenes.clover())
-    with pytest.raises(ArgumentError, match=message):
-        chart.animate(tmp_path / path, **options)
+    ):
+        with pytest.raises(ArgumentError, match=message):
+            chart.animate(tmp_path / path, **options)
     with pytest.raises(ArgumentError, match="expected an ending of a picture"):
         chart.plot(tmp_path / "run.gif2")
+    monkeypatch.setattr(animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
+    with pytest.raises(UnsupportedError, match=r"an \.mp4 needs the program ffmpeg, which is not found"):
+        chart.animate(tmp_path / "run.mp4")
     assert list(tmp_path.iterdir()) == []
