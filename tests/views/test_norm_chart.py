@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from pathlib import Path
@@ -12,6 +11,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.views.charts import norm
+from support.charted import read
 
 GAINS = (0.05, 0.3, 0.9)
 
@@ -54,8 +54,7 @@ def test_files_and_picture(tmp_path: Path) -> None:
     chart = norm(gains=np.geomspace(0.02, 0.9, 9), progress=shares.append)
     assert shares[-1] == 1.0
     chart.to_csv(tmp_path / "n.csv")
-    with (tmp_path / "n.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = read(tmp_path / "n.csv")
     assert len(rows) == len(chart.rows()) == 27
     assert [float(row["angle_error"]) for row in rows if row["method"] == "rk4"] == chart.lines[2].angle_error.tolist()
     chart.to_json(tmp_path / "n.json")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from fractions import Fraction
 from pathlib import Path
@@ -14,6 +13,7 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.views.charts import powers
 from stepwell.views.charts.powers import FORMS
+from support.charted import read
 from support.truths import CLOSED_FORMS
 
 
@@ -72,8 +72,7 @@ def test_a_power_costs_little_and_errs_like_steps() -> None:
 def test_files_and_picture(tmp_path: Path) -> None:
     chart = powers("rk4", system=sw.Chain(3), y=[1.0, 0.0, 0.0], steps=[1, 100, 1000])
     chart.to_csv(tmp_path / "p.csv")
-    with (tmp_path / "p.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = read(tmp_path / "p.csv")
     assert [float(row["error"]) for row in rows if row["form"] == "power"] == chart.errors["power"].tolist()
     assert len(rows) == len(chart.rows()) == 9
     chart.to_json(tmp_path / "p.json")
