@@ -62,14 +62,14 @@ def test_licences_are_of_the_crates_in_a_wheel() -> None:
     assert {"LICENSE", "THIRD-PARTY.txt"} == set(PROJECT["license-files"])
 
 
-@pytest.mark.parametrize("file", WORKFLOWS, ids=lambda file: file.stem)
-def test_a_workflow_may_do_little_and_ends(file: Path) -> None:
-    text = file.read_text(encoding="utf-8")
-    assert yaml.safe_load(text)["permissions"] == {"contents": "read"}
-    assert "concurrency:" in text
-    for job in jobs(file).values():
-        assert "uses" in job or job["timeout-minutes"] <= 360
-        assert set(job.get("permissions", ())) <= {"id-token", "pages"}
+def test_a_workflow_may_do_little_and_ends() -> None:
+    for file in WORKFLOWS:
+        text = file.read_text(encoding="utf-8")
+        assert yaml.safe_load(text)["permissions"] == {"contents": "read"}, file
+        assert "concurrency:" in text, file
+        for job in jobs(file).values():
+            assert "uses" in job or job["timeout-minutes"] <= 360, file
+            assert set(job.get("permissions", ())) <= {"id-token", "pages"}, file
 
 
 def test_actions_are_pinned_by_hash_and_alike() -> None:
@@ -141,32 +141,31 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize(
-    ("files", "core"),
-    [
-        ({f"{NOTES}/METADATA": METADATA.replace("0", "9")}, {}),
-        ({f"{NOTES}/METADATA": "Version: " + CARGO["version"]}, {}),
-        ({f"{NOTES}/WHEEL": "Tag: cp311-abi3-linux_x86_64"}, {}),
-        ({f"{NOTES}/sboms/stepwell-py.cyclonedx.json": '{"components": []}'}, {}),
-        ({"stepwell/_core.so": ""}, {}),
-        ({}, {"system": "macos"}),
-        ({}, {"machine": "arm64"}),
-        ({}, {"exports": frozenset({"PyInit__core", "main"})}),
-        ({}, {"needs": frozenset({"libc.so.6", "libgcc_s.so.1"})}),
-        ({}, {"minimum": (2, 28)}),
-    ],
-)
-def test_a_wheel_with_a_fault_is_refused(
-    files: dict[str, str], core: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kind = build_wheels.WHEELS["linux-x86_64"]
-    for name, contents, library in (("right", FILES, CORE), ("wrong", FILES | files, replace(CORE, **core))):
-        with zipfile.ZipFile(tmp_path / name, "w") as wheel:
-            for path, text in contents.items():
+#: What is wrong with the files of a wheel, or with its core.
+FAULTS: list[dict[str, Any]] = [
+    {f"{NOTES}/METADATA": METADATA.replace("0", "9")},
+    {f"{NOTES}/METADATA": "Version: " + CARGO["version"]},
+    {f"{NOTES}/WHEEL": "Tag: cp311-abi3-linux_x86_64"},
+    {f"{NOTES}/sboms/stepwell-py.cyclonedx.json": '{"components": []}'},
+    {"stepwell/_core.so": ""},
+    {"system": "macos"},
+    {"machine": "arm64"},
+    {"exports": frozenset({"PyInit__core", "main"})},
+    {"needs": frozenset({"libc.so.6", "libgcc_s.so.1"})},
+    {"minimum": (2, 28)},
+]
+
+
+def test_a_wheel_with_a_fault_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def check(files: dict[str, str], core: Library) -> None:
+        with zipfile.ZipFile(tmp_path / "wheel", "w") as wheel:
+            for path, text in files.items():
                 wheel.writestr(path, text)
-        monkeypatch.setattr(wheels, "read", lambda _, library=library: library)
-        if name == "right":
-            wheels.check(tmp_path / name, kind)
-        else:
-            with pytest.raises(AssertionError):
-                wheels.check(tmp_path / name, kind)
+        monkeypatch.setattr(wheels, "read", lambda _: core)
+        wheels.check(tmp_path / "wheel", build_wheels.WHEELS["linux-x86_64"])
+
+    check(FILES, CORE)
+    for fault in FAULTS:
+        of_core = hasattr(CORE, next(iter(fault)))
+        with pytest.raises(AssertionError):
+            check(FILES if of_core else FILES | fault, replace(CORE, **fault) if of_core else CORE)

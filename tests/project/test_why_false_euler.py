@@ -35,13 +35,13 @@ def test_the_half_axes_bound_the_energy() -> None:
     assert float(sw.stability_limit(sw.Oscillator(), "false_euler")) == pytest.approx(2.0, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", ["false_euler", "leapfrog"])
-def test_the_neighbour_swings_faster(method: str) -> None:
-    for phi in (0.1, 0.5, 1.5):
-        turn = float(sw.analyse(sw.Oscillator(), method, dt=phi).angle)
-        assert 2.0 * math.sin(turn / 2.0) == pytest.approx(phi, rel=1e-12)
-    turn = float(sw.analyse(sw.Oscillator(), method, dt=0.01).angle)
-    assert turn / 0.01 - 1.0 == pytest.approx(0.01**2 / 24.0, rel=1e-4)
+def test_the_neighbour_swings_faster() -> None:
+    for method in ("false_euler", "leapfrog"):
+        for phi in (0.1, 0.5, 1.5):
+            turn = float(sw.analyse(sw.Oscillator(), method, dt=phi).angle)
+            assert 2.0 * math.sin(turn / 2.0) == pytest.approx(phi, rel=1e-12)
+        turn = float(sw.analyse(sw.Oscillator(), method, dt=0.01).angle)
+        assert turn / 0.01 - 1.0 == pytest.approx(0.01**2 / 24.0, rel=1e-4)
 
 
 def test_leapfrog_is_off_by_a_part_of_the_square() -> None:
