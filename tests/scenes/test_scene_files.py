@@ -66,24 +66,18 @@ def test_several_scenes_are_told_apart(tmp_path: Path, file: str) -> None:
         sw.scenes.scene(f"{two}:fst")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_what_is_wrong_with_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "wrong.py"
+    for text, message in (
         ("x = 1\n", r"makes no Scene; write scene = sw\.Scene"),
         ("1 / 0\n", r"cannot be run: ZeroDivisionError: division by zero"),
         ("x = (\n", r"cannot be run: SyntaxError"),
         ("import stepwell as sw\nscene = sw.Scene(sw.Pendulum(), v=0.0)\n", r"y: expected the coordinates"),
-    ],
-)
-def test_what_is_wrong_with_a_file(text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "wrong.py"
-    path.write_text(text)
-    with pytest.raises(ArgumentError, match=message):
-        sw.scenes.scene(str(path))
-    assert main(["run", str(path), "--method", "rk4"]) == 2
-    assert capsys.readouterr().err.startswith("stepwell: ")
-
-
-def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    ):
+        path.write_text(text)
+        with pytest.raises(ArgumentError, match=message):
+            sw.scenes.scene(str(path))
+        assert main(["run", str(path), "--method", "rk4"]) == 2
+        assert capsys.readouterr().err.startswith("stepwell: ")
     assert main(["run", "nowhere.py", "--method", "rk4"]) == 2
     assert "there is no file 'nowhere.py'" in capsys.readouterr().err

@@ -14,6 +14,7 @@ from stepwell.scenes.base import LEAST_SCALE
 from stepwell.scenes.truth import METHOD, METHOD_IF_STIFF, method_for, with_truth
 from stepwell.views.charts.panel_picture import _blows_up
 from support.advised import unmeasured  # noqa: F401
+from support.charted import _hasty_times  # noqa: F401
 from support.stiff_problems import PROBLEMS
 
 STIFF = {name: sw.scenes.scene(name) for name in ("rober", "oregonator", "hires", "van_der_pol:mu=1000")}
@@ -43,14 +44,8 @@ def test_the_true_motion_of_van_der_pol_is_that_of_the_test_set() -> None:
 
 def test_the_method_of_the_reference_is_implicit_where_an_explicit_one_takes_many_more_steps() -> None:
     assert {method_for(scene) for scene in STIFF.values()} == {METHOD_IF_STIFF}
-    tame = [
-        sw.scenes.van_der_pol(1.0),
-        sw.scenes.pendulum(),
-        sw.scenes.kepler(0.9),
-        sw.scenes.chain(),
-        sw.scenes.double_pendulum(),
-    ]
-    assert {method_for(scene) for scene in tame} == {METHOD}
+    for name in ("van_der_pol:mu=1", "pendulum", "kepler:e=0.9", "chain", "double_pendulum"):
+        assert method_for(sw.scenes.scene(name)) == METHOD, name
     known = with_truth(STIFF["rober"])
     assert pickle.loads(pickle.dumps(known)) == known
 
@@ -143,7 +138,7 @@ def test_the_limit_that_advice_tells_is_where_an_explicit_method_blows_up() -> N
 @pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("name", ["oscillator", "pendulum", "clover", "van_der_pol:mu=1"])
 def test_advice_stays_explicit_on_what_is_not_stiff(name: str) -> None:
-    advice = sw.advise(name, frame=None, tolerance=1e-3, cost="evaluations")
+    advice = sw.advise(name, frame=None, tolerance=1e-3, methods=METHODS, cost="evaluations")
     assert advice.best is not None
     assert not advice.best.method.is_implicit
     assert advice.stiff is None
@@ -157,7 +152,7 @@ def test_advice_stays_explicit_on_what_is_not_stiff(name: str) -> None:
 @pytest.fixture(scope="module", name="chart")
 def the_chart() -> sw.charts.WorkPrecision:
     return sw.charts.work_precision(
-        "rober", ["rk4", "fehlberg_5", "rosenbrock23", "rodas4"], [40, 400, 4000, 40_000, 400_000], tolerances=[1e-2, 1e-5]
+        "rober", ["rk4", "fehlberg_5", "rosenbrock23", "rodas4"], [40, 400, 4000, 40_000, 200_000], tolerances=[1e-2, 1e-5]
     )
 
 
