@@ -14,7 +14,7 @@ from stepwell import _core
 from stepwell.device import blocks, bodies, device_of, opencl
 from stepwell.errors import UnsupportedError
 from support import families, recorded
-from support.devices import assert_same, needs_device, of_recorded, same
+from support.devices import assert_same, needs_device, of_recorded, same, velocity_verlet
 from support.families import family
 from support.own_methods import adams_bashforth_2
 
@@ -50,14 +50,6 @@ def that_meet() -> dict[str, Any]:
 
 
 FORCES: list[Any] = ["newton", "logarithmic", "printed"]
-
-
-@sw.method
-def velocity_verlet(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
-    """A step that begins where the last ended."""
-    half = v + 0.5 * s.dv(t, v, y)
-    moved = y + s.dy(t, half, y)
-    return half + 0.5 * s.dv(t + h, half, moved), moved
 
 
 @pytest.fixture

@@ -116,7 +116,7 @@ def test_the_page_of_options_is_that_of_a_device(option: str, monkeypatch: pytes
         assert options.refusal(kind, names) == expected, kind.name
 
 
-#: All kinds of batches, worlds, records and starts are among them; methods and systems are in ``test_device_proof.py``.
+#: All kinds of batches, worlds, records and starts are among them; methods and systems are above.
 SOME = (*SHORT[27::36], "pefrl, chain of five, direct, in pieces", "leapfrog, free, past some limits")
 
 

@@ -85,6 +85,14 @@ def driven(t: Any, v: Any, y: Any, *, k: Any = 1.0, u: Any = 0.0) -> Any:
     return -k * np.sin(y) + 0.3 * np.cos(0.7 * t) + u
 
 
+@sw.method
+def velocity_verlet(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
+    """A step that begins where the last ended."""
+    half = v + 0.5 * s.dv(t, v, y)
+    moved = y + s.dy(t, half, y)
+    return half + 0.5 * s.dv(t + h, half, moved), moved
+
+
 #: Of the recorded runs those whose kernels are compiled in a second; a few of them here, all by `make test-long`.
 SHORT = [
     name for name in recorded.written() if not any(word in name for word in ("large", "bodies", "tolerance", "power", "fused"))

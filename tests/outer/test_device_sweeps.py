@@ -1,4 +1,4 @@
-"""Outcomes of sweeps that a device computes while it makes the steps: the bits of the CPU, and no history crosses the bus."""
+"""Sweeps whose members a device steps, computing outcomes meanwhile: the bits of the CPU, and no history crosses the bus."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import pytest
 import stepwell as sw
 from stepwell.device import adaptive, fixed, opencl
 from stepwell.device.reductions import Extremes, Observer
+from stepwell.errors import ArgumentError, UnsupportedError
+from stepwell.studies.sweeps import ensemble
 from support.devices import NAMES, assert_alike, needs_device
 from support.families import family
 from support.sweeping import driven, swinging
@@ -88,10 +90,10 @@ def bus(monkeypatch: Any) -> list[int]:
     return sizes
 
 
-def both(name: str, system: Any, axes: Any, method: str, **options: Any) -> tuple[Any, Any]:
+def both(system: Any, axes: Any, method: str, **options: Any) -> tuple[Any, Any]:
     """The sweep by the CPU and by a device, which warn of the same."""
     results, said = [], []
-    for device in ("cpu", name):
+    for device in ("cpu", "opencl"):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             results.append(sw.sweep(system, axes, method, device=device, **options))
@@ -104,32 +106,29 @@ def both(name: str, system: Any, axes: Any, method: str, **options: Any) -> tupl
 LONG_CASES = ("one block", "passages", "a method with a carry", "a force", "float32, fused", "exact steps", "with exponents")
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("case", family(CASES, lambda case: case not in LONG_CASES))
-def test_the_bits_are_those_of_the_cpu(name: str, case: str, bus: list[int]) -> None:
+def test_the_bits_are_those_of_the_cpu(case: str, bus: list[int]) -> None:
     system, axes, method, options = CASES[case]
     options = {"dt": 0.02, "v": 0.3, "steps": 800} | options
-    cpu, device = both(name, system, axes, method, **{key: value for key, value in options.items() if value is not None})
+    cpu, device = both(system, axes, method, **{key: value for key, value in options.items() if value is not None})
     assert_alike(cpu, device)
     members = cpu["status"].size
     states = 1 + ("transient" in options) + ("every" in options) * 4
     assert sum(bus) / 8 < members * (100 + 24 * states), "histories would be 1600 numbers of each member, or more"
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_what_comes_back_does_not_grow_with_the_run(name: str, bus: list[int]) -> None:
+def test_what_comes_back_does_not_grow_with_the_run(bus: list[int]) -> None:
     """Of n numbers of a state come back the state, a last step that was bad, and 2n, n, 5 + 2n and 9 + 4n of the outcomes."""
     sizes, outcomes = [], ["extremes", "mean", Crossing(("y", 0)), Period(("y", 1))]
     axes = {"rho": ("rho", np.linspace(10.0, 40.0, 70))}
     for steps in (10, 1000):
         bus.clear()
-        sw.sweep(lorenz, axes, "rk4", y=1.0, dt=0.01, steps=steps, outcomes=outcomes, device=name)
+        sw.sweep(lorenz, axes, "rk4", y=1.0, dt=0.01, steps=steps, outcomes=outcomes, device="opencl")
         sizes.append(sum(bus))
     assert sizes[0] == sizes[1] == 8 * 70 * (3 + 1 + 6 + 3 + 11 + 21)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_what_must_see_the_states_sees_them(name: str, bus: list[int]) -> None:
+def test_what_must_see_the_states_sees_them(bus: list[int]) -> None:
     """A history, a function of Python, events, quantities in float32: saved states cross the bus, with the same results."""
     plain: dict[str, Any] = {"v": 0.3, "dt": 0.02, "steps": 300}
     outcomes: list[dict[str, Any]] = [
@@ -141,26 +140,25 @@ def test_what_must_see_the_states_sees_them(name: str, bus: list[int]) -> None:
     for each in outcomes:
         bus.clear()
         system = sw.Oscillator if "dtype" in each else driven
-        cpu, device = both(name, system, OMEGA if "dtype" in each else MU, "rk4", **plain, **each)
+        cpu, device = both(system, OMEGA if "dtype" in each else MU, "rk4", **plain, **each)
         assert_alike(cpu, device)
         assert sum(bus) > 8 * 300
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(
     ("method", "system"), family([("rk4", driven), ("leapfrog", swinging)], lambda method, _: method != "rk4")
 )
-def test_launches_and_chunks(name: str, method: str, system: Any, monkeypatch: Any) -> None:
+def test_launches_and_chunks(method: str, system: Any, monkeypatch: Any) -> None:
     """Where launches end makes no difference: within an interval, at its end, behind several. A carry goes over them, too."""
     options: dict[str, Any] = {"v": 0.3, "dt": 0.02, "steps": 205, "transient": 2, "observe": 6}
     outcomes: Any = ["mean", "extremes", "period", Crossing("v", 0.1, -1)]
     cpu = sw.sweep(system, MU, method, outcomes=outcomes, **options)
     for most in (1, 4, 6, 7, 40):
         monkeypatch.setattr(fixed, "MOST_STEPS", most)
-        assert_alike(cpu, sw.sweep(system, MU, method, outcomes=outcomes, device=name, **options))
+        assert_alike(cpu, sw.sweep(system, MU, method, outcomes=outcomes, device="opencl", **options))
     monkeypatch.undo()
     for more in ({"chunk": 7}, {"memory": 1e5}, {"chunk": 9, "threads": 3}):
-        assert_alike(cpu, sw.sweep(system, MU, method, outcomes=outcomes, device=name, **more, **options))
+        assert_alike(cpu, sw.sweep(system, MU, method, outcomes=outcomes, device="opencl", **more, **options))
 
 
 #: One without a carry, and one whose velocities are computed, each with other numbers.
@@ -168,20 +166,17 @@ DIVERGING = itertools.product(("rk4", "leapfrog", "verlet"), ("float64", "float3
 FEW_DIVERGING = (("rk4", "float64"), ("verlet", "float32"))
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(("method", "dtype"), family(DIVERGING, lambda *each: each in FEW_DIVERGING))
-def test_members_that_diverge(name: str, dtype: str, method: str, bus: list[int]) -> None:
+def test_members_that_diverge(dtype: str, method: str, bus: list[int]) -> None:
     """States that are not finite are in the extremes and means, also where only velocities are not; and zeros have one sign."""
     axes = {"omega": ("omega", np.geomspace(0.5, 3000.0, 40)), "y": ("y0", [0.0, -0.0, 1.0])}
     outcomes = ["extremes", "mean", "period", "last"]
     options: dict[str, Any] = {"v": 0.0, "dt": 0.01, "steps": 700, "transient": 20, "observe": 50, "outcomes": outcomes}
-    cpu, device = both(name, sw.Oscillator, axes, method, dtype=dtype, **options)
+    cpu, device = both(sw.Oscillator, axes, method, dtype=dtype, **options)
     assert_alike(cpu, device)
     assert 0 < int((cpu.status > 0).sum()) < cpu.status.size
     assert bool(np.isnan(cpu.y_mean).any())
-    both_now, both_device = both(
-        name, explodes, {"rate": [0.1, 3.0, 0.2, 9.0]}, "rk4", y=1.0, dt=0.1, steps=200, outcomes=outcomes
-    )
+    both_now, both_device = both(explodes, {"rate": [0.1, 3.0, 0.2, 9.0]}, "rk4", y=1.0, dt=0.1, steps=200, outcomes=outcomes)
     assert_alike(both_now, both_device)
 
 
@@ -189,13 +184,12 @@ def test_members_that_diverge(name: str, dtype: str, method: str, bus: list[int]
 OF_EACH_MEMBER = itertools.product(("rk4", "verlet"), (["last", "extremes"], ["mean", "period"]))
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(
     ("method", "outcomes"), family(OF_EACH_MEMBER, lambda method, outcomes: (method == "verlet") == ("last" in outcomes))
 )
-def test_steps_of_each_member(name: str, method: str, outcomes: list[str], bus: list[int]) -> None:
+def test_steps_of_each_member(method: str, outcomes: list[str], bus: list[int]) -> None:
     axes = {"omega": ("run", [1.0, 2.0, 4.0]), "dt": ("run", [0.01, 0.02, 0.04])}
-    cpu, device = both(name, sw.Oscillator, axes, method, v=0.0, y=1.0, steps=500, transient=7, outcomes=outcomes)
+    cpu, device = both(sw.Oscillator, axes, method, v=0.0, y=1.0, steps=500, transient=7, outcomes=outcomes)
     assert_alike(cpu, device)
     assert "mean" in outcomes or sum(bus) < 8 * 3 * 40
 
@@ -216,38 +210,30 @@ WITH_A_TOLERANCE: dict[str, tuple[str, dict[str, Any]]] = {
 SEEN: list[Any] = ["extremes", "mean", Crossing("v", 0.1, -1), Period(direction=0), "last", "evaluations"]
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("case", family(WITH_A_TOLERANCE, lambda case: case not in ("dop853, an absolute part", "stiff")))
-def test_with_a_tolerance(name: str, case: str, bus: list[int]) -> None:
+def test_with_a_tolerance(case: str, bus: list[int]) -> None:
     """By a pair, and by a series, which sees states within its steps; other methods differ in their attempts alone."""
     method, options = WITH_A_TOLERANCE[case]
     options = {"v": 0.3, "tolerance": 1e-7, "at": np.linspace(0.0, 12.0, 800)} | options
-    cpu, device = both(name, driven, MU, method, outcomes=SEEN, **options)
+    cpu, device = both(driven, MU, method, outcomes=SEEN, **options)
     assert_alike(cpu, device)
     assert case != "stopped" or 0 < int((cpu.status > 0).sum()) < cpu.status.size
     assert sum(bus) < 8 * 65 * 400 or case in ("backward", "irregular times")
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_tolerance_in_shares_and_launches(name: str, monkeypatch: Any) -> None:
-    options: dict[str, Any] = {
-        "v": 0.3,
-        "tolerance": 1e-7,
-        "at": np.linspace(0.5, 12.0, 40),
-        "outcomes": SEEN,
-    }
+def test_a_tolerance_in_shares_and_launches(monkeypatch: Any) -> None:
+    options: dict[str, Any] = {"v": 0.3, "tolerance": 1e-7, "at": np.linspace(0.5, 12.0, 40), "outcomes": SEEN}
     cpu = sw.sweep(driven, MU, "merson", **options)
     for attempts, saved in ((1, 1 << 14), (3, 1 << 28), (1000, 1 << 13)):
         monkeypatch.setattr(adaptive, "MOST_ATTEMPTS", attempts)
         monkeypatch.setattr(adaptive, "MOST_SAVED", saved)
-        assert_alike(cpu, sw.sweep(driven, MU, "merson", device=name, **options))
-    assert_alike(cpu, sw.sweep(driven, MU, "merson", device=name, chunk=9, threads=3, **options))
+        assert_alike(cpu, sw.sweep(driven, MU, "merson", device="opencl", **options))
+    assert_alike(cpu, sw.sweep(driven, MU, "merson", device="opencl", chunk=9, threads=3, **options))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_with_a_tolerance_quantities_are_seen_here(name: str) -> None:
+def test_with_a_tolerance_quantities_are_seen_here() -> None:
     options: dict[str, Any] = {"v": 0.3, "tolerance": 1e-7, "at": np.linspace(0.0, 5.0, 40), "outcomes": ["mean", E("energy")]}
-    assert_alike(*both(name, sw.Oscillator, OMEGA, "merson", **options))
+    assert_alike(*both(sw.Oscillator, OMEGA, "merson", **options))
 
 
 #: The same rows, reduced otherwise: what is kept of a text in a process goes by both.
@@ -261,17 +247,16 @@ ORDERS: list[tuple[str, list[Any]]] = [
 ]
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(
     ("kind", "orders"), family(ORDERS, lambda kind, orders: kind == "fixed" or orders[0] == ["extremes", "mean"])
 )
-def test_outcomes_in_another_order(name: str, kind: str, orders: list[Any]) -> None:
+def test_outcomes_in_another_order(kind: str, orders: list[Any]) -> None:
     """By the same steps in one process."""
     method, more = "rk4", {"dt": 0.02, "steps": 50}
     if kind == "adaptive":
         method, more = "merson", {"tolerance": 1e-6, "at": np.linspace(0.0, 2.0, 20)}
     for outcomes in orders:
-        assert_alike(*both(name, sw.Oscillator, OMEGA, method, outcomes=outcomes, v=0.3, **more))
+        assert_alike(*both(sw.Oscillator, OMEGA, method, outcomes=outcomes, v=0.3, **more))
 
 
 def test_a_number_that_was_not_a_number_stays_one() -> None:
@@ -280,8 +265,7 @@ def test_a_number_that_was_not_a_number_stays_one() -> None:
     assert "if (q0 < o0 || q0 != q0) o0 = q0;" in lines
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_many_bodies_are_seen_as_before(name: str) -> None:
+def test_many_bodies_are_seen_as_before() -> None:
     rng = np.random.default_rng(4)
     options: dict[str, Any] = {"v": rng.normal(size=(64, 2)), "y": rng.normal(size=(64, 2)), "dt": 0.001, "steps": 3}
 
@@ -289,5 +273,70 @@ def test_many_bodies_are_seen_as_before(name: str) -> None:
         return sw.NBody(np.ones(64), G=strength, softening=0.1)
 
     axes = {"strength": ("strength", [0.5, 1.0])}
-    cpu, device = both(name, many, axes, "leapfrog", outcomes=["extremes", "mean"], **options)
+    cpu, device = both(many, axes, "leapfrog", outcomes=["extremes", "mean"], **options)
     assert_alike(cpu, device)
+
+
+#: Sweeps whose states come back, or members that stop; by a method with a carry, over a transient, an interval, an event.
+STATES: dict[str, tuple[str, dict[str, Any]]] = {
+    "last": ("rk4", {"steps": 90}),
+    "no transient of any length": ("rk4", {"steps": 1, "transient": 1}),
+    "history": ("rk4", {"steps": 90, "every": 20, "outcomes": ["history", "mean"], "observe": 8}),
+    "a function": ("rk4", {"steps": 90, "every": 9, "outcomes": lambda run: run.y.max(axis=0)}),
+    "events": ("rk4", {"steps": 90, "events": sw.Event(lambda t, v, y: y, name="ground"), "outcomes": "extremes"}),
+    "after a transient": ("leapfrog", {"steps": 90, "transient": 40}),
+    "at intervals": ("leapfrog", {"steps": 90, "transient": 11, "outcomes": ["last", "extremes", "mean"], "observe": 7}),
+    "stopped": ("leapfrog", {"steps": 90, "events": sw.Event(lambda t, v, y: y - 1.0, name="ground", terminal=True)}),
+}
+
+
+def test_states_that_come_back_are_those_of_the_cpu() -> None:
+    for case, (method, options) in STATES.items():
+        results = both(swinging if method == "leapfrog" else driven, MU, method, dt=0.02, v=0.3, **options)
+        try:
+            assert_alike(*results)
+        except AssertionError as error:
+            error.add_note(case)
+            raise
+
+
+def test_the_variable_names_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[Any] = []
+    before = ensemble._compute
+
+    def watched(task: Any, *rest: Any) -> None:
+        seen.append(task.options.get("device"))
+        before(task, *rest)
+
+    monkeypatch.setattr(ensemble, "_compute", watched)
+    monkeypatch.setenv("STEPWELL_DEVICE", "opencl")
+    sw.sweep(driven, MU, "rk4", v=0.0, dt=0.02, steps=5)
+    sw.sweep(driven, MU, "rk4", v=0.0, dt=0.02, steps=5, device="cpu")
+    assert seen == [NAMES[0], "cpu"]
+
+
+def test_a_store_goes_on_with_another_device(tmp_path: Any) -> None:
+    pytest.importorskip("zarr")
+    options: dict[str, Any] = {"v": 0.0, "dt": 0.02, "steps": 20, "store": tmp_path / "results.zarr", "chunk": 10}
+    one = sw.sweep(driven, MU, "rk4", **options)
+    other = sw.sweep(driven, MU, "rk4", device="opencl", **options)
+    assert one.attrs["bits"] == other.attrs["bits"]
+
+
+def test_a_wrong_device() -> None:
+    with pytest.raises(ArgumentError, match="device: expected 'cpu', 'opencl'"):
+        sw.sweep(driven, MU, "rk4", v=0.0, dt=0.02, steps=20, device="gpu")
+    with pytest.raises(UnsupportedError, match="device: there is no opencl:99"):
+        sw.sweep(driven, MU, "rk4", v=0.0, dt=0.02, steps=20, device="opencl:99")
+
+
+@pytest.mark.parametrize("more", [{"dt": 0.1, "steps": 5}, {"tolerance": 1e-3, "at": [1.0]}])
+def test_what_is_too_long_is_refused_before_any_work(more: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ensemble, "_compute", lambda *_: pytest.fail("work"))
+
+    def chains(k: Any) -> sw.System:
+        return sw.Springs([(i, i + 1) for i in range(6000)], stiffness=k, rest=1.0, dim=3)
+
+    start = {"v": 0.0, "y": np.arange(18003.0).reshape(6001, 3, 1)}
+    with pytest.raises(UnsupportedError, match="too long for a kernel, which has at most 100000"):
+        sw.sweep(chains, {"k": ("k", [1.0, 2.0])}, "dop853", device="opencl", **start, **more)
