@@ -100,7 +100,7 @@ GRAPHS = "test_a_step and not float32 and (Pol or damped or top or floor or chai
 def test_the_suite_tests_the_method(tree: Path) -> None:
     """Order, stability, matrix form, world, bits, graphs: by iterating over the catalogue."""
     least = {"orders": 10, "stability": 5, "world": 15, "matrix": 15, "bits": 10, "graphs": 30, "looks": 1}
-    least |= {"package": 2, "quaternion_norm": 5, "stability_series": 1, "friction": 5, "truth": 3}
+    least |= {"quaternion_norm": 5, "stability_series": 1, "friction": 5, "truth": 3}
     named = f"{OF_METHOD} and (reference or not test_bits) or the_title_of_the_figures or {GRAPHS}"
     passed = suite(tree, named, *least)
     assert {file: number for file, number in least.items() if passed[file] < number} == {}, passed

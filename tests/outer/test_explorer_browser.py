@@ -26,7 +26,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> str:
 class Shown:
     """A page in a window; ``complaints`` is what its console said."""
 
-    def __init__(self, browser: Any, file: str, words: str = "", **window: Any) -> None:
+    def __init__(self, browser: Any, file: str, words: str = "", is_ready: str = "explorer.page.ready", **window: Any) -> None:
         self.context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | window))
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
@@ -37,10 +37,7 @@ class Shown:
             "request", lambda request: self.complaints.append(request.url) if request.url[:5] not in (file[:5], "data:") else None
         )
         self.page.goto(file + words)
-        self.page.evaluate("explorer.page.ready")
-
-    def tell(self, text: str) -> None:
-        self.complaints.append(text)
+        self.page.evaluate(is_ready)
 
     def __enter__(self) -> Shown:
         return self
@@ -203,23 +200,8 @@ def test_every_control_has_a_name_and_a_visible_focus(browser: Any, file: str) -
                 break
             seen.add(focused[0])
             assert focused[1] == "solid", focused
-        wanted = {
-            "scene",
-            "play",
-            "one",
-            "reset",
-            "speed",
-            "dt",
-            "link",
-            "method-a",
-            "method-b",
-            "m1",
-            "m2",
-            "m3",
-            "soft",
-            "phase",
-        }
-        assert wanted <= seen
+        wanted = "scene play one reset speed dt link method-a method-b m1 m2 m3 soft phase"
+        assert set(wanted.split()) <= seen
 
 
 def test_reduced_motion_waits_for_a_key(browser: Any, file: str) -> None:
@@ -256,31 +238,13 @@ def test_a_scene_of_ones_own_and_a_frame_of_a_notebook(browser: Any, tmp_path: P
         assert [each["name"] for each in shown.at("scene.sliders")] == ["turn", "fall"]
         assert not shown.complaints
     (tmp_path / "notebook.html").write_text(f"<!doctype html><title>x</title>{own._repr_html_()}", encoding="utf-8")
-    with sync_page(browser, (tmp_path / "notebook.html").as_uri()) as (web, complaints):
-        frame = web.frames[1]
+    with Shown(browser, (tmp_path / "notebook.html").as_uri(), is_ready="1") as shown:
+        frame = shown.page.frames[1]
         frame.wait_for_function("window.explorer?.page.race?.k > 3")
         frame.locator("#play").click()
-        web.wait_for_timeout(400)
+        shown.page.wait_for_timeout(400)
         assert frame.evaluate("explorer.page.playing") is False
-        assert not complaints
-
-
-class sync_page:  # noqa: N801
-    """A page that is none of the explorer's, and what its console says."""
-
-    def __init__(self, browser: Any, url: str) -> None:
-        self.context = browser.new_context()
-        self.web = self.context.new_page()
-        self.complaints: list[str] = []
-        self.web.on("console", lambda message: self.complaints.append(message.text))
-        self.web.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.web.goto(url)
-
-    def __enter__(self) -> tuple[Any, list[str]]:
-        return self.web, self.complaints
-
-    def __exit__(self, *_: Any) -> None:
-        self.context.close()
+        assert not shown.complaints
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -289,11 +253,8 @@ def test_two_methods_of_one_family_are_told_apart(browser: Any, file: str, schem
 
     def shown_colours(a: str, b: str) -> list[str]:
         with Shown(browser, file, f"#scene=oscillator&a={a}&b={b}&play=0", color_scheme=scheme) as shown:
-            names = "--a", "--b", "--text"
-            colours = [
-                shown.page.evaluate("(name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim()", name)
-                for name in names
-            ]
+            style = "(name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim()"
+            colours = [shown.page.evaluate(style, name) for name in ("--a", "--b", "--text")]
             assert not shown.complaints
             return colours
 

@@ -27,24 +27,13 @@ MEMBERS, ORDINARY = 24, 8
 STRANGE = {
     kind.dtype.name: np.array(
         [
-            *(
-                0.0,
-                -0.0,
-                1.0,
-                -1.0,
-                np.inf,
-                -np.inf,
-                np.nan,
-                kind.smallest_subnormal,
-                -5 * kind.smallest_subnormal,
-                kind.tiny / 64,
-            ),
-            *(-kind.tiny, np.sqrt(kind.tiny), np.sqrt(kind.max) * 2, -np.sqrt(kind.max), kind.max / 4, -kind.max, kind.eps),
+            0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, kind.smallest_subnormal, -5 * kind.smallest_subnormal, kind.tiny / 64,
+            -kind.tiny, np.sqrt(kind.tiny), np.sqrt(kind.max) * 2, -np.sqrt(kind.max), kind.max / 4, -kind.max, kind.eps,
         ],
         np.float64,
     )
     for kind in map(np.finfo, (np.float64, np.float32))
-}
+}  # fmt: skip
 #: Controls by what they are tried with: bodies, and an invariant of own equations.
 CONTROLLED = {
     "bodies": CONTROLS,
