@@ -215,8 +215,8 @@ def test_every_public_name_is_in_the_reference_with_an_example(site: Path) -> No
 
 
 SEEN = (
-    "index", "tutorials/first_run", "tutorials/sweep", "howto/runs", "gallery/index", "gallery/motion/heavy_top", "reference/index",
-    "reference/systems", "theory/stability", "theory/paper", "benchmarks/work-precision", "developing/design",
+    "index", "tutorials/first_run", "tutorials/sweep", "howto/runs", "gallery/index", "gallery/motion/heavy_top",
+    "reference/index", "reference/systems", "theory/stability", "theory/paper", "benchmarks/work-precision", "developing/design",
 )  # fmt: skip
 PHONE, DESKTOP = {"width": 390, "height": 844}, {"width": 1280, "height": 900}
 

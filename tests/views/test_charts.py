@@ -15,6 +15,7 @@ from support import stiff
 from support.advised import scene_of
 from support.charted import LADDER, METHODS, SCENES, _hasty_times, read, the_charts, the_small  # noqa: F401
 from support.families import family
+from support.looks import faults
 
 #: Those without a formula; the stiff ones are compared with published values in test_stiff_scenes.py.
 UNSOLVED = [scene for scene in sw.scenes.scenes() if scene.exact is None and scene.name not in stiff.SCENES]
@@ -421,28 +422,11 @@ def test_the_summary_is_what_the_points_say(charts):
                 assert cost == (min(better) if better else math.inf)
 
 
-@pytest.mark.parametrize("scene", family(SCENES, lambda scene: scene.name == "clover", lambda scene: scene.name))
-def test_nothing_in_the_picture_is_cut_off_or_covered(charts, scene, tmp_path):
-    chart = charts[scene.name]
-    figure = chart.plot(tmp_path / "chart.png")
-    width, height = np.frombuffer((tmp_path / "chart.png").read_bytes()[16:24], ">u4")
-    assert (width, height) == (1600, 900)
-
-    page = figure.bbox
-    panels = [axes.get_tightbbox() for axes in figure.axes]
-    texts = [text for text in figure.texts if text.get_text()]
-    beside = [text.get_window_extent() for text in texts]
-    for box in (*panels, *beside):
-        assert page.x0 <= box.x0 < box.x1 <= page.x1
-        assert page.y0 <= box.y0 < box.y1 <= page.y1
-    for i, box in enumerate(beside):
-        assert not any(box.overlaps(other) for other in (*panels, *beside[:i]))
-
-
 def test_every_point_is_in_the_picture(charts):
     """Below 1 as a point of a curve, or above it as a mark; each unstable method's own marker where it falls off."""
     chart = charts["oscillator"]
     figure = chart.plot()
+    assert faults(figure) == []
     curves, marks = figure.axes[0], figure.axes[2]
     words = " ".join(text.get_text() for text in (*curves.texts, *figure.texts)).replace("\n", ", ")
     cheapest = {row["method"] for row in chart.front()}

@@ -16,6 +16,7 @@ from stepwell.views.charts.maps import ROUNDING
 from support import families
 from support.charted import read
 from support.families import family
+from support.looks import faults
 from support.truths import CLOSED_FORMS
 
 METHODS = [method for method in sw.methods() if not method.is_implicit]
@@ -306,11 +307,7 @@ def test_the_picture_has_lines_numbers_and_hatching(method, tmp_path):
     assert "r₁" in bar.get_ylabel()
     assert any(hatch for collection in axes.collections for hatch in getattr(collection, "hatches", ()))
     assert len(axes.texts) >= 2
-    boxes = [text.get_window_extent() for text in axes.texts]
-    assert not any(box.overlaps(other) for i, box in enumerate(boxes) for other in boxes[:i])
-    for box in (*boxes, *(text.get_window_extent() for text in figure.texts), *(a.get_tightbbox() for a in figure.axes)):
-        assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
-        assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
+    assert faults(figure) == []
 
 
 def test_the_thick_line_of_false_euler_is_at_its_limit(false_euler):
