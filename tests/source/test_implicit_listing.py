@@ -2,30 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pytest
 import stepwell as sw
-from support.abroad import Journey, run
-from support.export import assert_same, languages
-
-IMPLICIT = [m.name for m in sw.methods() if m.is_implicit]
-
-
-@sw.system(order=1)
-def pair(t: Any, y: Any, k: Any = 100.0) -> Any:
-    a, b = y
-    return [-k * a + b * b, k * a - b]
-
-
-@sw.system
-def swing(t: Any, v: Any, y: Any, k: Any = 30.0) -> Any:
-    """Two masses with a spring that becomes soft, so that rows are exchanged in some steps and not in others."""
-    a, b = y
-    pull = k * (b - a) / (1.0 + (b - a) ** 2)
-    return [pull - 3.0 * v[0] * v[1] + np.cos(t), -pull - a]
+from support.export import LANGUAGES, pair
 
 
 def test_a_step_is_read_from_top_to_bottom() -> None:
@@ -54,20 +34,22 @@ def test_a_step_is_read_from_top_to_bottom() -> None:
     )
 
 
-@pytest.mark.parametrize("method", IMPLICIT)
-def test_every_part_has_its_name(method: str) -> None:
+def test_every_part_has_its_name() -> None:
     """Of each solve the unknowns; numbers of rates begin at 1, although derivatives evaluate them, too."""
-    ways: list[dict[str, Any]] = [{}, {"dtype": "float32"}]
-    if sw.method(method).error_order is not None:
-        ways.append({"attempt": True})
-    solves = {"rosenbrock23": 2, "rodas4": 6, "rodas5p": 8, "linearly_implicit_euler": 1}.get(method, 3)
-    for options in ways:
-        lines = {line.name: line for section in sw.explain(pair(), method, **options).sections for line in section.lines}
-        parts = ["matrix[0,1]", "exchange[0,1]", "reciprocal[0]", "reciprocal[1]", "factor[1,0]"]
-        parts += [] if "attempt" in options else ["dy1[0]", "dy1[1]"]
-        parts += [f"solution{i}[1]" for i in range(1, solves)]
-        assert [name for name in parts if name not in lines] == [], options
-        assert lines["exchange[0,1]"].formula == "|matrix[0,0]| < |matrix[1,0]|"
+    for method in sw.methods():
+        if not method.is_implicit:
+            continue
+        ways: list[dict[str, Any]] = [{}, {"dtype": "float32"}]
+        if method.error_order is not None:
+            ways.append({"attempt": True})
+        solves = {"rosenbrock23": 2, "rodas4": 6, "rodas5p": 8, "linearly_implicit_euler": 1}.get(method.name, 3)
+        for options in ways:
+            lines = {line.name: line for section in sw.explain(pair(), method, **options).sections for line in section.lines}
+            parts = ["matrix[0,1]", "exchange[0,1]", "reciprocal[0]", "reciprocal[1]", "factor[1,0]"]
+            parts += [] if "attempt" in options else ["dy1[0]", "dy1[1]"]
+            parts += [f"solution{i}[1]" for i in range(1, solves)]
+            assert [name for name in parts if name not in lines] == [], (method, options)
+            assert lines["exchange[0,1]"].formula == "|matrix[0,0]| < |matrix[1,0]|", (method, options)
 
 
 def test_a_system_of_second_order_solves_for_its_velocities() -> None:
@@ -78,16 +60,8 @@ def test_a_system_of_second_order_solves_for_its_velocities() -> None:
     assert "solution1[1]" not in listing
 
 
-@languages
-def test_exported_steps_have_the_same_bits_and_names(language: str, tmp_path: Path) -> None:
-    start = np.array([0.3, -0.2]), np.array([1.0, -0.5])
-    journeys = [
-        Journey(pair(), method, np.empty(0), np.array([1.0, 0.5]), dt=dt, steps=20)
-        for method, dt in (("rodas5p", 0.3), ("trapezoidal", 0.01), ("backward_euler", 1.0))
-    ]
-    journeys += [Journey(swing(), method, *start, dt=0.4) for method in ("rosenbrock23", "implicit_midpoint")]
-    journeys.append(Journey(swing(), "rodas4", *start, options={"dtype": "float32"}))
-    assert_same(journeys, run(language, journeys, tmp_path))
-    source = sw.export(pair(), "rosenbrock23", language, dt=0.1).source
-    for part in ("matrix_0_1", "exchange_0_1", "reciprocal_1", "factor_1_0", "solution1_1", "solution2_0"):
-        assert part in source
+def test_exported_steps_have_the_same_names() -> None:
+    for language in LANGUAGES:
+        source = sw.export(pair(), "rosenbrock23", language, dt=0.1).source
+        for part in ("matrix_0_1", "exchange_0_1", "reciprocal_1", "factor_1_0", "solution1_1", "solution2_0"):
+            assert part in source, language
