@@ -14,11 +14,12 @@ from stepwell.analysis.discrete.driven import of_method
 from stepwell.errors import ArgumentError, ShapeError, UnknownNameError, UnsupportedError
 from stepwell.views.charts.bode import phase
 from stepwell.views.charts.bode_picture import finding
+from support.looped import assert_refused, looped
 
 OSCILLATOR = sw.Oscillator(1.0, 0.1)
 
 
-@pytest.mark.parametrize("method", [each.name for each in sw.methods()])
+@looped("method", [each.name for each in sw.methods()])
 def test_the_response_is_what_a_run_shows(method: str) -> None:
     """A run that starts on the steady motion stays on it: at step k it is the real part of S·e^(jωk·dt), for every method.
 
@@ -35,7 +36,7 @@ def test_the_response_is_what_a_run_shows(method: str) -> None:
         assert np.concatenate([run.v, run.y], axis=1) == pytest.approx(truth, abs=1e-12 * max(1.0, np.abs(s).max()))
 
 
-@pytest.mark.parametrize(("method", "order"), [("standard_euler", 1), ("standard_heun", 2), ("rk4", 4), ("rodas4", 4)])
+@looped("method, order", [("standard_euler", 1), ("standard_heun", 2), ("rk4", 4), ("rodas4", 4)])
 def test_the_error_falls_with_the_order(method: str, order: int) -> None:
     errors = [sw.charts.bode(OSCILLATOR, [method], dt=dt, omega=[0.3, 0.7]).curves[0].error for dt in (0.02, 0.01)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx([order] * 2, abs=0.2)
@@ -138,8 +139,5 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("call", "kind", "message"), WRONG)
-def test_what_is_refused(call: Any, kind: type[Exception], message: str) -> None:
-    with pytest.raises(kind) as caught:
-        call()
-    assert message in str(caught.value)
+def test_what_is_refused() -> None:
+    assert_refused(WRONG)

@@ -14,6 +14,7 @@ from stepwell.reference import bits, functions, marks, trig
 from stepwell.reference.log import log
 from stepwell.reference.tape import rules
 from support.differences import central
+from support.looped import looped
 
 EPS = np.finfo(float).eps
 #: Long doubles where the machine has them, else doubles: the differences' bound knows which.
@@ -49,7 +50,7 @@ OPERATIONS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
 X, Y = np.random.default_rng(1).uniform(0.2, 3.0, (2, 50))
 
 
-@pytest.mark.parametrize("name", OPERATIONS)
+@looped("name", OPERATIONS)
 def test_operations_have_their_closed_forms(name: str) -> None:
     f, slopes = OPERATIONS[name]
     tape = _core.Tape()
@@ -178,7 +179,7 @@ class Standing:
         return function
 
 
-@pytest.mark.parametrize("name", rules.PARTIALS)
+@looped("name", rules.PARTIALS)
 def test_every_rule_is_that_of_its_function(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """First derivatives against differences of NumPy's function, whether stepwell has that function already or not."""
     assert_rule(name, monkeypatch)
@@ -208,6 +209,7 @@ def assert_rule(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         assert (np.abs(derivatives[i] - true) <= bound).all(), (name, i, derivatives[i], true, bound)
 
 
+@pytest.mark.mutant
 @pytest.mark.parametrize(
     ("name", "wrong"),
     [("sin", (lambda f, y, x: -f("cos")(x),)), ("tanh", (lambda f, y, x: 1.0 - y,)), ("floor", (lambda f, y, x: 1.0,))],
@@ -218,7 +220,7 @@ def test_a_wrong_rule_is_found(name: str, wrong: Any, monkeypatch: pytest.Monkey
         assert_rule(name, monkeypatch)
 
 
-@pytest.mark.parametrize("name", rules.PARTIALS)
+@looped("name", rules.PARTIALS)
 def test_elementary_functions_have_their_derivatives(name: str) -> None:
     """Those of ``reference.functions`` as they are traced, forwards and backwards, against NumPy's."""
     f, points = TRIED[name]
@@ -287,8 +289,8 @@ def test_what_the_tape_takes_for_an_earlier_value_keeps_its_derivative() -> None
 # ---- what has no derivative
 
 
-@pytest.mark.parametrize(
-    ("what", "says"),
+@looped(
+    "what, says",
     [
         (lambda tape, x: trig.sin(x), "rounds|exclusive or"),
         (lambda tape, x: (x * 0.5 + bits.DOUBLE.magic) - bits.DOUBLE.magic, "rounds"),

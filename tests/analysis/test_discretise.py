@@ -10,6 +10,7 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnknownNameError, UnsupportedError
 from stepwell.reference import exact
 from stepwell.reference.resolvent import polynomials
+from support.looped import assert_refused, looped
 
 signal = pytest.importorskip("scipy.signal")
 mp = pytest.importorskip("mpmath")
@@ -34,14 +35,14 @@ def units(one: Any, truth: Any) -> float:
 # ---- the exponential of a matrix
 
 
-@pytest.mark.parametrize(("n", "size"), [(1, 0.3), (2, 1.0), (3, 10.0), (4, 300.0), (5, 1e-3), (6, 50.0), (9, 3.0)])
+@looped("n, size", [(1, 0.3), (2, 1.0), (3, 10.0), (4, 300.0), (5, 1e-3), (6, 50.0), (9, 3.0)])
 def test_the_exponential_is_rounded_once(n: int, size: float) -> None:
     """Within one unit of each element: the squarings have twice the digits, so a norm of 300 costs none."""
     A = np.random.default_rng(n).normal(size=(n, n)) * size - size * np.eye(n)
     assert units(exact.exponential(A), many_digits(A)) <= 1.0
 
 
-@pytest.mark.parametrize("omega", [1.0, 1e3, 1e6, 1e-6])
+@looped("omega", [1.0, 1e3, 1e6, 1e-6])
 def test_badly_scaled_matrices(omega: float) -> None:
     """The controllable form of an oscillator has elements of 1 and ω²: scaled in powers of two it is as exact as any."""
     A = np.array([[-0.2 * omega, -(omega**2)], [1.0, 0.0]]) * (0.3 / omega)
@@ -83,9 +84,9 @@ def test_the_step_with_a_sinusoid() -> None:
 # ---- the ways
 
 
-@pytest.mark.parametrize("system", [G, H, THIRD], ids=["second degree", "equal degrees", "third degree"])
-@pytest.mark.parametrize(
-    ("how", "options", "theirs"),
+@looped("system", [G, H, THIRD])
+@looped(
+    "how, options, theirs",
     [
         ("zoh", {}, "zoh"),
         ("linear", {}, "foh"),
@@ -108,7 +109,7 @@ def test_transfer_functions_are_those_of_scipy(system: Any, how: str, options: A
     assert discrete.num == pytest.approx(num.ravel(), abs=200 * EPS)
 
 
-@pytest.mark.parametrize("how", ["zoh", "linear", "impulse", "tustin"])
+@looped("how", ["zoh", "linear", "impulse", "tustin"])
 def test_runs_are_those_of_scipy(how: str) -> None:
     """From rest before the first sample; SciPy's states are s − Q_next·x, as those of the standard form."""
     x = np.random.default_rng(2).normal(size=50)
@@ -134,8 +135,8 @@ def test_an_exact_step_is_exact() -> None:
         assert units(matrix, expected) <= 4.0  # Q is a difference of two
 
 
-@pytest.mark.parametrize("interpolation", ["hold", "linear"])
-@pytest.mark.parametrize("method", [each.name for each in sw.methods()])
+@looped("interpolation", ["hold", "linear"])
+@looped("method", [each.name for each in sw.methods()])
 def test_a_method_makes_the_steps_of_integrate(method: str, interpolation: Any) -> None:
     """With sampled inputs, two of them, from any state: for what is carried in place of v, too."""
     rng = np.random.default_rng(3)
@@ -195,8 +196,8 @@ def test_members_and_systems_without_inputs() -> None:
 # ---- dead time
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.11, 0.3, 0.41, 0.9, 0.6 + 1e-13])
-@pytest.mark.parametrize("interpolation", ["hold", "linear"])
+@looped("delay", [0.0, 0.11, 0.3, 0.41, 0.9, 0.6 + 1e-13])
+@looped("interpolation", ["hold", "linear"])
 def test_a_dead_time_of_any_length_is_exact(interpolation: Any, delay: float) -> None:
     """Beside a step of a thirtieth of dt, of which the delay is a whole number, and whose input is the same."""
     dt, fine = 0.3, 30
@@ -213,10 +214,8 @@ def test_a_dead_time_of_any_length_is_exact(interpolation: Any, delay: float) ->
     assert coarse.z == pytest.approx(run.z[::fine], abs=1e-12)
 
 
-@pytest.mark.parametrize("interpolation", ["hold", "linear"])
-@pytest.mark.parametrize(
-    "method", ["standard_euler", "false_euler", "leapfrog", "verlet", "rk4", "rodas4", "trapezoidal", "dop853"]
-)
+@looped("interpolation", ["hold", "linear"])
+@looped("method", ["standard_euler", "false_euler", "leapfrog", "verlet", "rk4", "rodas4", "trapezoidal", "dop853"])
 def test_a_method_sees_what_it_sees_in_a_run(method: str, interpolation: Any) -> None:
     """Late samples of a run: the mean over a step where a held one begins within it."""
     dt, delay = 0.2, 0.27
@@ -358,11 +357,8 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("call", "kind", "message"), WRONG)
-def test_what_is_refused(call: Any, kind: type[Exception], message: str) -> None:
-    with pytest.raises(kind) as caught:
-        call()
-    assert message in str(caught.value)
+def test_what_is_refused() -> None:
+    assert_refused(WRONG)
 
 
 def test_reprs() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from support.looped import looped
 
 EPS = np.finfo(float).eps
 
@@ -35,9 +36,7 @@ def test_the_pendulum_hangs_or_stands() -> None:
     assert above.analysis.kind == beyond.analysis.kind == "monotonic unstable"
 
 
-@pytest.mark.parametrize(
-    ("damping", "kinds"), [(0.1, ["sink", "saddle"]), (3.0, ["sink", "saddle"]), (-0.1, ["source", "saddle"])]
-)
+@looped("damping, kinds", [(0.1, ["sink", "saddle"]), (3.0, ["sink", "saddle"]), (-0.1, ["source", "saddle"])])
 def test_damping_decides(damping: float, kinds: list[str]) -> None:
     equilibria = sw.equilibria(sw.Pendulum(1.0, damping), near=(0.1, [0.3, 3.0]))
     assert [each.kind for each in equilibria] == kinds
@@ -69,7 +68,7 @@ def quintics(mu: float) -> list[float]:
     return [1 - mu - roots[0], 1 - mu + roots[1], -mu - roots[2]]
 
 
-@pytest.mark.parametrize("mu", [0.012277471, 0.2, 3e-6])
+@looped("mu", [0.012277471, 0.2, 3e-6])
 def test_the_five_points_of_lagrange(mu: float) -> None:
     hill = (mu / 3) ** (1 / 3)
     x = [1 - mu - hill, 1 - mu + hill, -1.0, 0.5, 0.5]
@@ -151,8 +150,8 @@ def test_many_starts_are_found_once() -> None:
     assert sum(len(each.starts) for each in equilibria) + len(equilibria.lost) == 60
 
 
-@pytest.mark.parametrize(
-    ("wrong", "says"),
+@looped(
+    "wrong, says",
     [
         ({"near": 1.0}, "near: expected a pair"),
         ({"system": sw.Pendulum([1.0, 2.0])}, "system: expected one member"),
@@ -189,8 +188,8 @@ def floating(t, v, y, *, k=1.0):
     return np.array([after - before for before, after in itertools.pairwise([0.0, *stretched, 0.0])])
 
 
-@pytest.mark.parametrize("at", [0.0, 1.0, -3e5])
-@pytest.mark.parametrize("p", [2, 3])
+@looped("at", [0.0, 1.0, -3e5])
+@looped("p", [2, 3])
 def test_a_multiple_root_is_undecided_from_every_side(p: int, at: float) -> None:
     """Each step of Newton's method leaves 1 − 1/p of the distance, and an eigenvalue of p·distance^(p − 1), of either sign.
 
@@ -212,7 +211,7 @@ def definition(p: int, at: float) -> Any:
     return root
 
 
-@pytest.mark.parametrize("start", [2.0, 0.3, 1.001])
+@looped("start", [2.0, 0.3, 1.001])
 def test_a_double_root_that_rounding_hides_is_undecided(start: float) -> None:
     """It is found to about the root of a rounding, 1.5e-8, where the eigenvalue is as large."""
     for each in sw.equilibria(expanded(), near=(None, np.array(start))):
@@ -229,7 +228,7 @@ def test_roots_that_are_apart_are_decided() -> None:
     assert slow.kind == "sink"
 
 
-@pytest.mark.parametrize("n", [2, 3, 6])
+@looped("n", [2, 3], long=[6])
 def test_what_nothing_holds_is_undecided(n: int) -> None:
     """Its double eigenvalue zero comes out of rounding as ±1e-8."""
     (equilibrium,) = sw.equilibria(floating(k=3.7), near=(np.zeros(n), np.arange(n) + 0.1))
@@ -249,7 +248,7 @@ MULTIPLE: list[Any] = [
 ]
 
 
-@pytest.mark.parametrize(("rate", "root", "starts"), MULTIPLE)
+@looped("rate, root, starts", MULTIPLE)
 def test_a_multiple_root_is_one_equilibrium(rate: Any, root: float, starts: list[float]) -> None:
     """From every start, and first order does not decide it; the place is known to ε^(1/4), 1.2·10⁻⁴, at worst."""
     equilibria = sw.equilibria(sw.system(order=1)(rate)(), near=(None, np.array(starts)))
@@ -269,8 +268,8 @@ def test_a_multiple_root_across_the_axes() -> None:
     assert len(sw.equilibria(sw.system(order=1)(rate)(), near=(None, starts))) == 1
 
 
-@pytest.mark.parametrize(
-    ("rate", "roots", "starts"),
+@looped(
+    "rate, roots, starts",
     [
         (lambda t, y: (y - 1.0) * (y - 1.0 - 1e-6), [1.0, 1.0 + 1e-6], [0.0, 2.0]),
         (lambda t, y: (y - 1.0) ** 2 - 1e-12, [1.0 - 1e-6, 1.0 + 1e-6], [0.0, 2.0]),
@@ -285,7 +284,7 @@ def test_near_roots_stay_apart(rate: Any, roots: list[float], starts: list[float
     assert "undecided to first order" not in {each.kind for each in equilibria}
 
 
-@pytest.mark.parametrize("least", [1.0, 1e-12])
+@looped("least", [1.0, 1e-12])
 def test_an_extreme_of_a_rate_is_no_equilibrium(least: float) -> None:
     """There Newton's step is zero, but the rate is not."""
     equilibria = sw.equilibria(sw.system(order=1)(lambda t, y: (y - 1.0) ** 2 + least)(), near=(None, np.array([1.0])))

@@ -10,11 +10,12 @@ import stepwell as sw
 from stepwell.analysis.dynamics import Lyapunov, exponents
 from stepwell.errors import UnsupportedError
 from stepwell.model.systems import System
+from support.looped import looped
 
 EPS = np.finfo(float).eps
 
 
-@pytest.mark.parametrize("method", ["standard_euler", "false_euler", "rk4", "merson", "false_heun"])
+@looped("method", ["standard_euler", "false_euler", "rk4", "merson", "false_heun"])
 def test_of_a_linear_system_they_are_the_logarithms_of_the_eigenvalues(method: str) -> None:
     """Real rates far apart, so that vectors find their directions: ln|z|/dt of the method's own step."""
     system = sw.LinearSystem([[-1.0, 0.3, 0.1], [0.2, -2.0, 0.4], [0.1, 0.5, 0.5]], velocities=1)
@@ -39,7 +40,7 @@ def test_one_exponent_is_the_largest_of_all() -> None:
     np.testing.assert_allclose(sw.lyapunov(system, "rk4", exponents=2, **arguments).exponents, every, rtol=0, atol=40 * EPS / 0.1)
 
 
-@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "pefrl", "verlet", "rk4"])
+@looped("method", ["false_euler", "leapfrog", "pefrl", "verlet", "rk4"])
 def test_the_states_are_those_of_integrate(method: str) -> None:
     system = sw.Pendulum(np.array([1.0, 2.0]), a=sw.Sinusoid(0.5, 0.7, 0.1))
     v, y = np.array([0.3, 0.1]), np.array([[1.0], [2.0], [3.0]])
@@ -214,7 +215,7 @@ def _pairs() -> Any:
 PACED: dict[str, Any] = {"tolerance": 1e-9, "at": np.arange(1.0, 41.0), "transient": 20, "exponents": "all"}
 
 
-@pytest.mark.parametrize("method", ["merson", "dop853", "fehlberg_5", "taylor"])
+@looped("method", ["merson", "dop853", "fehlberg_5", "taylor"])
 def test_with_a_tolerance_they_are_the_rates_of_a_linear_system(method: str) -> None:
     matrix = np.array([[-1.0, 0.3, 0.1], [0.2, -2.0, 0.4], [0.1, 0.5, 0.5]])
     spectrum = sw.lyapunov(sw.LinearSystem(matrix, velocities=1), method, v=np.zeros(1), y=np.ones(2), **PACED)
@@ -227,7 +228,7 @@ def test_with_a_tolerance_they_are_the_rates_of_a_linear_system(method: str) -> 
     assert spectrum.dt is None
 
 
-@pytest.mark.parametrize("size", [1.0, 1e-9])
+@looped("size", [1.0, 1e-9])
 def test_with_a_tolerance_the_unit_of_the_state_does_not_matter(size: float) -> None:
     """ẏ = 50·cos(50·t)·size − y: its disturbances, e^(−t), would do with long steps, and are given lengths like that of y."""
 
@@ -244,7 +245,7 @@ def test_with_a_tolerance_the_unit_of_the_state_does_not_matter(size: float) -> 
     np.testing.assert_allclose(spectrum.exponents, [-1.0], rtol=0, atol=2000 * 1e-9)
 
 
-@pytest.mark.parametrize("k", [2, "all"])
+@looped("k", [2, "all"])
 def test_with_a_tolerance_bodies_have_those_of_short_steps(k: Any) -> None:
     """Twelve disturbances make an attempt too long for one tape, two do not. Steps of 0.002 by rk4 are right to h⁴ ~ 10⁻¹¹."""
     y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
@@ -289,8 +290,8 @@ def test_with_a_tolerance_a_member_that_stops_has_none() -> None:
     np.testing.assert_allclose(spectrum.exponents[0, [0, 2]], right, rtol=0, atol=100 * 1e-9)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
+@looped(
+    "wrong, message",
     [
         ({"steps": 10}, "steps: works with fixed steps only"),
         ({"every": 10}, "every: works with fixed steps only"),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.analysis.orbits import kepler
+from support.looped import looped
 from support.mistakes import mistaken
 
 #: The unit roundoff.
@@ -75,7 +76,7 @@ def apart(a: Any, b: Any) -> float:
     return float(np.abs(np.remainder(a - b + math.pi, 2.0 * math.pi) - math.pi).max())
 
 
-@pytest.mark.parametrize("between", [(0.0, 1e-3), (0.0, 0.99), (0.99, 1 - 1e-9), (1 + 1e-9, 1.01), (1.01, 5.0)])
+@looped("between", [(0.0, 1e-3), (0.0, 0.99), (0.99, 1 - 1e-9), (1 + 1e-9, 1.01), (1.01, 5.0)])
 def test_elements_return_through_states(between: tuple[float, float]) -> None:
     n = 2000
     e, q, mu = RNG.uniform(*between, n), RNG.uniform(0.1, 3.0, n), RNG.uniform(0.1, 50.0, n)
@@ -97,7 +98,7 @@ def test_elements_return_through_states(between: tuple[float, float]) -> None:
         assert (np.abs(back - block).max(axis=0) / np.abs(block).max(axis=0)).max() < 2000 * U
 
 
-@pytest.mark.parametrize("e", [0.0, 0.3, 0.999, 1.0, 1.001, 2.0])
+@looped("e", [0.0, 0.3, 0.999, 1.0, 1.001, 2.0])
 def test_anomalies_and_sizes_are_of_one_orbit(e: float) -> None:
     """Each way to say where the body is gives the same state; energy and angular momentum are those of the closed forms."""
     mu, q = 2.0, 0.7
@@ -186,7 +187,7 @@ def test_jacobis_coordinates_and_back() -> None:
     assert np.abs(sw.orbits.inertial(masses, relative) - block).max() < 80 * U
 
 
-@pytest.mark.parametrize("around", ["jacobi", "astrocentric", [0, 1, [0, 1]]])
+@looped("around", ["jacobi", "astrocentric", [0, 1, [0, 1]]])
 def test_a_system_has_the_elements_that_it_was_made_of(around: Any) -> None:
     """In a batch of masses and sizes; its centre of mass rests at the origin."""
     masses = np.array([1.0, 1e-2, 1e-4, 0.0])[:, np.newaxis] * np.array([1.0, 2.0])
@@ -278,7 +279,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("elements", "message"), WRONG, ids=lambda each: str(each)[:50])
+@looped("elements, message", WRONG)
 def test_elements_that_are_no_orbit_are_refused(elements: dict[str, Any], message: str) -> None:
     with pytest.raises(sw.errors.ArgumentError, match=message):
         sw.orbits.system([1.0, 0.1], **elements)

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnknownNameError
+from support.looped import assert_refused, in_turn, looped
 
 MASS = sw.TransferFunction(4.0, [1.0, 0.4, 0.0])
 PI = sw.parallel(0.4, sw.TransferFunction(0.1, [1.0, 0.0]))
 INTEGRATOR = sw.TransferFunction(1.0, [1.0, 0.0])
 
 
-@pytest.mark.parametrize("late", [0, 1, 3])
+@looped("late", [0, 1, 3])
 def test_a_loop_is_what_its_controller_and_plant_do(late: int) -> None:
     """A PI controller by the trapezoidal rule, written out, with the exact plant run from sample to sample."""
     dt, steps, x = 0.1, 40, 1.0
@@ -63,10 +64,10 @@ def test_limits_that_are_known() -> None:
     assert sw.sampling_limit(INTEGRATOR, -1.0) == 0.0
 
 
-@pytest.mark.parametrize("options", [{}, {"delay": 0.05}, {"samples": 1}, {"delay": 0.03, "samples": 1}], ids=str)
-@pytest.mark.parametrize("controller", [0.8, PI], ids=["P", "PI"])
-def test_a_limit_from_both_sides(controller: Any, options: Any) -> None:
+@pytest.mark.parametrize(("delay", "samples", "name"), in_turn([0.0, 0.05, 0.03], [0, 1], ["P", "PI"]))
+def test_a_limit_from_both_sides(delay: float, samples: int, name: str) -> None:
     """By the samples themselves: below they decay, beyond they grow."""
+    controller, options = {"P": 0.8, "PI": PI}[name], {"delay": delay, "samples": samples}
     limit = sw.sampling_limit(MASS, controller, **options)
     for factor, stable in ((0.98, True), (1.02, False)):
         loop = sw.sampled_loop(MASS, controller, factor * limit, **options)
@@ -95,8 +96,5 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("call", "kind", "message"), WRONG)
-def test_what_is_refused(call: Any, kind: type[Exception], message: str) -> None:
-    with pytest.raises(kind) as caught:
-        call()
-    assert message in str(caught.value)
+def test_what_is_refused() -> None:
+    assert_refused(WRONG)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.analysis.stability import KINDS, operations
-from support.stability_cases import EPS, METHODS, known
+from support.looped import looped
+from support.stability_cases import DEAR, EPS, METHODS, OF_EACH_STRUCTURE, QUICK, known
 from support.truths import CLOSED_FORMS
 
 #: FACTS of the undamped oscillator: q = r₁², p, limit.
@@ -61,12 +62,10 @@ def test_p_q_and_eigenvalues(method: str) -> None:
         assert a.radius[i] == pytest.approx(np.abs(z).max(), abs=1e-7)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("form", ["canonical", "physical"])
+@looped("method", CLOSED_FORMS)
+@looped("form", ["canonical", "physical"])
 def test_matrix_is_that_of_the_closed_form(method: str, form: str) -> None:
     """In the slots of Verlet, (y_prev, y), P is [0, 1], [−1, 2 − Φ²]."""
-    if method not in CLOSED_FORMS:
-        pytest.skip("no closed form")
     omega, phi = 1.7, 0.6
     a = sw.analyse(sw.Oscillator(omega, form=form), method, dt=phi / omega)
     scale = 1.0 if form == "canonical" else omega
@@ -81,7 +80,7 @@ def test_matrix_is_that_of_the_closed_form(method: str, form: str) -> None:
     np.testing.assert_allclose(a.P, true, rtol=0, atol=20 * EPS)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", METHODS)
 def test_arrays_of_steps_are_the_single_steps(method: str) -> None:
     """Many steps at once go through the reference, one through the core: the same bits. So do arrays of parameters."""
     dt = np.array([[0.1], [0.7], [1.9]])
@@ -104,7 +103,7 @@ def test_arrays_of_steps_are_the_single_steps(method: str) -> None:
     np.testing.assert_array_equal(both.P[:, :, 1], sw.analyse(chain, method, dt=0.2).P)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", METHODS)
 def test_input_matrix(method: str) -> None:
     """Q is what a held input makes in a step from rest; the sum over the nodes of what the matrix form takes."""
     second_order = sw.method(method).needs_acceleration
@@ -138,8 +137,8 @@ def test_the_angle_is_that_of_atan2() -> None:
     assert b.frequency_ratio == pytest.approx(math.radians(150) / phi, abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("method", "damping", "phi", "kind", "stable"),
+@looped(
+    "method, damping, phi, kind, stable",
     [
         ("false_euler", None, 1.0, "harmonic", True),
         ("false_euler", None, 2.0, "unstable oscillation (double eigenvalue -1)", False),
@@ -164,7 +163,7 @@ def test_the_words_of_the_document(method: str, damping: float | None, phi: floa
     assert bool(sw.analyse(sw.Oscillator(1.0, damping), method, dt=[phi]).stable[0]) == stable
 
 
-@pytest.mark.parametrize("method", ["false_euler", "damped_euler", "verlet"])
+@looped("method", ["false_euler", "damped_euler", "verlet"])
 def test_at_exactly_two_the_samples_grow_linearly(method: str) -> None:
     """z₁ = z₂ = −1: y_k = (−1)ᵏ(a + b·k). Bounded at 1.999, and at 2.001 growing at the predicted rate."""
     run = sw.integrate(sw.Oscillator(), method, v=0.5, y=1.0, dt=2.0, steps=1000, every=1)
@@ -201,7 +200,7 @@ def test_the_misprinted_matrix_of_false_heun_has_another_determinant() -> None:
     assert misprinted - a.q == pytest.approx(0.04579, abs=1e-5)
 
 
-@pytest.mark.parametrize("method", ["standard_euler", "standard_heun", "rk4", "merson", "fehlberg", "fehlberg_5"])
+@looped("method", ["standard_euler", "standard_heun", "rk4", "merson", "fehlberg", "fehlberg_5"])
 def test_growth_over_thousands_of_steps(method: str) -> None:
     """The energy of the canonical oscillator is multiplied by r₁² each step, because P is r₁ times a rotation.
 
@@ -215,7 +214,7 @@ def test_growth_over_thousands_of_steps(method: str) -> None:
     assert ((a.radius > 1) == (method in ("standard_euler", "standard_heun", "fehlberg", "fehlberg_5")))[1:].all()
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", [*QUICK, "rosenbrock23"], long=[m for m in DEAR if m != "rosenbrock23"])
 def test_derivative_of_the_reference_is_the_matrix_of_the_core(method: str) -> None:
     """At any state of a linear system the complex step gives what unit vectors give, to rounding."""
     chain = sw.Chain(3, stiffness=[1.0, 2.0, 0.5, 0.0])
@@ -227,7 +226,7 @@ def test_derivative_of_the_reference_is_the_matrix_of_the_core(method: str) -> N
     np.testing.assert_allclose(np.abs(derived.rates), np.abs(exact.rates), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", [*QUICK, "rosenbrock23"], long=[m for m in DEAR if m != "rosenbrock23"])
 def test_derivative_of_a_step_that_is_not_linear(method: str) -> None:
     """Against differences of steps, whose error is the square of the difference times the third derivative: ≲ 1e-9 here."""
     scene = sw.scenes.clover()
@@ -247,8 +246,8 @@ def test_derivative_of_a_step_that_is_not_linear(method: str) -> None:
         np.testing.assert_allclose(a.P[:, j], (ends[0] - ends[1]) / (2 * d), rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("force", ["logarithmic", "newton", "printed"])
-@pytest.mark.parametrize(
+@looped("force", ["logarithmic", "newton", "printed"])
+@looped(
     "control",
     [
         sw.EnergyControl(0.3, target=-0.2),
@@ -256,7 +255,6 @@ def test_derivative_of_a_step_that_is_not_linear(method: str) -> None:
         sw.Projection(target=-0.2),
         sw.Projection("nacozy", target=-0.2),
     ],
-    ids=repr,
 )
 def test_control_belongs_to_the_step(control: Any, force: str) -> None:
     """P of what is controlled or set back is the derivative of that run, by differences: d⁴ = 1e-16, and rounding 1e-16/d."""
@@ -278,7 +276,7 @@ def test_control_belongs_to_the_step(control: Any, force: str) -> None:
     assert counted.additions > operations("false_euler", sw.NBody(force=force)).additions
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", METHODS)
 def test_each_eigenvalue_of_two_continues_its_own_rate(method: str) -> None:
     """Two real rates: z = e^(λ·dt) but for some (λ·dt)²; taken for each other they would be off by 0.02 and more."""
     dt = 0.01
@@ -297,8 +295,8 @@ def test_each_eigenvalue_of_two_continues_its_own_rate(method: str) -> None:
         assert (a.radius == np.abs(a.eigenvalues).max(axis=0)).all()
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("omega", [2.0**-40, *(pytest.param(2.0**k, marks=pytest.mark.long) for k in (-20, 20)), 2.0**40])
+@looped("method", OF_EACH_STRUCTURE, long=METHODS)
+@looped("omega", [2.0**-40, 2.0**40])
 def test_units_do_not_matter(method: str, omega: float) -> None:
     """Rad per microsecond or per year: all scaled by powers of two, so what is found is the same to the bit, or nearly."""
     phi = np.array([0.01, 0.1, 0.5, 1.0, 1.5, 1.9, 2.1, 3.0])

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.analysis.stability import along
+from support.looped import looped
+from support.stability_cases import METHODS, OF_EACH_STRUCTURE
 
 EPS = np.finfo(float).eps
 
 
-@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "verlet", "pefrl", "rk4", "merson", "semi_false_heun"])
+@looped("method", ["false_euler", "leapfrog", "verlet", "pefrl", "rk4", "merson", "semi_false_heun"])
 def test_the_pendulum_is_stiffest_where_it_hangs(method: str) -> None:
     """Where cos y > 0 the limit is that of an oscillator of ω₀²·cos y; the smallest is where y is nearest to 0."""
     run = sw.integrate(sw.Pendulum(1.5), "rk4", v=0.0, y=1.2, dt=0.01, steps=600, every=3)
@@ -39,7 +41,7 @@ def test_what_grows_by_itself_does_not_count() -> None:
     np.testing.assert_allclose(along.growth[falls], np.sqrt(-np.cos(run.y[falls])), rtol=1e-12)
 
 
-@pytest.mark.parametrize("method", [m.name for m in sw.methods()])
+@looped("method", [*OF_EACH_STRUCTURE, "rosenbrock23"], long=METHODS)
 def test_at_an_equilibrium_it_is_the_limit_there(method: str) -> None:
     """Damped or not, of one or of several bodies: a state that stays is one at which both ways say the same."""
     damped = None if sw.method(method).needs_acceleration else 0.1
@@ -54,7 +56,7 @@ def test_at_an_equilibrium_it_is_the_limit_there(method: str) -> None:
         assert abs(along.mode.rate - there.mode.rate) <= 1e-8 * abs(there.mode.rate)
 
 
-@pytest.mark.parametrize("method", [m.name for m in sw.methods() if not m.is_implicit or m.name == "rosenbrock23"])
+@looped("method", OF_EACH_STRUCTURE, long=[m.name for m in sw.methods() if not m.is_implicit or m.name == "rosenbrock23"])
 def test_scaled_limits_are_those_that_are_tried(method: str) -> None:
     """Of forces with an energy: one search for each direction of λ, or steps of many lengths for each state."""
     members = 1 if sw.method(method).has_series else 5  # the steps of a series go number by number

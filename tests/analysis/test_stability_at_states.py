@@ -11,6 +11,7 @@ import pytest
 import stepwell as sw
 from stepwell.analysis.stability import eigen, limit_search
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnsupportedError
+from support.looped import in_turn, looped
 from support.stability_cases import EPS
 
 
@@ -35,7 +36,7 @@ def test_the_angle_of_verlet_is_as_exact_as_its_matrix() -> None:
     assert (a.kind == "harmonic").all()
 
 
-@pytest.mark.parametrize("method", ["false_euler", "rk4", "verlet"])
+@looped("method", ["false_euler", "rk4", "verlet"])
 def test_along_a_run(method: str) -> None:
     """The product of the steps' matrices is the derivative of the end with respect to the start (in slots)."""
     scene = sw.scenes.clover()
@@ -109,8 +110,8 @@ def test_overflow_is_said() -> None:
     assert a.stable.tolist() == [True, False]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
+@looped(
+    "arguments, error, message",
     [
         ({"system": 1, "dt": 0.1}, DTypeError, "system: expected a stepwell system"),
         ({"method": "eular", "dt": 0.1}, ArgumentError, "method: there is no 'eular'"),
@@ -137,6 +138,9 @@ def test_overflow_is_said() -> None:
 def test_analyse_says_what_is_wrong(arguments: dict[str, Any], error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
         sw.analyse(**({"system": sw.Oscillator(), "method": "false_euler"} | arguments))
+
+
+def test_a_run_that_is_none_has_no_monodromy() -> None:
     with pytest.raises(ArgumentError, match="monodromy"):
         _ = sw.analyse(sw.Oscillator(), "rk4", dt=0.1).monodromy
 
@@ -212,8 +216,9 @@ def as_linear(system: sw.System, v: Any, y: Any) -> sw.LinearSystem:
     return sw.LinearSystem(sw.jacobian(system, v=v, y=y).matrix, velocities=0 if v is None else len(v))
 
 
-@pytest.mark.parametrize("method", ["standard_euler", "false_euler", "rk4", "merson", "dop853", "taylor"])
-@pytest.mark.parametrize("n", [3, 4, 7])
+@pytest.mark.parametrize(
+    ("n", "method"), in_turn([3, 4, 7], ["false_euler", "rk4", "merson", "standard_euler", "dop853", "taylor"])
+)
 def test_own_linear_equations_have_the_limit_of_the_linear_system(n: int, method: str) -> None:
     """Also where eigenvalues meet, which rounding would hide in the eigenvalues of a step: the fast one decides."""
     y = np.linspace(1.0, 2.0, n + 1)
@@ -227,7 +232,7 @@ def test_own_linear_equations_have_the_limit_of_the_linear_system(n: int, method
         assert limit.mode.y.shape == (n + 1,)
 
 
-@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "rk4", "verlet"])
+@looped("method", ["false_euler", "leapfrog", "rk4", "verlet"])
 def test_own_oscillators_that_are_equal_have_the_limit_of_one(method: str) -> None:
     limit = sw.stability_limit(swings(), method, v=np.zeros(4), y=np.ones(4))
     assert limit.decided
@@ -260,8 +265,7 @@ def coupled(t: Any, v: Any, y: Any, *, k: Any = 0.1) -> Any:
     return (np.roll(y, 1) + np.roll(y, -1)) * k - np.sin(y)
 
 
-@pytest.mark.parametrize("method", ["rk4", "verlet", "fehlberg"])
-@pytest.mark.parametrize("of_each", [False, True])
+@pytest.mark.parametrize(("of_each", "method"), in_turn([False, True], ["rk4", "verlet", "fehlberg"]))
 def test_only_members_whose_limit_is_sought_are_searched(method: str, of_each: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the bits and modes that all of them had together.
 

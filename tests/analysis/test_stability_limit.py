@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import DTypeError, ShapeError, UnsupportedError
+from support import families
 from support import other_methods as other
+from support.looped import looped
 from support.stability_cases import LIMITS, METHODS, known
 
 DAMPABLE = [m for m in METHODS if not sw.method(m).needs_acceleration]
@@ -26,13 +28,13 @@ def test_limits_of_the_undamped_oscillator(method: str) -> None:
     assert sw.stability_limit(sw.Oscillator(7.3, form="physical"), method) == pytest.approx(LIMITS[method] / 7.3, rel=1e-13)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", METHODS)
 def test_the_record_has_the_limit(method: str) -> None:
     assert sw.stability_limit(sw.Oscillator(), method) == pytest.approx(sw.method(method).limit, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("method", "limit"),
+@looped(
+    "method, limit",
     [
         (other.MERSON_4, 2 * math.sqrt(3)),
         (other.FEHLBERG_4, 0.0),
@@ -53,14 +55,13 @@ def test_limits_of_methods_that_are_not_in_the_catalogue(method: Any, limit: flo
 _A, _B = (0.0792036964311957, 0.353172906049774, -0.0420650803577195), (0.209515106613362, -0.143851773179818)
 
 
-@pytest.mark.parametrize(
-    ("kicks", "drifts"),
+@looped(
+    "kicks, drifts",
     [
         ((*_B, 0.5 - sum(_B), 0.5 - sum(_B), *_B[::-1]), (*_A, 1 - 2 * sum(_A), *_A[::-1])),
         ((0.49, 0.51), (0.245, 0.5, 0.255)),
         ((0.2, 0.199, 0.202, 0.199, 0.2), (0.1, 0.1995, 0.2005, 0.2005, 0.1995, 0.1)),
     ],
-    ids=["Blanes-Moan", "two uneven halves", "five uneven fifths"],
 )
 def test_growth_for_less_than_a_rung_is_found(kicks: Any, drifts: Any) -> None:
     """Compositions grow in a narrow window where ½·trace passes ±1 for a moment: of the third from 3.0898 to 3.0905 only.
@@ -89,8 +90,8 @@ def test_growth_for_less_than_a_rung_is_found(kicks: Any, drifts: Any) -> None:
     assert batch == pytest.approx([2 * high, high], rel=1e-13)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 8))])
+@looped("method", [m for m in METHODS if m != "taylor"], long=["taylor"])
+@looped("seed", range(8 if families.LONG else 2))
 def test_limits_of_chains_with_soft_and_stiff_springs(seed: int, method: str) -> None:
     """Eight decades of stiffness, four of mass, with walls and without: the fastest mode decides, by the matrix K/√mm."""
     rng = np.random.default_rng(seed)
@@ -105,9 +106,7 @@ def test_limits_of_chains_with_soft_and_stiff_springs(seed: int, method: str) ->
     assert limit == pytest.approx(sw.method(method).limit / fastest, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    "method", ["false_euler", *(pytest.param(m, marks=pytest.mark.long) for m in ("verlet", "pefrl", "rk4"))]
-)
+@looped("method", ["false_euler"], long=["verlet", "pefrl", "rk4"])
 def test_limits_of_a_long_chain(method: str) -> None:
     n = 40
     fastest = 2 * math.sin(n * math.pi / (2 * (n + 1)))
@@ -141,15 +140,15 @@ def _independent(method: str, damping: float) -> float:
     return low
 
 
-@pytest.mark.parametrize("method", ["standard_euler", "standard_heun", "rk4", "false_euler", "damped_euler"])
-@pytest.mark.parametrize("damping", [0.05, 0.3, 0.7, 1.7])
+@looped("method", ["standard_euler", "standard_heun", "rk4", "false_euler", "damped_euler"])
+@looped("damping", [0.05, 0.3, 0.7, 1.7])
 def test_limits_of_the_damped_oscillator(method: str, damping: float) -> None:
     # The independent value loses digits where q crosses 1 at a small angle: an eps of the determinant over the slope.
     assert sw.stability_limit(sw.Oscillator(1.0, damping), method) == pytest.approx(_independent(method, damping), rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("method", "limit"),
+@looped(
+    "method, limit",
     [
         ("standard_euler", 2.0),
         ("standard_heun", 2.0),
@@ -165,7 +164,7 @@ def test_limits_at_critical_damping(method: str, limit: float) -> None:
     assert sw.stability_limit(sw.Oscillator(1.0, 1.0), method) == pytest.approx(limit, rel=1e-12)
 
 
-@pytest.mark.parametrize("damping", [1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 0.5, 0.99])
+@looped("damping", [1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 0.5, 0.99])
 def test_standard_euler_is_stable_up_to_twice_the_damping(damping: float) -> None:
     """r₁² = 1 − 2DΦ + Φ² (§6). However light the damping, the limit keeps its digits."""
     limit = sw.stability_limit(sw.Oscillator(1.0, damping), "standard_euler")
@@ -174,7 +173,7 @@ def test_standard_euler_is_stable_up_to_twice_the_damping(damping: float) -> Non
     assert limit.mode.angle == pytest.approx(math.atan2(2 * damping * math.sqrt(1 - damping**2), 1 - 2 * damping**2), abs=1e-8)
 
 
-@pytest.mark.parametrize("damping", [0.1, 0.5, 2.0])
+@looped("damping", [0.1, 0.5, 2.0])
 def test_false_euler_damped_has_its_limit_where_an_eigenvalue_passes_minus_one(damping: float) -> None:
     """1 + 2p + q = 4 − 4DΦ − Φ² = 0."""
     limit = sw.stability_limit(sw.Oscillator(2.0, damping), "false_euler")
@@ -182,7 +181,7 @@ def test_false_euler_damped_has_its_limit_where_an_eigenvalue_passes_minus_one(d
     assert limit.mode.eigenvalue == pytest.approx(-1.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("method", [m for m in METHODS if 0.0 < sw.method(m).limit < math.inf])
+@looped("method", [m for m in METHODS if 0.0 < sw.method(m).limit < math.inf and m != "taylor"], long=["taylor"])
 def test_limits_of_a_chain_are_those_of_its_fastest_mode(method: str) -> None:
     n = 9
     fastest = 2 * math.sin(n * math.pi / (2 * (n + 1)))
@@ -223,8 +222,8 @@ def test_inputs_do_not_matter() -> None:
     assert sw.stability_limit(driven, "rk4") == sw.stability_limit(sw.Oscillator(1.3, 0.2), "rk4")
 
 
-@pytest.mark.parametrize("method", DAMPABLE)
-@pytest.mark.parametrize("damping", [0.02, 0.4])
+@looped("method", DAMPABLE)
+@looped("damping", [0.02, 0.4])
 def test_limits_from_both_sides(method: str, damping: float) -> None:
     """A thousandth below, samples die away; a thousandth above, they grow at the predicted rate."""
     limit = sw.stability_limit(sw.Oscillator(1.0, damping), method)
@@ -244,7 +243,7 @@ def test_limits_from_both_sides(method: str, damping: float) -> None:
     assert grown == pytest.approx(steps * math.log(a.radius[1]), abs=math.log(50))
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", METHODS)
 def test_limits_of_a_pendulum_and_of_a_libration_point(method: str) -> None:
     """Hanging, it is an oscillator; standing, it falls. At L4 two oscillations, of which the frame couples velocities."""
     pendulum = sw.Pendulum(3.0)

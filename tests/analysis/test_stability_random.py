@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.analysis.stability import maps, operations, series
+from support.looped import in_turn
 from support.truths import DOP853_TAIL
 
 SECOND_ORDER = [m.name for m in sw.methods() if m.needs_acceleration]
@@ -70,8 +71,7 @@ def radius(method: str, a: Any, n_v: int) -> Any:
     return lambda h: np.abs(np.linalg.eigvals(by_hand(method, np.asarray(h)[..., np.newaxis, np.newaxis] * a, n_v))).max(axis=-1)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("seed", [pytest.param(seed, marks=pytest.mark.long if seed >= 5 else ()) for seed in range(15)])
+@pytest.mark.parametrize(("seed", "method"), in_turn(range(15), METHODS))
 def test_matrix_and_limit(method: str, seed: int) -> None:
     system, a, velocities = random_system(seed)
     n_v = len(velocities)
@@ -104,8 +104,7 @@ def test_matrix_and_limit(method: str, seed: int) -> None:
     assert np.abs(np.linalg.eigvals(a) - limit.mode.rate).min() < 1e-9 * fastest
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(("method", "seed"), in_turn(METHODS, range(8)))
 def test_runs_stay_bounded_or_grow_as_predicted(method: str, seed: int) -> None:
     """A batch of random systems of 3 states with random steps, alone in their fate: each by its own r₁."""
     rng = np.random.default_rng([seed, 77])
@@ -130,8 +129,7 @@ def test_runs_stay_bounded_or_grow_as_predicted(method: str, seed: int) -> None:
     assert 0 < analysis.stable.sum() < b or method == "standard_euler"
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 6))])
+@pytest.mark.parametrize(("method", "seed"), in_turn(METHODS, range(6)))
 def test_units_of_the_states_and_of_time_do_not_matter(seed: int, method: str) -> None:
     """A similar system, its states in units that are powers of two apart, up to 2⁴⁰, and its time too."""
     _, a, velocities = random_system(seed + 100)
@@ -149,8 +147,7 @@ def test_units_of_the_states_and_of_time_do_not_matter(seed: int, method: str) -
         assert two.radius == pytest.approx(one.radius, rel=1e-11)
 
 
-@pytest.mark.parametrize("method", SECOND_ORDER)
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize(("seed", "method"), in_turn(range(10), SECOND_ORDER))
 def test_limits_and_runs_of_random_springs(method: str, seed: int) -> None:
     """v̇ = −K·y, ẏ = c·v with frequencies over three decades: Φ of the fastest decides, and runs from both sides say so."""
     rng = np.random.default_rng([seed, 3])

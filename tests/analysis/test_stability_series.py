@@ -15,6 +15,7 @@ from stepwell.analysis.stability.numbers import Polynomial
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.reference.systems.oscillator import Oscillator as Reference
 from support import other_methods as other
+from support.looped import looped
 from support.stability_cases import EPS, METHODS
 from support.truths import CLOSED_FORMS
 
@@ -51,15 +52,15 @@ RADII = {
 }
 
 
-@pytest.mark.parametrize("method", sorted(RATIOS))
+@looped("method", sorted(RATIOS))
 def test_series_are_those_of_computer_algebra(method: str) -> None:
     expansion = series(method)
     assert expansion.ratio_terms(len(RATIOS[method])) == [(k, Fraction(c)) for k, c in RATIOS[method]]
     assert expansion.radius_terms(9) == [(k, Fraction(c)) for k, c in RADII[method]]
 
 
-@pytest.mark.parametrize(
-    ("method", "radius", "ratio"),
+@looped(
+    "method, radius, ratio",
     [
         (other.MERSON_4, (8, -1 / 1728), (4, -1 / 720)),
         (other.FEHLBERG_4, (6, 5.342e-3), None),
@@ -79,7 +80,7 @@ def test_series_of_methods_that_are_not_in_the_catalogue(method: Any, radius: An
         assert expansion.ratio_terms(1)[0] == pytest.approx(ratio, rel=1e-2)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", METHODS)
 def test_series_approach_the_exact_values(method: str) -> None:
     """With terms up to Φ¹² the rest is some Φ¹⁴ = 6e-8 at Φ = 0.3, and less for the exact r₁²."""
     expansion = series(method)
@@ -89,8 +90,8 @@ def test_series_approach_the_exact_values(method: str) -> None:
     assert a.p == pytest.approx(expansion.p(0.3), abs=20 * EPS)
 
 
-@pytest.mark.parametrize(
-    ("method", "counts"),
+@looped(
+    "method, counts",
     [
         # Two products with Φ and two sums (§8: "two multiplications and two additions per step").
         ("standard_euler", (2, 2, 0, 0, 1, 1)),
@@ -119,7 +120,7 @@ def test_operations_of_other_systems() -> None:
         operations("verlet", sw.Oscillator(1.0, 0.1))
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", METHODS)
 def test_the_record_has_the_evaluations(method: str) -> None:
     o, calls = operations(method), []
 
@@ -195,8 +196,8 @@ def test_criteria_file(tmp_path: Any) -> None:
     assert json.loads((tmp_path / "c.json").read_text(encoding="utf-8")) == json.loads(json.dumps(criteria.rows()))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
+@looped(
+    "arguments, message",
     [
         ({"methods": "rk4"}, "expected a list of names"),
         ({"methods": []}, "methods: expected at least one"),

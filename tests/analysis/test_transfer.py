@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
+from support.looped import assert_refused, looped
 
 signal = pytest.importorskip("scipy.signal")
 
@@ -50,7 +51,7 @@ H: Any = ([2.0, 5.0, 1.0], [1.0, 3.0, 0.5])  # equal degrees
 K: Any = ([1.0], [0.2, 1.0])
 
 
-@pytest.mark.parametrize(("num", "den"), [G, H, K, ([1.0], [1.0, 0.0]), ([0.0, 0.0, 2.0], [0.0, 4.0, 2.0]), ([7.0], [2.0, 1.0])])
+@looped("num, den", [G, H, K, ([1.0], [1.0, 0.0]), ([0.0, 0.0, 2.0], [0.0, 4.0, 2.0]), ([7.0], [2.0, 1.0])])
 def test_the_response_is_the_ratio_of_the_polynomials(num: Any, den: Any) -> None:
     near(response(sw.TransferFunction(num, den))[0, 0], ratio(num, den))
 
@@ -99,7 +100,7 @@ OBJECTS: dict[str, tuple[Any, Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", OBJECTS)
+@looped("name", OBJECTS)
 def test_objects_of_other_libraries(name: str) -> None:
     system, (num, den) = OBJECTS[name]
     near(response(sw.LinearSystem.of(system))[0, 0], ratio(num, den))
@@ -122,7 +123,7 @@ def test_several_inputs_and_outputs_of_other_libraries() -> None:
     near(both_rows[1, 0], ratio([3.0], [1.0, 2.0]))
 
 
-@pytest.mark.parametrize("form", ["canonical", "physical"])
+@looped("form", ["canonical", "physical"])
 def test_an_oscillator_as_a_linear_system(form: Any) -> None:
     """z = y, so the response to x is ω₀²/(s² + 2Dω₀s + ω₀²), to a 1 over the same."""
     oscillator = sw.Oscillator(np.array([2.0, 3.0]), 0.1, form=form, a=1.0)
@@ -239,7 +240,7 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (
         lambda: sw.LinearSystem.of(signal.ZerosPolesGain([], [-1.0 + 1j], 1.0)),
         ArgumentError,
-        "zeros|poles: expected real numbers",
+        "poles: expected real numbers",
     ),
     (lambda: sw.LinearSystem.of([1.0]), DTypeError, "system: expected a linear system of stepwell, or an object of SciPy"),
     (lambda: sw.LinearSystem.of(sw.Pendulum()), UnsupportedError, "system: expected a linear one"),
@@ -262,11 +263,8 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("call", "kind", "message"), WRONG)
-def test_what_is_refused(call: Any, kind: type[Exception], message: str) -> None:
-    with pytest.raises(kind) as caught:
-        call()
-    assert any(each in str(caught.value) for each in message.split("|"))
+def test_what_is_refused() -> None:
+    assert_refused(WRONG)
 
 
 def test_a_system_of_python_does_not_multiply() -> None:

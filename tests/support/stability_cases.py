@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 import stepwell as sw
+
+from support.looped import looped
 
 METHODS = [m.name for m in sw.methods()]
 EPS = float(np.finfo(float).eps)
@@ -26,4 +27,10 @@ LIMITS = {
     "dop853": 5.96035981170278,  # of the polynomial in truths, in 40 digits
     "pefrl": 2.989449545906729,  # where 1 + p = 0, by bisection of the product of nine shears in fractions
 }
-known = pytest.mark.parametrize("method", sorted(LIMITS))
+known = looped("method", sorted(LIMITS))
+
+#: Methods whose steps are derived number by number take long.
+DEAR = [m.name for m in sw.methods() if m.has_derivatives]
+QUICK = [name for name in METHODS if name not in DEAR]
+#: A method of each structure, of those that do not take long.
+OF_EACH_STRUCTURE = ["standard_euler", "false_euler", "verlet", "leapfrog", "semi_false_heun", "rk4", "fehlberg_5", "pefrl"]
