@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import pickle
 import re
 import subprocess
 import sys
 import tracemalloc
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,14 +21,18 @@ import stepwell as sw
 import xarray
 from stepwell.errors import ArgumentError, DTypeError, UnsupportedError
 from stepwell.studies.sweeps import axes as of_axes
-from stepwell.studies.sweeps import outcomes
-from support.sweeping import AXES, OUTCOMES, duffing, small, unlike
+from stepwell.studies.sweeps import outcomes, portable
+from stepwell.studies.sweeps.axes import Chunk
+from stepwell.studies.sweeps.ensemble import _outcomes
+from stepwell.studies.sweeps.task import Task
+from support.looped import assert_refused, looped
+from support.sweeping import AXES, OUTCOMES, Pickling, duffing, small, unlike
 
 Oscillator = sw.Oscillator
 #: Outcomes that work with float32.
 WITH_FLOAT32 = tuple(each for each in OUTCOMES if each != "lyapunov")
 
-each_type = pytest.mark.parametrize("dtype", ["float64", "float32"])
+each_type = looped("dtype", ["float64", "float32"])
 
 
 # ---- axes
@@ -80,7 +88,7 @@ def test_blocks_with_axes_of_their_own() -> None:
 
 
 @each_type
-@pytest.mark.parametrize("method", ["leapfrog", "verlet", "merson"])
+@looped("method", ["leapfrog", "verlet", "merson"])
 def test_a_step_as_an_axis(method: str, dtype: Any) -> None:
     """A run has one step, so those of one step are computed together; its dimension comes first."""
     dt, omega = np.array([0.01, 0.02, 0.05]), np.array([1.0, 2.0])
@@ -109,8 +117,8 @@ def test_a_force_as_an_axis() -> None:
     np.testing.assert_array_equal(dataset.y_last, run.y[-1])
 
 
-@pytest.mark.parametrize("shape", [(7,), (3, 5), (2, 3, 4), (1, 6, 1)])
-@pytest.mark.parametrize("of_dt", [0, 1])
+@looped("shape", [(7,), (3, 5), (2, 3, 4), (1, 6, 1)])
+@looped("of_dt", [0, 1])
 def test_chunks_are_all_members_in_their_order(shape: tuple[int, ...], of_dt: int) -> None:
     names = ["dt" if of_dt and i == 0 else f"p{i}" for i in range(len(shape))]
     grid = of_axes.grid({name: np.arange(1.0, n + 1.0) for name, n in zip(names, shape, strict=True)})
@@ -158,26 +166,23 @@ def test_sobol_fills_the_box_evenly() -> None:
 # ---- the same bits
 
 
-@pytest.mark.parametrize(
-    "division",
-    [
+@looped("dtype", ["float64", "float32"])
+def test_every_division_gives_the_same_bits(dtype: Any) -> None:
+    options: dict[str, Any] = {} if dtype == "float64" else {"dtype": dtype, "outcomes": WITH_FLOAT32}
+    one = small(**options)
+    assert len(one.attrs["bits"]) == 32
+    assert options == {} or one.attrs["bits"] != small(outcomes=WITH_FLOAT32).attrs["bits"]
+    for division in (
         {"chunk": 1},
         {"chunk": 2, "threads": 3},
         {"chunk": 7},
         {"chunk": 10_000},
         {"memory": 12_000.0},
         {"memory": 100_000.0, "chunk": 11},
-    ],
-    ids=str,
-)
-@each_type
-def test_every_division_gives_the_same_bits(division: dict[str, Any], dtype: Any) -> None:
-    options: dict[str, Any] = {} if dtype == "float64" else {"dtype": dtype, "outcomes": WITH_FLOAT32}
-    one, other = small(**options), small(**options, **division)
-    assert unlike(one, other) == []
-    assert one.attrs == other.attrs
-    assert len(one.attrs["bits"]) == 32
-    assert options == {} or one.attrs["bits"] != small(outcomes=WITH_FLOAT32).attrs["bits"]
+    ):
+        other = small(**options, **division)
+        assert unlike(one, other) == [], division
+        assert one.attrs == other.attrs, division
 
 
 def test_a_bit_that_differs_has_another_hash() -> None:
@@ -210,6 +215,90 @@ def test_a_sum_in_another_order_would_be_noticed(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(outcomes._Mean, "see", see)
     assert len({small(outcomes="mean", memory=m).attrs["bits"] for m in (64.0 * 2**20, 12_000.0)}) == 2
+
+
+# ---- engines; those of other processes are in tests/outer/test_sweep_engines.py
+
+
+def test_executors_give_the_same_bits() -> None:
+    whole = small()
+    with ThreadPoolExecutor(3) as pool:
+        for engine, chunk in ((pool, 4), (pool, None), (Pickling(), 11)):
+            dataset = small(engine=engine, chunk=chunk)
+            assert unlike(whole, dataset) == [], engine
+            assert dataset.attrs == whole.attrs, engine
+
+
+def test_what_happens_in_another_process_is_told_here() -> None:
+    def wrong(run: sw.Run) -> Any:
+        return run.y[-1, :1].reshape(1, 1, 1)[0, 0, 0]
+
+    for engine in (Pickling(), None):
+        with pytest.raises(
+            ArgumentError, match="outcomes: wrong: expected an array whose last axis has one number for each member of the run, "
+        ):
+            small(engine=engine, outcomes=wrong)
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 2 members diverged, that at omega = 30"):
+        sw.sweep(sw.Oscillator, {"omega": [1.0, 30.0]}, "rk4", v=0.0, y=1.0, dt=0.2, steps=500, engine=Pickling())
+
+
+def test_equations_that_are_written_in_a_function() -> None:
+    """``pickle`` finds equations by name; those of a notebook, a script or a function travel by their text."""
+    gain = 0.5
+
+    @sw.system
+    def local(t: Any, v: Any, y: Any, *, gamma: Any = gain) -> Any:
+        return gamma * np.cos(1.2 * t) - 0.2 * v + gain * 2.0 * y - y**3
+
+    @local.invariant
+    def energy(v: Any, y: Any) -> Any:
+        return 0.5 * v**2 - 0.5 * y**2 + 0.25 * y**4
+
+    with pytest.raises(ArgumentError, match="an own system is pickled by the name of its function"):
+        pickle.dumps(local)
+    datasets = [
+        sw.sweep(
+            local, AXES, "rk4", v=0.0, dt=0.05, steps=100, outcomes=["last", sw.sweeps.Mean("energy")], engine=engine, chunk=5
+        )
+        for engine in (None, Pickling())
+    ]
+    assert unlike(*datasets) == []
+
+
+def test_kernels_are_compiled_once_a_worker() -> None:
+    """A worker unpacks the task once; the machine code of further chunks is that of the first."""
+    if sw.isa() == "interpret" or not sys.platform.startswith("linux"):
+        pytest.skip("everything is interpreted, or this system does not tell of mappings")
+
+    def mapped() -> list[str]:
+        """Executable mappings that are no file."""
+        lines = Path("/proc/self/maps").read_text().splitlines()
+        return [line for line in lines if re.match(r"\S+ ..x. \S+ \S+ 0\s*$", line)]
+
+    arguments = {"v": 0.0, "y": 1.0, "dt": 0.05, "t0": 0.0, "fused": False, "threads": 1}
+    task = Task(partial(duffing, delta=0.123), "rk4", arguments, 0, 2000, 1, None, _outcomes(["last", "extremes"], None), 2.0**26)
+    package = portable.packed(task)
+    before = mapped()
+    kernels = []
+    for k in range(6):
+        chunk = Chunk((k,), (slice(64 * k, 64 * k + 64),), (64,), 64 * k)
+        portable.sweep_chunk(package, {"gamma": np.linspace(0.1, 0.6, 64) + k}, chunk)
+        kernels.append(mapped())
+    # A step is interpreted until compiling it pays, which for one of the two kinds of pieces may be in the second chunk.
+    assert kernels[1] != before
+    assert all(each == kernels[1] for each in kernels[1:])
+    assert portable._task(package) is portable._task(bytes(bytearray(package)))
+
+
+def test_what_cannot_travel_is_told() -> None:
+    lock = multiprocessing.get_context("spawn").Lock()
+
+    def locked(run: sw.Run) -> Any:
+        with lock:
+            return run.y[-1]
+
+    with pytest.raises((ArgumentError, RuntimeError), match=r"engine: the system and the outcomes must be pickled|shared"):
+        small(engine=Pickling(), outcomes=locked)
 
 
 def test_memory_is_bounded() -> None:
@@ -314,49 +403,28 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("what", REFUSED)
+@looped("what", REFUSED)
 def test_what_is_refused(what: str) -> None:
     wrong, message = REFUSED[what]
     with pytest.raises((sw.StepwellError, TypeError), match=re.escape(message)):
         sw.sweep(**(GOOD | wrong))
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "message"),
-    [
-        (
-            {"tolerance": 1e-9, "at": [1.0], "method": "merson"},
-            ArgumentError,
-            "tolerance: in float32 a step rounds the state by up",
-        ),
-        ({"outcomes": "lyapunov"}, ArgumentError, "dtype: goes without Lyapunov exponents"),
-        ({"axes": {"omega": [1.0, 1e39, 1.0]}}, ArgumentError, "axes: omega: expected numbers up to 3.4e38"),
-        (
-            {"axes": {"dt": [0.1, 1e-50, 0.1]}, "dt": None},
-            ArgumentError,
-            "dt: expected a number of size 1.4e-45 to 3.4e38 units of time in float32",
-        ),
-        ({"y": 1e39}, ArgumentError, "y: expected numbers up to 3.4e38"),
-        ({"method": "taylor"}, UnsupportedError, "dtype: float32 does not work with taylor"),
-        ({"dtype": "float16"}, DTypeError, "dtype: expected 'float64' or 'float32', got 'float16'"),
-    ],
-)
-def test_what_does_not_go_with_float32_is_said_before_any_work(
-    options: dict[str, Any], error: type[Exception], message: str
-) -> None:
-    arguments = {
-        "axes": {"omega": [1.0, 2.0, 3.0]},
-        "method": "rk4",
-        "v": 0.0,
-        "y": 1.0,
-        "dt": 0.1,
-        "steps": 10,
-        "dtype": "float32",
-    } | options
-    if "tolerance" in arguments:
-        arguments |= {"dt": None, "steps": None}
-    with pytest.raises(error, match=message):
-        sw.sweep(sw.Oscillator(), **arguments) if "dt" in arguments["axes"] else sw.sweep(partial(sw.Oscillator), **arguments)  # type: ignore[arg-type]
+def test_what_does_not_go_with_float32_is_said_before_any_work() -> None:
+    adaptive: dict[str, Any] = {"tolerance": 1e-9, "at": [1.0], "method": "merson", "dt": None, "steps": None}
+    steps: dict[str, Any] = {"system": Oscillator(), "axes": {"dt": [0.1, 1e-50, 0.1]}, "dt": None}
+    assert_refused(
+        (lambda options=options: sw.sweep(**GOOD | {"dtype": "float32"} | options), error, message)
+        for options, error, message in (
+            (adaptive, ArgumentError, "tolerance: in float32 a step rounds the state by up"),
+            ({"outcomes": "lyapunov"}, ArgumentError, "dtype: goes without Lyapunov exponents"),
+            ({"axes": {"omega": [1.0, 1e39, 1.0]}}, ArgumentError, "axes: omega: expected numbers up to 3.4e38"),
+            (steps, ArgumentError, "dt: expected a number of size 1.4e-45 to 3.4e38 units of time in float32"),
+            ({"y": 1e39}, ArgumentError, "y: expected numbers up to 3.4e38"),
+            ({"method": "taylor"}, UnsupportedError, "dtype: float32 does not work with taylor"),
+            ({"dtype": "float16"}, DTypeError, "dtype: expected 'float64' or 'float32', got 'float16'"),
+        )
+    )
 
 
 def test_a_component_must_be_given_where_there_are_several() -> None:
@@ -393,12 +461,7 @@ def test_filters_of_warnings_are_as_before() -> None:
     assert list(warnings.filters) == before
 
 
-def test_every_kind_of_outcome_is_tried() -> None:
-    tried = {type(each).__name__ if isinstance(each, outcomes.Outcome) else each for each in OUTCOMES if not callable(each)}
-    assert {"last", "extremes", "mean", "crossing", "period", "lyapunov"} <= tried
-
-
-@pytest.mark.parametrize("name", sw.sweeps.__all__)
+@looped("name", sw.sweeps.__all__)
 def test_everything_public_has_an_example_that_runs(name: str) -> None:
     import doctest
 

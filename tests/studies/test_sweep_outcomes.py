@@ -10,12 +10,13 @@ import stepwell as sw
 from stepwell.errors import ArgumentError
 from stepwell.studies.sweeps import crossings, observed
 from stepwell.studies.sweeps.task import Stopped
+from support.looped import looped
 from support.sweeping import AXES, duffing, ends, power, small
 
 Oscillator = sw.Oscillator
 F = np.float32
 
-each_type = pytest.mark.parametrize("dtype", ["float64", "float32"])
+each_type = looped("dtype", ["float64", "float32"])
 
 
 def whole(**options: Any) -> tuple[Any, sw.Run]:
@@ -34,7 +35,7 @@ def test_extremes() -> None:
         np.testing.assert_array_equal(dataset[f"{name}_max"], values.max(axis=0))
 
 
-@pytest.mark.parametrize("observe", [1, 7, 400])
+@looped("observe", [1, 7, 400])
 def test_means(observe: int) -> None:
     """By the trapezoidal rule, the last interval shorter where the steps are no multiple of the interval."""
     dataset, run = whole(outcomes=["mean", sw.sweeps.Mean(power, name="p")], observe=observe)
@@ -46,7 +47,7 @@ def test_means(observe: int) -> None:
         np.testing.assert_allclose(dataset[f"{name}_mean"], sums, atol=2 * 400 * 2**-53 * abs(values).max())
 
 
-@pytest.mark.parametrize("memory", [None, 2e4])
+@looped("memory", [None, 2e4])
 def test_a_first_passage_without_a_time_stays_the_first(memory: float | None) -> None:
     """From −∞ to ∞ there is no time of a passage, and a later one is not the first, wherever pieces end."""
 
@@ -109,7 +110,7 @@ def crossing_errors(steps: int, **options: Any) -> Any:
     return abs(dataset.y_crossing.values - t), bound
 
 
-@pytest.mark.parametrize("steps", [20, 40, 80, 400])
+@looped("steps", [20, 40, 80, 400])
 def test_first_crossings_are_those_of_the_exact_motion(steps: int) -> None:
     errors, bound = crossing_errors(steps)
     assert (errors < bound).all()
@@ -165,7 +166,7 @@ def test_directions_and_what_never_passes() -> None:
     np.testing.assert_allclose(dataset.y_crossing, 1.5 * np.pi, atol=1e-8)
 
 
-@pytest.mark.parametrize(("number", "word"), [(1, "rising"), (-1, "falling"), (0, "both")])
+@looped("number, word", [(1, "rising"), (-1, "falling"), (0, "both")])
 def test_directions_are_those_of_events(number: int, word: Any) -> None:
     """As a number or as a word, in both; a crossing of both says it as an event does."""
     crossings = [sw.sweeps.Crossing("y", 0.5, each) for each in (number, word)]
@@ -191,7 +192,7 @@ def test_a_crossing_at_a_state_counts_once() -> None:
     assert np.isnan(dataset.met_period).all()
 
 
-@pytest.mark.parametrize("memory", [64 * 2**20, 3000])
+@looped("memory", [64 * 2**20, 3000])
 def test_periods(memory: float) -> None:
     """Of 2π/ω: RK4's own frequency is lower by Φ⁴/120; n intervals share the errors of two passages, of Φ⁴/384 each at most."""
     omega, h, steps = np.array([1.0, 1.5, 2.0]), 0.05, 1000
@@ -235,7 +236,7 @@ def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
 
 
 @each_type
-@pytest.mark.parametrize(("every", "steps"), [(1, 10), (4, 10), (5, 10), (20, 10)])
+@looped("every, steps", [(1, 10), (4, 10), (5, 10), (20, 10)])
 def test_histories_are_those_of_integrate(every: int, steps: int, dtype: Any) -> None:
     omega = np.array([1.0, 2.0, 3.0])
     arguments: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": steps, "every": every, "dtype": dtype}
@@ -306,7 +307,7 @@ OBSERVED: dict[str, sw.System] = {
 }
 
 
-@pytest.mark.parametrize("name", OBSERVED)
+@looped("name", OBSERVED)
 def test_rates_are_those_of_the_motion(name: str) -> None:
     """Each member at a time of its own, as at passages; compared with a short step of RK4 from there."""
     system, rng, t, h = OBSERVED[name], np.random.default_rng(1), np.array([0.1, 1.3, 2.6]), 1e-5

@@ -5,12 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
-import signal
-import subprocess
-import sys
-import textwrap
-import time
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +14,8 @@ import stepwell as sw
 import xarray
 from stepwell.errors import ArgumentError
 from stepwell.studies.sweeps import engines, stores
-from support import ROOT
-from support.sweeping import small, unlike
+from support.looped import in_turn
+from support.sweeping import chunk_files, small, unlike
 
 KINDS = pytest.mark.parametrize("ending", ["zarr", "nc"])
 
@@ -40,8 +34,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return firsts
 
 
-@KINDS
-@pytest.mark.parametrize("every", [None, 40])
+@pytest.mark.parametrize(("ending", "every"), in_turn(["zarr", "nc"], [40, None]))
 def test_a_store_holds_what_memory_would(ending: str, every: int | None, tmp_path: Path) -> None:
     options: dict[str, Any] = {
         "every": every,
@@ -115,12 +108,9 @@ def test_ctrl_c_leaves_a_valid_store(tmp_path: Path, monkeypatch: pytest.MonkeyP
         assert "bits" not in there.attrs
 
 
-def chunk_files(path: Path, name: str) -> list[Path]:
-    return sorted(each for each in (path / name / "c").rglob("*") if each.is_file())
-
-
-@pytest.mark.parametrize("damage", ["empty", "half", "a bit", "gone", "another"])
-@pytest.mark.parametrize("name", ["y_last", "status", "progress/hashes"])
+@pytest.mark.parametrize(
+    ("damage", "name"), in_turn(["empty", "half", "a bit", "gone", "another"], ["progress/hashes", "y_last", "status"])
+)
 def test_a_torn_chunk_is_done_again(damage: str, name: str, tmp_path: Path, computed: list[int]) -> None:
     """And no other one. Whole numbers are compressed, so a bit may be an error of the codec, or another number."""
     path = tmp_path / "a.zarr"
@@ -234,90 +224,6 @@ def test_xarray_reads_it_by_itself(ending: str, tmp_path: Path) -> None:
         assert json.loads(dataset.attrs["sweep"])["method"] == "rk4"
 
 
-#: A sweep of some seconds in a process of its own.
-SLOW = """
-    import signal, sys, time
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # what a shell starts in the background ignores Ctrl-C
-    sys.path.insert(0, {tests!r})
-    from functools import partial
-    import stepwell as sw
-    from support.sweeping import duffing, AXES
-
-    def slow(run):
-        time.sleep(0.15)
-        return {{"end": run.y[-1]}}
-
-    dataset = sw.sweep(
-        partial(duffing, delta=0.2), AXES, "rk4", v=0.0, dt=0.05, steps=60, outcomes=["last", slow], chunk=2, threads=2,
-        store={store!r},
-    )
-    print("finished", dataset.attrs["bits"])
-"""
-
-
-def slow_sweep(tmp_path: Path, ending: str) -> tuple[Path, list[str]]:
-    script, store = tmp_path / "slow.py", tmp_path / f"a.{ending}"
-    script.write_text(textwrap.dedent(SLOW.format(tests=str(ROOT / "tests"), store=str(store))))
-    return store, [sys.executable, str(script)]
-
-
-def finished_chunks(store: Path) -> int:
-    """How many chunks have their hash."""
-    at = store if store.exists() else store.with_name(f"{store.name}.unfinished")
-    return len(chunk_files(at, "progress/hashes"))
-
-
-@pytest.mark.parametrize(
-    ("killed", "ending"),
-    [
-        (True, "zarr"),
-        (True, "nc"),
-        pytest.param(False, "zarr", marks=pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")),
-    ],
-)
-def test_after_a_signal_in_the_middle(killed: bool, ending: str, tmp_path: Path) -> None:
-    """Killed again and again at any moment; every finished chunk stays as it is, and the result is that of one sweep."""
-    store, command = slow_sweep(tmp_path, ending)
-    written: dict[Path, int] = {}
-    chunks = 27  # three of two, two and one member for each of nine values
-    for least in (3, 10):
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        until = time.monotonic() + 60
-        while finished_chunks(store) < least and process.poll() is None and time.monotonic() < until:
-            time.sleep(0.01)
-        process.kill() if killed else process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=60)
-        assert "finished" not in out, error
-        if killed:
-            assert process.returncode in (-9, 1)  # the latter on Windows
-        else:
-            assert "KeyboardInterrupt" in error
-        assert least <= finished_chunks(store) < chunks
-        at = store if ending == "zarr" else store.with_name("a.nc.unfinished")
-        for file, when in written.items():
-            assert file.stat().st_mtime_ns == when, "a finished chunk was written again"
-        hashes = chunk_files(at, "progress/hashes")
-        written = {file: file.stat().st_mtime_ns for file in hashes}
-    beside = shutil.copytree(at, tmp_path / "beside.zarr")
-    with stores.opened(beside) as there:
-        done = there.status.values != -1
-        assert 10 <= done.sum() < done.size
-        assert np.isfinite(there.y_last.values[done]).all()
-    done_by = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert done_by.returncode == 0, done_by.stderr
-    if ending == "zarr":
-        for file, when in written.items():
-            assert file.stat().st_mtime_ns == when
-    else:
-        assert not at.exists()
-    whole = small(outcomes=["last", lambda run: {"end": run.y[-1]}], steps=60, transient=0)
-    assert done_by.stdout.split() == ["finished", whole.attrs["bits"]]
-    options = {"engine": "zarr", "consolidated": False} if ending == "zarr" else {"engine": "h5netcdf"}
-    with xarray.open_dataset(store, **options) as dataset:
-        np.testing.assert_array_equal(dataset.y_last, whole.y_last)
-        np.testing.assert_array_equal(dataset.end, whole.y_last)
-
-
 TORN = {
     "empty": lambda whole: b"",
     "half": lambda whole: whole[: len(whole) // 2],
@@ -325,9 +231,9 @@ TORN = {
 }
 
 
-@KINDS
-@pytest.mark.parametrize("damage", TORN)
-@pytest.mark.parametrize("what", ["y_last", "status", "gamma", "y0", "progress/hashes"])
+@pytest.mark.parametrize(
+    ("what", "damage", "ending"), in_turn(["y_last", "status", "gamma", "y0", "progress/hashes"], list(TORN), ["zarr", "nc"])
+)
 def test_torn_metadata_is_told(what: str, damage: str, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Before any work; nothing is written, so that what is whole can still be read."""
     path = tmp_path / f"a.{ending}"

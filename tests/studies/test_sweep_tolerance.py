@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import re
 import warnings
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,9 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
 from stepwell.studies.sweeps import task
-from support.sweeping import AXES, duffing, ends, power, unlike
+from support.families import family
+from support.looped import looped
+from support.sweeping import AXES, Pickling, duffing, ends, power, unlike
 
 METHODS = ("merson", "fehlberg", "fehlberg_5", "dop853", "taylor")
 GAMMA, Y0 = (values for _, values in AXES.values())
@@ -50,7 +51,7 @@ def alike(method: str = "dop853", **options: Any) -> sw.Run:
 # ---- the bits of integrate
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method", METHODS)
 def test_members_are_those_of_integrate(method: str) -> None:
     dataset, run = adaptive(method=method, outcomes=["last", "history", "evaluations"], chunk=7, memory=20_000.0), alike(method)
     assert run.paces is not None
@@ -66,7 +67,7 @@ def test_members_are_those_of_integrate(method: str) -> None:
     assert len(np.unique(dataset.evaluations)) > 1  # members have steps of their own
 
 
-@pytest.mark.parametrize(
+@looped(
     "options",
     [
         {"tolerance": (1e-7, 1e-9)},
@@ -77,7 +78,6 @@ def test_members_are_those_of_integrate(method: str) -> None:
         {"control": sw.Projection("energy")},
         {"dtype": "float32", "tolerance": 1e-4},
     ],
-    ids=lambda options: next(iter(options)),
 )
 def test_arguments_are_those_of_integrate(options: dict[str, Any]) -> None:
     dataset, run = adaptive(outcomes=["last", "evaluations"], chunk=10, memory=20_000.0, **options), alike(**options)
@@ -86,7 +86,7 @@ def test_arguments_are_those_of_integrate(options: dict[str, Any]) -> None:
     np.testing.assert_array_equal(dataset.evaluations, run.paces.evaluations)
 
 
-@pytest.mark.parametrize("method", ["dop853", "taylor"])
+@looped("method", ["dop853", "taylor"])
 def test_a_tolerance_as_an_axis(method: str) -> None:
     relative = np.array([1.1e-8, 1.2e-8, 1.5e-8]) if method == "taylor" else np.array([1e-4, 1e-8, 1e-12])
     axes = {"y": ("y0", Y0), "tolerance": ("tolerance", relative)}
@@ -99,17 +99,6 @@ def test_a_tolerance_as_an_axis(method: str) -> None:
     np.testing.assert_array_equal(dataset.evaluations, run.paces.evaluations)
     np.testing.assert_array_equal(dataset.tolerance, relative)
     assert "tolerance" not in dataset.attrs
-
-
-def test_blocks_with_axes_of_their_own() -> None:
-    scene = sw.scenes.figure_eight()
-    factor = np.array([0.98, 1.0, 1.02, 1.04])
-    axes = {"v": ("speed", scene.v[..., None] * factor)}
-    dataset = sw.sweep(scene.system, axes, "dop853", y=scene.y, tolerance=1e-10, at=[1.0, 2.0], outcomes="history", chunk=3)
-    run = sw.integrate(
-        scene.system, "dop853", v=scene.v[..., None] * factor, y=scene.y[..., None], tolerance=1e-10, at=[1.0, 2.0]
-    )
-    np.testing.assert_array_equal(dataset.y, np.moveaxis(run.y, -1, 0))
 
 
 # ---- what reductions see
@@ -162,26 +151,21 @@ def whole() -> Any:
     return adaptive()
 
 
-@pytest.mark.parametrize(
-    "division",
-    [{"chunk": 1}, {"chunk": 2, "threads": 3}, {"chunk": 7}, {"memory": 20_000.0}, {"memory": 60_000.0, "chunk": 11}],
-    ids=str,
-)
-def test_every_division_gives_the_same_bits(whole: Any, division: dict[str, Any]) -> None:
-    dataset = adaptive(**division)
-    assert unlike(whole, dataset) == []
-    assert whole.attrs == dataset.attrs
-
-
 def in_pieces(monkeypatch: pytest.MonkeyPatch, times: int) -> None:
     """As if memory sufficed for so many states at once."""
     monkeypatch.setattr(task.Task, "states_at_once", lambda *_: times)
 
 
-@pytest.mark.parametrize("times", [1, 2, 7, 24])
-def test_every_division_of_time_gives_the_same_bits(whole: Any, times: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    in_pieces(monkeypatch, times)
-    assert unlike(whole, adaptive(chunk=20)) == []
+def test_every_division_of_members_and_of_time_gives_the_same_bits(whole: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    with ThreadPoolExecutor(3) as pool:
+        divisions: list[dict[str, Any]] = [{"chunk": 1}, {"chunk": 2, "threads": 3}, {"memory": 60_000.0, "chunk": 11}]
+        for division in (*divisions, {"engine": pool, "chunk": 4}, {"engine": Pickling(), "chunk": 10}):
+            dataset = adaptive(**division)
+            assert unlike(whole, dataset) == [], division
+            assert whole.attrs == dataset.attrs, division
+    for times in (1, 2, 7, 24):
+        in_pieces(monkeypatch, times)
+        assert unlike(whole, adaptive(chunk=20)) == [], times
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -212,24 +196,7 @@ def test_pieces_that_begin_anew_would_be_noticed(whole: Any, monkeypatch: pytest
     assert "y_last" in unlike(whole, adaptive())
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
-def test_every_engine_gives_the_same_bits(whole: Any) -> None:
-    import distributed
-
-    with ThreadPoolExecutor(3) as pool:
-        assert unlike(whole, adaptive(engine=pool, chunk=4)) == []
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
-        assert unlike(whole, adaptive(engine=pool, chunk=11)) == []
-    with (
-        distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=":0") as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        dataset = adaptive(engine=client, chunk=10)
-        assert unlike(whole, dataset) == []
-        assert dataset.attrs["bits"] == whole.attrs["bits"]
-
-
-@pytest.mark.parametrize("ending", ["zarr", "nc"])
+@pytest.mark.parametrize("ending", family(["zarr", "nc"], lambda ending: ending == "zarr"))
 def test_a_store_goes_on_and_refuses_another_tolerance(whole: Any, ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"a.{ending}"
     for _ in range(2):
@@ -369,7 +336,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("what", REFUSED)
+@looped("what", REFUSED)
 def test_what_is_refused(what: str) -> None:
     wrong, message = REFUSED[what]
     with pytest.raises((sw.StepwellError, TypeError), match=re.escape(message)):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
+from concurrent.futures import Executor, Future
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -73,3 +76,21 @@ def unlike(a: Any, b: Any) -> list[str]:
     """The names of arrays and coordinates that differ in a bit."""
     assert list(a.variables) == list(b.variables) or set(a.variables) == set(b.variables)
     return [name for name in a.variables if a[name].values.tobytes() != b[name].values.tobytes() or a[name].dims != b[name].dims]
+
+
+class Pickling(Executor):
+    """Computes here and at once, but nothing comes or goes that does not travel between processes."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        function, arguments, options = pickle.loads(pickle.dumps((fn, args, kwargs)))
+        future: Future[Any] = Future()
+        try:
+            future.set_result(pickle.loads(pickle.dumps(function(*arguments, **options))))
+        except Exception as error:
+            future.set_exception(pickle.loads(pickle.dumps(error)))
+        return future
+
+
+def chunk_files(path: Path, name: str) -> list[Path]:
+    """Those of an array in a store."""
+    return sorted(each for each in (path / name / "c").rglob("*") if each.is_file())

@@ -5,15 +5,14 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
-import pickle
-import re
+import shutil
 import signal
 import subprocess
 import sys
 import textwrap
 import time
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,12 +22,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 import xarray
-from stepwell.errors import ArgumentError
-from stepwell.studies.sweeps import portable
-from stepwell.studies.sweeps.axes import Chunk
-from stepwell.studies.sweeps.ensemble import _outcomes
-from stepwell.studies.sweeps.task import Task
-from support.sweeping import AXES, OUTCOMES, duffing, ends, small, unlike
+from stepwell.studies.sweeps import stores
+from support import ROOT
+from support.sweeping import chunk_files, duffing, small, unlike
 
 #: Of Dask and its loops, at their own end.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
@@ -54,18 +50,15 @@ def client(cluster: Any) -> Iterator[Any]:
 # ---- the same bits everywhere
 
 
-@pytest.mark.parametrize("chunk", [4, None])
-def test_threads_of_an_executor(whole: Any, chunk: int | None) -> None:
-    with ThreadPoolExecutor(3) as pool:
-        assert unlike(whole, small(engine=pool, chunk=chunk)) == []
-
-
 @pytest.mark.parametrize("start", ["spawn", "forkserver"])
-def test_processes(whole: Any, start: str) -> None:
+def test_processes(start: str) -> None:
+    """With fixed steps and with a tolerance."""
+    steps: dict[str, Any] = {"tolerance": 1e-8, "at": np.linspace(0.0, 6.0, 25), "outcomes": ["last", "evaluations"]}
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(start)) as pool:
-        dataset = small(engine=pool, chunk=11)
-        assert unlike(whole, dataset) == []
-        assert dataset.attrs == whole.attrs
+        for options in ({}, steps | {"dt": None, "steps": None, "transient": None}):
+            whole, dataset = small(**options), small(engine=pool, chunk=11, **options)
+            assert unlike(whole, dataset) == []
+            assert dataset.attrs == whole.attrs
 
 
 def test_a_cluster(whole: Any, client: Any, tmp_path: Path) -> None:
@@ -163,42 +156,6 @@ def test_a_process_that_is_lost_leaves_a_store_that_goes_on(tmp_path: Path) -> N
 # ---- what travels
 
 
-def test_what_happens_in_another_process_is_told_here(client: Any) -> None:
-    def wrong(run: sw.Run) -> Any:
-        return run.y[-1, :1].reshape(1, 1, 1)[0, 0, 0]
-
-    for engine in (client, None):
-        with pytest.raises(
-            ArgumentError, match="outcomes: wrong: expected an array whose last axis has one number for each member of the run, "
-        ):
-            small(engine=engine, outcomes=wrong)
-    with pytest.warns(sw.DivergenceWarning, match=r"1 of 2 members diverged, that at omega = 30"):
-        sw.sweep(sw.Oscillator, {"omega": [1.0, 30.0]}, "rk4", v=0.0, y=1.0, dt=0.2, steps=500, engine=client)
-
-
-def test_equations_that_are_written_in_a_function(client: Any, whole: Any) -> None:
-    """``pickle`` finds equations by name; those of a notebook, a script or a function travel by their text."""
-    gain = 0.5
-
-    @sw.system
-    def local(t: Any, v: Any, y: Any, *, gamma: Any = gain) -> Any:
-        return gamma * np.cos(1.2 * t) - 0.2 * v + gain * 2.0 * y - y**3
-
-    @local.invariant
-    def energy(v: Any, y: Any) -> Any:
-        return 0.5 * v**2 - 0.5 * y**2 + 0.25 * y**4
-
-    with pytest.raises(ArgumentError, match="an own system is pickled by the name of its function"):
-        pickle.dumps(local)
-    datasets = [
-        sw.sweep(
-            local, AXES, "rk4", v=0.0, dt=0.05, steps=100, outcomes=["last", sw.sweeps.Mean("energy")], engine=engine, chunk=5
-        )
-        for engine in (None, client)
-    ]
-    assert unlike(*datasets) == []
-
-
 #: As a user writes it: equations in the script that is started, or in a notebook.
 SCRIPT = """
     import numpy as np, stepwell as sw
@@ -254,45 +211,6 @@ def test_systems_methods_scenes_and_worlds_travel(client: Any) -> None:
         np.testing.assert_array_equal(there, used(what))
 
 
-def test_kernels_are_compiled_once_a_worker() -> None:
-    """A worker unpacks the task once; the machine code of further chunks is that of the first."""
-    if sw.isa() == "interpret" or not sys.platform.startswith("linux"):
-        pytest.skip("everything is interpreted, or this system does not tell of mappings")
-
-    def mapped() -> list[str]:
-        """Executable mappings that are no file."""
-        lines = Path("/proc/self/maps").read_text().splitlines()
-        return [line for line in lines if re.match(r"\S+ ..x. \S+ \S+ 0\s*$", line)]
-
-    arguments = {"v": 0.0, "y": 1.0, "dt": 0.05, "t0": 0.0, "fused": False, "threads": 1}
-    task = Task(partial(duffing, delta=0.123), "rk4", arguments, 0, 2000, 1, None, _outcomes(["last", "extremes"], None), 2.0**26)
-    package = portable.packed(task)
-    before = mapped()
-    kernels = []
-    for k in range(6):
-        chunk = Chunk((k,), (slice(64 * k, 64 * k + 64),), (64,), 64 * k)
-        portable.sweep_chunk(package, {"gamma": np.linspace(0.1, 0.6, 64) + k}, chunk)
-        kernels.append(mapped())
-    # A step is interpreted until compiling it pays, which for one of the two kinds of pieces may be in the second chunk.
-    assert kernels[1] != before
-    assert all(each == kernels[1] for each in kernels[1:])
-    assert portable._task(package) is portable._task(bytes(bytearray(package)))
-
-
-def test_what_cannot_travel_is_told() -> None:
-    lock = multiprocessing.get_context("spawn").Lock()
-
-    def locked(run: sw.Run) -> Any:
-        with lock:
-            return run.y[-1]
-
-    with (
-        ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool,
-        pytest.raises((ArgumentError, RuntimeError), match=r"engine: the system and the outcomes must be pickled|shared"),
-    ):
-        small(engine=pool, outcomes=locked)
-
-
 # ---- xarray and Dask by themselves
 
 
@@ -329,7 +247,88 @@ def test_a_graph_of_dask_delayed(client: Any) -> None:
         np.testing.assert_array_equal(run.y, sw.integrate(duffing(gamma=g), "rk4", v=0.0, y=1.0, dt=0.1, steps=20).y)
 
 
-def test_every_kind_of_outcome_travels() -> None:
-    """What the tests above compare."""
-    assert ends in OUTCOMES
-    assert len(OUTCOMES) >= 10
+# ---- stores of a process that is killed
+
+#: A sweep of some seconds in a process of its own.
+SLOW = """
+    import signal, sys, time
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # what a shell starts in the background ignores Ctrl-C
+    sys.path.insert(0, {tests!r})
+    from functools import partial
+    import stepwell as sw
+    from support import ROOT
+from support.sweeping import chunk_files, duffing, AXES
+
+    def slow(run):
+        time.sleep(0.15)
+        return {{"end": run.y[-1]}}
+
+    dataset = sw.sweep(
+        partial(duffing, delta=0.2), AXES, "rk4", v=0.0, dt=0.05, steps=60, outcomes=["last", slow], chunk=2, threads=2,
+        store={store!r},
+    )
+    print("finished", dataset.attrs["bits"])
+"""
+
+
+def slow_sweep(tmp_path: Path, ending: str) -> tuple[Path, list[str]]:
+    script, store = tmp_path / "slow.py", tmp_path / f"a.{ending}"
+    script.write_text(textwrap.dedent(SLOW.format(tests=str(ROOT / "tests"), store=str(store))))
+    return store, [sys.executable, str(script)]
+
+
+def finished_chunks(store: Path) -> int:
+    """How many chunks have their hash."""
+    at = store if store.exists() else store.with_name(f"{store.name}.unfinished")
+    return len(chunk_files(at, "progress/hashes"))
+
+
+@pytest.mark.parametrize(
+    ("killed", "ending"),
+    [
+        (True, "zarr"),
+        (True, "nc"),
+        pytest.param(False, "zarr", marks=pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")),
+    ],
+)
+def test_after_a_signal_in_the_middle(killed: bool, ending: str, tmp_path: Path) -> None:
+    """Killed again and again at any moment; every finished chunk stays as it is, and the result is that of one sweep."""
+    store, command = slow_sweep(tmp_path, ending)
+    written: dict[Path, int] = {}
+    chunks = 27  # three of two, two and one member for each of nine values
+    for least in (3, 10):
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        until = time.monotonic() + 60
+        while finished_chunks(store) < least and process.poll() is None and time.monotonic() < until:
+            time.sleep(0.01)
+        process.kill() if killed else process.send_signal(signal.SIGINT)
+        out, error = process.communicate(timeout=60)
+        assert "finished" not in out, error
+        if killed:
+            assert process.returncode in (-9, 1)  # the latter on Windows
+        else:
+            assert "KeyboardInterrupt" in error
+        assert least <= finished_chunks(store) < chunks
+        at = store if ending == "zarr" else store.with_name("a.nc.unfinished")
+        for file, when in written.items():
+            assert file.stat().st_mtime_ns == when, "a finished chunk was written again"
+        hashes = chunk_files(at, "progress/hashes")
+        written = {file: file.stat().st_mtime_ns for file in hashes}
+    beside = shutil.copytree(at, tmp_path / "beside.zarr")
+    with stores.opened(beside) as there:
+        done = there.status.values != -1
+        assert 10 <= done.sum() < done.size
+        assert np.isfinite(there.y_last.values[done]).all()
+    done_by = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done_by.returncode == 0, done_by.stderr
+    if ending == "zarr":
+        for file, when in written.items():
+            assert file.stat().st_mtime_ns == when
+    else:
+        assert not at.exists()
+    whole = small(outcomes=["last", lambda run: {"end": run.y[-1]}], steps=60, transient=0)
+    assert done_by.stdout.split() == ["finished", whole.attrs["bits"]]
+    options = {"engine": "zarr", "consolidated": False} if ending == "zarr" else {"engine": "h5netcdf"}
+    with xarray.open_dataset(store, **options) as dataset:
+        np.testing.assert_array_equal(dataset.y_last, whole.y_last)
+        np.testing.assert_array_equal(dataset.end, whole.y_last)
