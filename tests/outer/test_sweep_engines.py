@@ -24,7 +24,7 @@ import stepwell as sw
 import xarray
 from stepwell.studies.sweeps import stores
 from support import ROOT
-from support.sweeping import chunk_files, duffing, small, unlike
+from support.sweeping import AXES, chunk_files, duffing, small, unlike
 
 #: Of Dask and its loops, at their own end.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
@@ -53,10 +53,10 @@ def client(cluster: Any) -> Iterator[Any]:
 @pytest.mark.parametrize("start", ["spawn", "forkserver"])
 def test_processes(start: str) -> None:
     """With fixed steps and with a tolerance."""
-    steps: dict[str, Any] = {"tolerance": 1e-8, "at": np.linspace(0.0, 6.0, 25), "outcomes": ["last", "evaluations"]}
+    paced = partial(sw.sweep, partial(duffing, delta=0.2), AXES, "dop853", v=0.0, tolerance=1e-8, at=np.linspace(0.0, 6.0, 25))
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(start)) as pool:
-        for options in ({}, steps | {"dt": None, "steps": None, "transient": None}):
-            whole, dataset = small(**options), small(engine=pool, chunk=11, **options)
+        for sweep in (small, paced):
+            whole, dataset = sweep(), sweep(engine=pool, chunk=11)
             assert unlike(whole, dataset) == []
             assert dataset.attrs == whole.attrs
 
@@ -256,8 +256,7 @@ SLOW = """
     sys.path.insert(0, {tests!r})
     from functools import partial
     import stepwell as sw
-    from support import ROOT
-from support.sweeping import chunk_files, duffing, AXES
+    from support.sweeping import duffing, AXES
 
     def slow(run):
         time.sleep(0.15)
