@@ -121,13 +121,11 @@ def assert_cheap(brute: Brute, advice: sw.advice.Advice) -> None:
         assert cheaper is None
 
 
-def tried(cases: Mapping[str, Sequence[float]], long: Collection[str] = ()) -> list[Any]:
-    """A scene and a tolerance: by default each scene but the ``long`` once, with one tolerance after the other."""
-    return [
-        pytest.param(name, each, marks=() if i == turn % len(of) and name not in long else pytest.mark.long)
-        for turn, (name, of) in enumerate(cases.items())
-        for i, each in enumerate(of)
-    ]
+def tried(cases: Mapping[str, Sequence[float]], some: Collection[str], *more: Any) -> list[Any]:
+    """A scene and a tolerance: by default each of some scenes once, with one tolerance after the other."""
+    turns = {name: of[i % len(of)] for i, (name, of) in enumerate((name, cases[name]) for name in some)}
+    every = [(name, each, *more) for name, of in cases.items() for each in of]
+    return families.family(every, lambda name, tolerance, *_: turns.get(name) == tolerance)
 
 
 def pendulum(v: float, y: float, horizon: float) -> Scene:
