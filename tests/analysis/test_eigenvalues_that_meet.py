@@ -17,6 +17,7 @@ from stepwell.base.immutable import same
 from support import families
 from support.families import family
 from support.looped import in_turn, looped
+from support.stability_cases import by_hand
 
 #: Implicit ones are stable at every step here, which test_stiff.py shows.
 METHODS = [m.name for m in sw.methods() if not m.is_implicit]
@@ -133,23 +134,6 @@ def test_undamped_oscillators_of_one_frequency_that_drive_each_other(method: str
     assert resonant.radius == pytest.approx(1.0, abs=1e-15)
 
 
-def _matrix(method: str, a: Any, n_v: int) -> Any:
-    """P of a step in fractions, from h·A, without this library."""
-    n = len(a)
-    one = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
-    kick, drift = a.copy(), a.copy()
-    kick[n_v:], drift[:n_v] = Fraction(0), Fraction(0)
-    if method == "false_euler":
-        return (one + drift) @ (one + kick)
-    if method == "damped_euler":
-        return (one + kick) @ (one + drift)
-    first = one + kick
-    dy1 = drift @ first if method == "false_heun" else drift
-    dv2 = kick @ (first + dy1)
-    dy2 = drift @ (one + dv2 + dy1)
-    return one + (kick + dv2) / 2 + (dy1 + dy2) / 2
-
-
 def _damps(p: Any) -> bool:
     """Whether all eigenvalues of a matrix of fractions are inside the unit circle: Schur 1918 and Cohn 1922, without rounding."""
     n, power = len(p), p * 0 + np.array([[Fraction(int(i == j)) for j in range(len(p))] for i in range(len(p))], dtype=object)
@@ -187,7 +171,7 @@ def test_limits_of_methods_that_use_the_newest_value(method: str, a: Any, n_v: i
     assert limit.decided
     exactly = np.array([[Fraction(float(x)) for x in row] for row in a], dtype=object)
     for factor, damps in ((1 + 1e-12, False), (1 - 1e-12, True), (0.97, True), (0.5, True), (0.1, True)):
-        assert _damps(_matrix(method, exactly * Fraction(float(limit) * factor), n_v)) == damps, factor
+        assert _damps(by_hand(method, exactly * Fraction(float(limit) * factor), n_v)) == damps, factor
 
 
 def test_eigenvalues_in_many_digits() -> None:

@@ -110,16 +110,6 @@ def test_a_step_that_is_too_long_is_refused_before_it_is_differentiated() -> Non
         sw.lyapunov(sw.NBody(np.ones(500)), "rk4", v=0.0, y=y, dt=0.1, steps=1)
 
 
-def test_a_member_has_the_same_exponents_alone() -> None:
-    """To the bit: members do not mix."""
-    omega, y = np.array([1.0, 1.5, 2.0]), np.array([1.0, 2.0, 3.0])
-    company = sw.lyapunov(sw.Pendulum(omega, 0.1), "rk4", v=0.1, y=y, dt=0.1, steps=50, exponents="all")
-    for k in range(3):
-        alone = sw.lyapunov(sw.Pendulum(omega[k], 0.1), "rk4", v=0.1, y=y[k], dt=0.1, steps=50, exponents="all")
-        np.testing.assert_array_equal(alone.exponents, company.exponents[:, k])
-        np.testing.assert_array_equal(alone.history, company.history[..., k])
-
-
 def test_damping_is_the_sum() -> None:
     """Volumes shrink by −2Dω₀ per unit of time. RK4 misses ln det by O(dt⁴): halving the step divides what is left by 16."""
     misses = []

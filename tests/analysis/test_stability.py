@@ -10,47 +10,24 @@ import pytest
 import stepwell as sw
 from stepwell.analysis.stability import KINDS, operations
 from support.looped import looped
-from support.stability_cases import DEAR, EPS, METHODS, OF_EACH_STRUCTURE, QUICK, known
+from support.stability_cases import DEAR, EPS, METHODS, OF_EACH_STRUCTURE, QUICK
 from support.truths import CLOSED_FORMS
 
-#: FACTS of the undamped oscillator: q = r₁², p, limit.
-Q: dict[str, Any] = {
-    "standard_euler": lambda f: 1 + f**2,
-    "damped_euler": lambda f: 1.0 + 0 * f,
-    "false_euler": lambda f: 1.0 + 0 * f,
-    "verlet": lambda f: 1.0 + 0 * f,
-    "leapfrog": lambda f: 1.0 + 0 * f,
-    "standard_heun": lambda f: 1 + f**4 / 4,
-    "false_heun": lambda f: 1 - f**2 / 2,
-    "semi_false_heun": lambda f: 1 - f**4 / 4,
-    "rk4": lambda f: 1 - f**6 / 72 + f**8 / 576,
-    # |1 + z + … |² of the polynomials of truths, z = iΦ, multiplied out.
-    "merson": lambda f: 1 - f**8 / 1728 + f**10 / 20736,
-    "fehlberg": lambda f: 1 + 5 * f**6 / 936 - 11 * f**8 / 7488 + f**10 / 10816,
-    "fehlberg_5": lambda f: 1 + 17 * f**6 / 9360 - 7 * f**8 / 12480 + 11 * f**10 / 374400 + f**12 / 4326400,
-    "dop853": lambda f: np.array([(CLOSED_FORMS["dop853"](x)[0] ** 2).sum() for x in f]),
-    "pefrl": lambda f: 1.0 + 0 * f,
-}
-P: dict[str, Any] = {
-    "standard_euler": lambda f: 1 + 0 * f,
-    "false_heun": lambda f: 1 - 3 * f**2 / 4 + f**4 / 4,
-    "rk4": lambda f: 1 - f**2 / 2 + f**4 / 24,
-    "merson": lambda f: 1 - f**2 / 2 + f**4 / 24,
-    "fehlberg": lambda f: 1 - f**2 / 2 + f**4 / 24,
-    "fehlberg_5": lambda f: 1 - f**2 / 2 + f**4 / 24 - f**6 / 2080,
-    "dop853": lambda f: np.array([CLOSED_FORMS["dop853"](x)[0, 0] for x in f]),
-    "pefrl": lambda f: np.array([CLOSED_FORMS["pefrl"](x).trace() / 2 for x in f]),
-}
+
+def closed(method: str, phi: Any) -> tuple[Any, Any]:
+    """p and q of the closed form: half the trace of a step, and its determinant."""
+    steps = np.array([CLOSED_FORMS[method](x) for x in phi])
+    return np.trace(steps, axis1=1, axis2=2) / 2, steps[:, 0, 0] * steps[:, 1, 1] - steps[:, 0, 1] * steps[:, 1, 0]
 
 
 # ---- analyse
 
 
-@known
+@looped("method", CLOSED_FORMS)
 def test_p_q_and_eigenvalues(method: str) -> None:
     phi = np.linspace(0.05, 3.0, 60)
     a = sw.analyse(sw.Oscillator(), method, dt=phi)
-    q, p = Q[method](phi), P.get(method, lambda f: 1 - f**2 / 2)(phi)
+    p, q = closed(method, phi)
     # Elements of P up to Φ⁴/2 = 40, each of some roundings; p and q are sums and products of them.
     np.testing.assert_allclose(a.p, p, rtol=0, atol=200 * EPS)
     np.testing.assert_allclose(a.q, q, rtol=0, atol=200 * 40 * EPS)
@@ -208,9 +185,10 @@ def test_growth_over_thousands_of_steps(method: str) -> None:
     """
     phi = np.array([0.01, 0.1, 0.3, 1.0])
     a = sw.analyse(sw.Oscillator(phi), method, dt=1.0)
-    np.testing.assert_allclose(a.radius**2, Q[method](phi), rtol=0, atol=20 * EPS)
+    _, q = closed(method, phi)
+    np.testing.assert_allclose(a.radius**2, q, rtol=0, atol=20 * EPS)
     run = sw.integrate(sw.Oscillator(phi), method, v=0.0, y=1.0, dt=1.0, steps=1000)
-    np.testing.assert_allclose(np.log(2 * run.energy[-1]), 1000 * np.log(Q[method](phi)), rtol=0, atol=1000 * 40 * EPS)
+    np.testing.assert_allclose(np.log(2 * run.energy[-1]), 1000 * np.log(q), rtol=0, atol=1000 * 40 * EPS)
     assert ((a.radius > 1) == (method in ("standard_euler", "standard_heun", "fehlberg", "fehlberg_5")))[1:].all()
 
 
@@ -224,26 +202,6 @@ def test_derivative_of_the_reference_is_the_matrix_of_the_core(method: str) -> N
     derived = sw.analyse(chain, method, dt=0.3, at=(at[0], at[1]))
     np.testing.assert_allclose(derived.P, exact.P, rtol=0, atol=30 * EPS)
     np.testing.assert_allclose(np.abs(derived.rates), np.abs(exact.rates), rtol=0, atol=1e-12)
-
-
-@looped("method", [*QUICK, "rosenbrock23"], long=[m for m in DEAR if m != "rosenbrock23"])
-def test_derivative_of_a_step_that_is_not_linear(method: str) -> None:
-    """Against differences of steps, whose error is the square of the difference times the third derivative: ≲ 1e-9 here."""
-    scene = sw.scenes.clover()
-    a = sw.analyse(scene.system, method, dt=0.1, at=(scene.v, scene.y))
-    steps = sw.method(method).steps
-    s = scene.system.scaled(0.1, ())
-    slot = steps.start(s, 0, 0.0, scene.v, scene.y) if sw.method(method).carry else scene.v
-    flat = np.concatenate([slot.ravel(), scene.y.ravel()])
-    d = 1e-5
-    for j in range(12):
-        ends = []
-        for sign in (1, -1):
-            moved = flat.copy()
-            moved[j] += sign * d
-            v, y = steps.step(s, 0.0, 0.1, moved[:6].reshape(3, 2), moved[6:].reshape(3, 2))
-            ends.append(np.concatenate([v.ravel(), y.ravel()]))
-        np.testing.assert_allclose(a.P[:, j], (ends[0] - ends[1]) / (2 * d), rtol=0, atol=1e-8)
 
 
 @looped("force", ["logarithmic", "newton", "printed"])

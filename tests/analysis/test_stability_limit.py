@@ -106,47 +106,6 @@ def test_limits_of_chains_with_soft_and_stiff_springs(seed: int, method: str) ->
     assert limit == pytest.approx(sw.method(method).limit / fastest, rel=1e-12)
 
 
-@looped("method", ["false_euler"], long=["verlet", "pefrl", "rk4"])
-def test_limits_of_a_long_chain(method: str) -> None:
-    n = 40
-    fastest = 2 * math.sin(n * math.pi / (2 * (n + 1)))
-    assert sw.stability_limit(sw.Chain(n), method) == pytest.approx(LIMITS[method] / fastest, rel=1e-13)
-
-
-def _independent(method: str, damping: float) -> float:
-    """The limit of v̇ = −2Dv − y, ẏ = v by Jury's conditions, from p and q written by hand, by bisection."""
-    d = damping
-
-    def stable(f: float) -> bool:
-        a = np.array([[-2 * d, -1.0], [1.0, 0.0]]) * f
-        one = np.eye(2)
-        kick, drift = np.array([[1 - 2 * d * f, -f], [0, 1]]), np.array([[1, 0], [f, 1]])
-        matrix = {
-            "standard_euler": one + a,
-            "standard_heun": one + a + a @ a / 2,
-            "rk4": one + a + a @ a / 2 + a @ a @ a / 6 + a @ a @ a @ a / 24,
-            "false_euler": drift @ kick,
-            "damped_euler": kick @ drift,
-        }[method]
-        trace, det = matrix.trace(), np.linalg.det(matrix)
-        return bool(abs(trace) <= 1 + det and det <= 1)
-
-    ladder = np.arange(1e-4, 5.0, 1e-3)
-    high = next(f for f in ladder if not stable(f))
-    low = high - 1e-3
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if stable(middle) else (low, middle)
-    return low
-
-
-@looped("method", ["standard_euler", "standard_heun", "rk4", "false_euler", "damped_euler"])
-@looped("damping", [0.05, 0.3, 0.7, 1.7])
-def test_limits_of_the_damped_oscillator(method: str, damping: float) -> None:
-    # The independent value loses digits where q crosses 1 at a small angle: an eps of the determinant over the slope.
-    assert sw.stability_limit(sw.Oscillator(1.0, damping), method) == pytest.approx(_independent(method, damping), rel=1e-12)
-
-
 @looped(
     "method, limit",
     [

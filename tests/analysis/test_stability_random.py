@@ -11,48 +11,12 @@ import pytest
 import stepwell as sw
 from stepwell.analysis.stability import maps, operations, series
 from support.looped import in_turn
-from support.truths import DOP853_TAIL
+from support.stability_cases import TAYLOR, by_hand
 
 SECOND_ORDER = [m.name for m in sw.methods() if m.needs_acceleration]
 
-#: R(z) = 1 + z + … of the methods that treat both blocks alike.
-TAYLOR = {
-    "standard_euler": (1, 1),
-    "standard_heun": (1, 1, 1 / 2),
-    "rk4": (1, 1, 1 / 2, 1 / 6, 1 / 24),
-    "merson": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 144),
-    "fehlberg": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 104),
-    "fehlberg_5": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 2080),
-    "dop853": (*(1 / math.factorial(k) for k in range(9)), *map(float, DOP853_TAIL)),
-}
-
 #: Those whose P is written by hand here.
 METHODS = [*TAYLOR, "false_euler", "damped_euler", "false_heun", "semi_false_heun"]
-
-
-def by_hand(method: str, a: Any, n_v: int) -> Any:
-    """P of a step, from h·A in the order (v, y), without this library: each stage is a matrix that acts on the start.
-
-    Or of many steps, from their h·A along the axes before the last two.
-    """
-    one = np.eye(a.shape[-1])
-    kick, drift = a.copy(), a.copy()
-    kick[..., n_v:, :] = 0.0  # what changes v
-    drift[..., :n_v, :] = 0.0  # what changes y
-    if method in TAYLOR:
-        return sum(c * np.linalg.matrix_power(a, k) for k, c in enumerate(TAYLOR[method]))
-    if method == "false_euler":
-        return (one + drift) @ (one + kick)
-    if method == "damped_euler":
-        return (one + kick) @ (one + drift)
-    dv1 = kick
-    first = one + dv1
-    dy1 = drift @ first if method == "false_heun" else drift
-    predicted = first + dy1  # (v1, y1)
-    dv2 = kick @ predicted
-    newer = one + dv2 + dy1  # (v + dv2, y1)
-    dy2 = drift @ newer
-    return one + 0.5 * (dv1 + dv2) + 0.5 * (dy1 + dy2)
 
 
 def random_system(seed: int) -> tuple[Any, Any, list[int]]:

@@ -237,11 +237,7 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: sw.TransferFunction(np.ones((1, 2)), np.ones((2, 3))), ShapeError, "do not broadcast to one: num (2,), den (3,)"),
     (lambda: sw.LinearSystem.of(signal.dlti([1.0], [1.0, 0.5], dt=0.1)), UnsupportedError, "dt = 0.1, which is sampled already"),
     (lambda: sw.LinearSystem.of(SimpleNamespace(num=[[[1.0]]], den=[[[1.0]]], dt=True)), UnsupportedError, "sampled already"),
-    (
-        lambda: sw.LinearSystem.of(signal.ZerosPolesGain([], [-1.0 + 1j], 1.0)),
-        ArgumentError,
-        "poles: expected real numbers",
-    ),
+    (lambda: sw.LinearSystem.of(signal.ZerosPolesGain([], [-1.0 + 1j], 1.0)), ArgumentError, "poles: expected real numbers"),
     (lambda: sw.LinearSystem.of([1.0]), DTypeError, "system: expected a linear system of stepwell, or an object of SciPy"),
     (lambda: sw.LinearSystem.of(sw.Pendulum()), UnsupportedError, "system: expected a linear one"),
     (

@@ -329,23 +329,8 @@ def assert_listing_of_a_transition_matrix(name: str, method: sw.Method) -> None:
         assert "its products of matrices are made by a loop" in str(explained)
         return
     plan = engine.Plan(system, method, (MEMBERS,), H, t0=T, form="matrix")
-    inputs = system.given_inputs()
-    p, q = linear.transition(plan), linear.pulses(plan, inputs)
-    names, tables = naming.parameters(plan)
-    tracer = Tracer(system, _core.Tape())
-    tracer.symbols([each.signal() for each in inputs.values()], (MEMBERS,))
-    numbers = [*p.reshape(-1, MEMBERS), *q.reshape(-1, MEMBERS), *tracer.numbers]
-    known = dict(zip(names, numbers, strict=True)) | {"h": H, "t": T}
-    samples = {}
-    for name_of, table in zip(tables, tracer.tables, strict=True):
-        values = np.asarray(table.values)
-        known |= {f"{name_of}.start": table.start, f"{name_of}.interval": table.interval, f"{name_of}.last": len(values) - 1.0}
-        samples[name_of] = values
-    wide = [np.broadcast_to(each.reshape(len(each), -1), (len(each), MEMBERS)) for each in samples.values()]
-    every = np.concatenate(wide) if wide else np.zeros((0, MEMBERS))
-    ends = np.cumsum([0, *(len(each) for each in wide)])
-    known |= {f"{name_of}.first": float(first) for name_of, first in zip(tables, ends, strict=False)}
-    known |= {"lanes": 1.0, "sample": lambda at: every[np.broadcast_to(at, MEMBERS).astype(int), np.arange(MEMBERS)]}
+    p, q = linear.transition(plan), linear.pulses(plan, system.given_inputs())
+    known, samples = leaves(plan, [*p.reshape(-1, MEMBERS), *q.reshape(-1, MEMBERS)])
     rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS)]
     known |= dict(zip(naming.states(plan, False), rows, strict=True))
     after = state(explained, plan, evaluate(explained, known, samples))

@@ -74,10 +74,7 @@ FRAMES = dict.fromkeys(QUICK, (1e-2, 1e-4)) | {"chain": (1e-2,), "figure_eight":
 @pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize(
     ("name", "tolerance", "frames"),
-    [
-        *tried(CASES, ("pendulum", "kepler", "symmetric_top"), None),
-        *tried(FRAMES, ("clover",), 160),
-    ],
+    [*tried(CASES, ("pendulum", "kepler", "symmetric_top"), None), *tried(FRAMES, ("clover",), 160)],
 )
 def test_the_advice_is_true_and_near_the_cheapest(name: str, tolerance: float, frames: int | None) -> None:
     """Of any steps, and of steps within frames."""

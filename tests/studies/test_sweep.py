@@ -103,13 +103,6 @@ def test_a_step_as_an_axis(method: str, dtype: Any) -> None:
         np.testing.assert_array_equal(dataset.t[i], run.t[[7, 23, 39, 47]])
 
 
-def test_a_step_that_varies_with_a_parameter() -> None:
-    axes = {"omega": ("run", [1.0, 2.0]), "dt": ("run", [0.1, 0.05])}
-    dataset = sw.sweep(Oscillator, axes, "rk4", v=0.0, y=1.0, steps=30)
-    for i, (omega, h) in enumerate([(1.0, 0.1), (2.0, 0.05)]):
-        assert float(dataset.y_last[i]) == float(sw.integrate(Oscillator(omega), "rk4", v=0.0, y=1.0, dt=h, steps=30).y[-1])
-
-
 def test_a_force_as_an_axis() -> None:
     force = np.array([0.0, 0.5, 1.0])
     dataset = sw.sweep(sw.Pendulum(), {"force": ("push", force)}, "rk4", v=0.0, y=1.0, dt=0.1, steps=30, chunk=2)

@@ -35,12 +35,6 @@ def test_the_step_alone_is_varied(system: sw.System, v: Any, y: Any) -> None:
                 np.testing.assert_array_equal(values[0, i] if len(dataset["status"].dims) == 2 else values[i], block)
 
 
-def test_systems_made_of_parameters_and_the_step_alone() -> None:
-    dataset = sw.sweep(sw.Oscillator, {"dt": STEPS}, "rk4", v=0.0, y=1.0, steps=10, every=2)
-    assert dataset["y"].dims == ("dt", "saved")
-    assert dataset["status"].shape == (3,)
-
-
 def test_means_are_summed_state_after_state_whatever_the_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """And many states in one go: state by state took 50 times as long as the run of a member with a step of its own."""
     omega = np.linspace(0.5, 2.0, 3)

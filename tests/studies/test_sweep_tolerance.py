@@ -297,10 +297,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "a start": ({"start": "first_order"}, "start: works with fixed steps only"),
     "steps as an axis": ({"axes": {"dt": [0.1, 0.2]}}, "axes: dt: with a tolerance, dt is the step to try first"),
     "no times": ({"at": None}, "at: tolerance= needs the times at which to save states, too, such as at="),
-    "times alone": (
-        {"tolerance": None},
-        "tolerance: at= needs the error that a step may have, too, such as tolerance=1e-6",
-    ),
+    "times alone": ({"tolerance": None}, "tolerance: at= needs the error that a step may have, too, such as tolerance=1e-6"),
     "an axis without times": ({"tolerance": None, "at": None, "axes": {"tolerance": [1e-6, 1e-9]}}, "at: tolerance= needs"),
     "a list": ({"tolerance": [1e-6, 1e-9]}, "tolerance: expected a number, or a pair (relative, absolute), the same for all"),
     "three": ({"tolerance": (1e-6, 1e-9, 1.0)}, "tolerance: expected a number, or a pair (relative, absolute), the same for all"),
@@ -360,24 +357,3 @@ def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
             sw.Pendulum(omega[i]), "dop853", v=0.0, y=1.0, tolerance=tolerance[k], at=at, transient=4, exponents="all"
         )
         np.testing.assert_array_equal(dataset.lyapunov[i, k], truth.exponents)
-
-
-def test_a_history_needs_no_interval() -> None:
-    assert sw.sweep(**GOOD, outcomes="history").y.dims == ("omega", "t")
-
-
-def test_memory_is_bounded() -> None:
-    """The states at all times would be 32 MB."""
-    import tracemalloc
-
-    members, memory = 500, 2 * 2**20
-    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6, "outcomes": ["extremes", "mean"], "threads": 1}
-    axes, at = {"omega": np.linspace(0.5, 2.0, members)}, np.linspace(0.0, 20.0, 4000)
-    sw.sweep(sw.Oscillator, axes, "dop853", at=at[:2], **arguments)  # imports
-    tracemalloc.start()
-    try:
-        sw.sweep(sw.Oscillator, axes, "dop853", at=at, memory=memory, **arguments)
-        # Results are 8 numbers a member, axes, times and coordinates a few more; some hundred kilobytes are Python's own.
-        assert tracemalloc.get_traced_memory()[1] < memory + 8 * 30 * (members + at.size) + 2**19
-    finally:
-        tracemalloc.stop()

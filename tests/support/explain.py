@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -129,19 +130,25 @@ def evaluate(explained: sw.Explanation, known: dict[str, Any], tables: dict[str,
     return out
 
 
-def leaves(plan: engine.Plan) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What stands behind the names of parameters, and samples by the name of their table; a row of each for every member."""
+def leaves(plan: engine.Plan, before: Sequence[Any] = ()) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What stands behind the names of parameters, and samples by the name of their table; a row of each for every member.
+
+    Before the parameters of inputs there are those of a step, or, of a transition matrix, its elements.
+    """
     names, tables = naming.parameters(plan)
     tracer = Tracer(plan.system, _core.Tape())
-    tracer.scaled(H)
-    known = dict(zip(names, tracer.numbers, strict=True)) | {"h": H, "t": T}
-    samples, before = {}, 0
+    if before:
+        tracer.symbols([each.signal() for each in plan.system.given_inputs().values()], (MEMBERS,))
+    else:
+        tracer.scaled(H)
+    known = dict(zip(names, [*before, *tracer.numbers], strict=True)) | {"h": H, "t": T}
+    samples, first = {}, 0
     for name, table in zip(tables, tracer.tables, strict=True):
         values = np.asarray(table.values)
         known |= {f"{name}.start": table.start, f"{name}.interval": table.interval, f"{name}.last": len(values) - 1.0}
-        known |= {f"{name}.first": float(before)}
+        known |= {f"{name}.first": float(first)}
         samples[name] = values
-        before += len(values)
+        first += len(values)
     wide = [np.broadcast_to(each.reshape(len(each), -1), (len(each), MEMBERS)) for each in samples.values()]
     every = np.concatenate(wide) if wide else np.zeros((0, MEMBERS))
     known |= {"lanes": 1.0, "sample": lambda at: every[np.broadcast_to(at, MEMBERS).astype(int), np.arange(MEMBERS)]}

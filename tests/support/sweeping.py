@@ -46,10 +46,7 @@ def ends(run: sw.Run) -> dict[str, Any]:
     return {"twice": 2.0 * run.y[-1], "both": ("block", np.stack([run.v[-1], run.y[-1]]))}
 
 
-AXES = {
-    "gamma": ("gamma", np.linspace(0.1, 0.6, 9)),
-    "y": ("y0", np.linspace(-1.0, 1.0, 5)),
-}
+AXES = {"gamma": ("gamma", np.linspace(0.1, 0.6, 9)), "y": ("y0", np.linspace(-1.0, 1.0, 5))}
 #: Every kind of outcome.
 OUTCOMES = (
     "last",
