@@ -25,6 +25,7 @@ from hypothesis import strategies as st
 from stepwell.base import files
 from stepwell.studies.sweeps import stores
 from support import ROOT
+from support.for_each import for_each
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="forks, limits and memory as Linux has them")
 timer = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there is no timer here")
@@ -69,7 +70,7 @@ def test_fuzzed_calls_work_or_say_what_is_wrong(example: fuzz.Example, data: Any
 
 @timer
 @pytest.mark.usefixtures("_quiet")
-@pytest.mark.parametrize("case", CORPUS, ids=lambda case: case["about"])
+@for_each("case", CORPUS)
 def test_what_was_found_stays_mended(case: dict[str, Any]) -> None:
     """Each of these calls once ended otherwise."""
     outcome = fuzz.once(case["call"])

@@ -15,6 +15,7 @@ from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.studies.sweeps import ensemble
 from support.devices import NAMES, assert_alike, needs_device
 from support.families import family
+from support.for_each import for_each
 from support.sweeping import driven, swinging
 
 pytest.importorskip("xarray")
@@ -290,14 +291,10 @@ STATES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-def test_states_that_come_back_are_those_of_the_cpu() -> None:
-    for case, (method, options) in STATES.items():
-        results = both(swinging if method == "leapfrog" else driven, MU, method, dt=0.02, v=0.3, **options)
-        try:
-            assert_alike(*results)
-        except AssertionError as error:
-            error.add_note(case)
-            raise
+@for_each("case", STATES)
+def test_states_that_come_back_are_those_of_the_cpu(case: str) -> None:
+    method, options = STATES[case]
+    assert_alike(*both(swinging if method == "leapfrog" else driven, MU, method, dt=0.02, v=0.3, **options))
 
 
 def test_the_variable_names_the_device(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,6 +17,7 @@ from stepwell.device import world as on_device
 from stepwell.errors import ArgumentError, BusyError, UnsupportedError
 from support.devices import needs_device, velocity_verlet
 from support.families import family
+from support.for_each import for_each
 from support.own_methods import adams_bashforth_2
 
 pytestmark = needs_device
@@ -181,20 +182,15 @@ KINDS: dict[str, tuple[Callable[[], dict[str, Any]], Moves]] = {
 }
 
 
-def test_kinds_of_worlds() -> None:
-    for kind, (ask, moves) in KINDS.items():
+@for_each("kind", KINDS)
+def test_kinds_of_worlds(kind: str) -> None:
+    def make(device: str) -> sw.World:
+        options = {"method": "rk4", "dt": 0.05} | KINDS[kind][0]()
+        v, y = start(y=options.pop("y", None))
+        blocks = {"v": options.pop("v", v), "y": y}
+        return sw.World(options.pop("system"), options.pop("method"), **blocks, **options, device=device)
 
-        def make(device: str, ask: Any = ask) -> sw.World:
-            options = {"method": "rk4", "dt": 0.05} | ask()
-            v, y = start(y=options.pop("y", None))
-            blocks = {"v": options.pop("v", v), "y": y}
-            return sw.World(options.pop("system"), options.pop("method"), **blocks, **options, device=device)
-
-        try:
-            both(make, moves)
-        except AssertionError as error:
-            error.add_note(kind)
-            raise
+    both(make, KINDS[kind][1])
 
 
 def test_of_one_member_and_of_several_axes() -> None:

@@ -17,6 +17,7 @@ from stepwell.scenes.builtin.plummer import _drawn
 from stepwell.scenes.taylor import Orbit, TurningOrbit
 from stepwell.scenes.truth import with_truth
 from support import families
+from support.for_each import for_each
 
 SCENES = sw.scenes.scenes()
 
@@ -317,9 +318,7 @@ def test_what_the_reference_does_not_know_is_nan():
         assert np.isnan(error).tolist() == [False, False, False, True]
 
 
-@pytest.mark.parametrize(
-    ("amplitude", "period"), [(10.0, 6.2951685236990721787), (90.0, 7.4162987092054876737), (170.0, 15.326967999136584745)]
-)
+@for_each("amplitude, period", [(10.0, 6.2951685236990721787), (90.0, 7.4162987092054876737), (170.0, 15.326967999136584745)])
 def test_the_pendulum_has_the_periods_of_the_facts(amplitude, period):
     scene = sw.scenes.pendulum(amplitude)
     assert scene.period == pytest.approx(period, rel=4e-16)

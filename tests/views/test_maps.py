@@ -16,6 +16,7 @@ from stepwell.views.charts.maps import ROUNDING
 from support import families
 from support.charted import read
 from support.families import family
+from support.for_each import for_each
 from support.looks import faults
 from support.truths import CLOSED_FORMS
 
@@ -178,7 +179,7 @@ def test_every_point_does_what_its_eigenvalues_say(method):
     assert dataclasses.replace(chart, phi=1.02 * chart.phi).observe(2000).disagreements > 10
 
 
-@pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
+@for_each("method", METHODS)
 def test_every_undamped_point_does_what_its_eigenvalues_say(method):
     """So many angles at D = 0, where the stable ones of the symplectic methods are on the circle itself."""
     chart = sw.charts.stability_map(method, damping=None, size=(10_000, 1))

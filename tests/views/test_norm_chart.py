@@ -12,11 +12,12 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.views.charts import norm
 from support.charted import read
+from support.for_each import for_each
 
 GAINS = (0.05, 0.3, 0.9)
 
 
-@pytest.mark.parametrize("phi", [0.05, 0.3])
+@for_each("phi", [0.05, 0.3])
 def test_standard_euler_by_its_formulas(phi: float) -> None:
     """Resetting turns by atan Φ, control by asin Φ at a norm of 1 + (1 − √(1 − Φ²))/(hk); alone the norm grows by Φ²."""
     line = norm(["standard_euler"], phi=phi, gains=GAINS).lines[0]

@@ -14,6 +14,7 @@ from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.views.charts import powers
 from stepwell.views.charts.powers import FORMS
 from support.charted import read
+from support.for_each import for_each
 from support.truths import CLOSED_FORMS
 
 
@@ -29,7 +30,7 @@ def of_tableau(steps: Any, phi: Fraction) -> Any:
     return np.array([[real, -imaginary], [imaginary, real]], dtype=object)
 
 
-@pytest.mark.parametrize("method", sorted(CLOSED_FORMS))
+@for_each("method", sorted(CLOSED_FORMS))
 def test_errors_are_those_of_exact_arithmetic(method: str) -> None:
     """The closed form of P in fractions, applied seven times by hand."""
     chart = powers(method, v=0.25, y=1.0, dt=0.5, steps=[1, 7])
