@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,18 +14,24 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, NotFiniteError, ShapeError, UnknownNameError, UnsupportedError
 from stepwell.model import setting
 from stepwell.runs.continuation import bits_of_parameters
+from support import families
 from support import own_systems as own
-from support.cases import SOME, SYSTEMS, Case, drawn, fits
+from support.cases import SYSTEMS, Case, drawn, fits, number
+from support.families import family
+from support.ways import kernels
 
-LEVELS = ["", "interpret", "avx2"]
 
-
-def able(name: str, some: int | None) -> list[sw.Method]:
-    """Methods that can step a system; among them one with a carry, if there is one."""
+def able(name: str, most: int = 1) -> list[sw.Method]:
+    """Methods that can step a system; among them one with a carry, if there is one. In the long run all."""
     system = SYSTEMS[name](np.random.default_rng(0), 1)
     every = [method for method in sw.methods() if fits(system, method) and not method.has_series]
     carries = [method for method in every if method.carry is not None and system.keeper is None]
-    return [*drawn(every, some, "parameters", name), *drawn(carries, 1, name)]
+    return every if families.LONG else [*drawn(every, most, "parameters", name), *drawn(carries, 1, name)]
+
+
+#: By default a third of the systems in each test, others in each.
+def some_systems(salt: str) -> Any:
+    return pytest.mark.parametrize("name", family(SYSTEMS, lambda name: not families.LONG and number(name, salt) % 3 == 0))
 
 
 def started(name: str, method: str, members: int, **options: Any) -> tuple[sw.World, sw.System]:
@@ -54,10 +62,9 @@ def assert_goes_on(world: sw.World, other: sw.World, steps: int = 4) -> None:
         np.testing.assert_array_equal(world.y, other.y)
 
 
-@SOME
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_set_is_a_new_world_that_goes_on(name: str, some: int | None) -> None:
-    for method in able(name, some):
+@some_systems("set")
+def test_set_is_a_new_world_that_goes_on(name: str) -> None:
+    for method in able(name):
         for members in (1, 5):
             world, system = started(name, method.name, members)
             values = numbers_of(system)
@@ -70,14 +77,12 @@ def test_set_is_a_new_world_that_goes_on(name: str, some: int | None) -> None:
             assert_goes_on(world, fresh)
 
 
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_arrays_are_a_new_world_that_goes_on(name: str, level: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every parameter that reaches the step as it is, by every level of kernels, in batches of several shares."""
-    if level:
-        monkeypatch.setenv("STEPWELL_KERNELS", level)
-    for method in able(name, 1):
-        for members in (1, 5, 70):
+@some_systems("arrays")
+def test_arrays_are_a_new_world_that_goes_on(name: str) -> None:
+    """Every parameter that reaches the step as it is, in batches of several shares, by each level of kernels in turn."""
+    for i, members in enumerate((1, 5, 70)):
+        method, levels = able(name)[-1], sw.isa_levels()
+        with kernels(levels[(number(name) + i) % len(levels)]):
             world, system = started(name, method.name, members)
             into = setting.direct(system, (members,))
             for place in list(world.parameters):
@@ -85,23 +90,20 @@ def test_arrays_are_a_new_world_that_goes_on(name: str, level: str, monkeypatch:
                 array[...] = into[place].numbers if place in into and array.shape == into[place].numbers.shape else 0.7 * array
                 expected = setting.with_parameters(world._system, {place: array.copy()})
                 assert_same_numbers(world.system, expected, members)
-                fresh = sw.World(expected, method, resume=world)
-                assert_goes_on(world, fresh, 2)
+                assert_goes_on(world, sw.World(expected, method, resume=world), 2)
 
 
 @pytest.mark.parametrize("name", ["free", "pendulum, damped", "three bodies, newton", "own: Duffing", "chain of nineteen"])
 def test_float32_and_fused(name: str) -> None:
     for options in ({"dtype": "float32"}, {"fused": True}):
-        for method in ("false_euler", "rk4"):
-            world, system = started(name, method, 5, **options)
-            values = numbers_of(system)
-            fresh = sw.World(setting.with_parameters(world.system, values), method, resume=world)
-            world.set(**values)
-            assert_goes_on(world, fresh)
-            for place in world.parameters:
-                world.parameters[place][...] *= 0.9
-            fresh = sw.World(world.system, method, resume=world)
-            assert_goes_on(world, fresh)
+        world, system = started(name, "rk4", 5, **options)
+        values = numbers_of(system)
+        fresh = sw.World(setting.with_parameters(world.system, values), "rk4", resume=world)
+        world.set(**values)
+        assert_goes_on(world, fresh)
+        for place in world.parameters:
+            world.parameters[place][...] *= 0.9
+        assert_goes_on(world, sw.World(world.system, "rk4", resume=world))
 
 
 def large(members: int) -> dict[str, sw.System]:
@@ -203,13 +205,12 @@ def test_constraints() -> None:
 # ---- members
 
 
-@SOME
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_members_that_are_reset(name: str, some: int | None) -> None:
+@some_systems("reset")
+def test_members_that_are_reset(name: str) -> None:
     """These have the bits of a fresh world of theirs, all others go on as if nothing had happened."""
     rng = np.random.default_rng(5)
     members, chosen = 7, [5, 1, 2]
-    for method in able(name, some):
+    for method in able(name):
         world, _ = started(name, method.name, members)
         before = copy.copy(world)
         values = {}
@@ -283,10 +284,10 @@ def test_an_array_for_each_member() -> None:
     world.set(omega=[1.0, 2.0, 3.0])
     assert world.parameters["omega"].shape == (3,)
     wide = world.parameters["omega"]
-    for number in (2.0, np.array(3.0), [4.0]):  # the array stays as wide as it is
-        world.set(omega=number)
+    for value in (2.0, np.array(3.0), [4.0]):  # the array stays as wide as it is
+        world.set(omega=value)
         assert world.parameters["omega"] is wide
-        np.testing.assert_array_equal(wide, np.full(3, np.max(number)))
+        np.testing.assert_array_equal(wide, np.full(3, np.max(value)))
         np.testing.assert_array_equal(world.system.omega, wide)
     with pytest.raises(ValueError, match="read-only"):
         omega[...] = 2.0
@@ -335,16 +336,16 @@ def test_events_see_the_parameters() -> None:
         assert len(world.events["zero"].t)
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@some_systems("refuses")
 def test_what_the_core_refuses_is_what_the_system_refuses(name: str) -> None:
     """The bounds of numbers that are written are those of the arguments."""
-    world, _ = started(name, able(name, 1)[0].name, 1)
+    world, _ = started(name, able(name)[0].name, 1)
     for place in list(world.parameters):
         array = world.parameters[place]
         good = array.copy()
-        for number in (-1.0, 0.0, 1e-9, np.nan, np.inf):
+        for wrong in (-1.0, 0.0, 1e-9, np.nan, np.inf):
             array[...] = good
-            array.reshape(-1)[0] = number
+            array.reshape(-1)[0] = wrong
             try:
                 setting.with_parameters(world._system, {place: array.copy()})
             except ArgumentError:
@@ -375,25 +376,25 @@ def test_refusals() -> None:
             world.reset(0, **values)
         assert world.system == before
     bodies = sw.World(sw.NBody(), "false_euler", v=np.ones((3, 2)), y=np.arange(6.0).reshape(3, 2), dt=0.01)
-    with pytest.raises(UnsupportedError, match=r"force: it selects the operations"):
-        bodies.set(force="newton")
-    with pytest.raises(UnsupportedError, match=r"other numbers are computed from it; use world.set\(G=…\)"):
-        _ = bodies.parameters["G"]
-    with pytest.raises(UnsupportedError, match="masses: expected numbers, inputs and surfaces of the kinds and sizes"):
-        bodies.set(masses=[1.0, 1.0])
-    with pytest.raises(ArgumentError, match="members: expected a world with a batch"):
-        bodies.reset(0, y=0.0)
-    with pytest.raises(ArgumentError, match="got none"):
-        world.reset(0)
-    with pytest.raises(ArgumentError, match="members: expected an index"):
-        world.reset(2, y=0.0)
-    with pytest.raises(ArgumentError, match="each member once"):
-        world.reset([0, 0], y=0.0)
-    with pytest.raises(ShapeError, match=r"y: expected shape \(\) or \(2,\), got \(3,\)"):
-        world.reset([0, 1], y=[1.0, 2.0, 3.0])
     linear = sw.World(sw.LinearSystem([[0.0, -1.0], [1.0, 0.0]]), "rk4", v=np.zeros(1), y=np.ones(1), dt=0.1)
-    with pytest.raises(UnsupportedError, match="A: expected matrices of the structure"):
-        linear.set(A=[[-0.1, -1.0], [1.0, 0.0]])
+    calls: list[tuple[Callable[[], Any], Any, str]] = [
+        (lambda: bodies.set(force="newton"), UnsupportedError, "force: it selects the operations"),
+        (lambda: bodies.parameters["G"], UnsupportedError, "other numbers are computed from it; use world.set(G=…)"),
+        (
+            lambda: bodies.set(masses=[1.0, 1.0]),
+            UnsupportedError,
+            "masses: expected numbers, inputs and surfaces of the",
+        ),
+        (lambda: bodies.reset(0, y=0.0), ArgumentError, "members: expected a world with a batch"),
+        (lambda: world.reset(0), ArgumentError, "got none"),
+        (lambda: world.reset(2, y=0.0), ArgumentError, "members: expected an index"),
+        (lambda: world.reset([0, 0], y=0.0), ArgumentError, "each member once"),
+        (lambda: world.reset([0, 1], y=[1.0, 2.0, 3.0]), ShapeError, "y: expected shape () or (2,), got (3,)"),
+        (lambda: linear.set(A=[[-0.1, -1.0], [1.0, 0.0]]), UnsupportedError, "A: expected matrices of the structure"),
+    ]
+    for call, kind, text in calls:
+        with pytest.raises(kind, match=re.escape(text)):
+            call()
     single = sw.World(sw.Pendulum(), "rk4", v=np.zeros(1, "f4"), y=np.ones(1, "f4"), dt=0.1, dtype="float32")
     with pytest.raises(ArgumentError, match="largest of float32"):
         single.set(omega=1e39)

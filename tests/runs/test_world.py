@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import pickle
 import sys
 import threading
@@ -13,41 +14,31 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import FixedError
-from support.cases import SYSTEMS, Case, cases, thinned
+from support.cases import SYSTEMS
 
-DIRECT = [c for c in cases() if c.form == "direct"]
-
-
-@pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 2}, "world"))
-def test_equals_a_run(case: Case) -> None:
-    for b in (1, 5, 97):
-        system, arguments = case.make(b)
-        whole = sw.integrate(system, **(arguments | {"steps": 20, "every": 1, "t0": 0.4}))
-        v, y = arguments["v"].copy(), arguments["y"].copy()
-        w = sw.World(system, arguments["method"], v=v, y=y, dt=0.1, t0=0.4, start=arguments["start"])
-        for k, n in ((4, 4), (5, 1), (5, 0), (20, 15)):
-            w.step(n)
-            assert w.step_number == k
-            assert w.t == whole.t[k]
-            np.testing.assert_array_equal(y, whole.y[k])
-            np.testing.assert_array_equal(v, whole.v[k])
+#: A method of each kind of step, and of what it carries.
+KINDS = ("false_euler", "rk4", "verlet", "leapfrog", "pefrl", "dop853", "taylor", "rodas4", "trapezoidal")
 
 
-@pytest.mark.parametrize("method", [m.name for m in sw.methods()])
+@pytest.mark.parametrize("method", KINDS)
 def test_a_kick_is_seen(method: str) -> None:
     """What the user writes between steps counts, also for a method that keeps something else than v inside."""
     v, y = np.array([0.1]), np.array([1.0])
-    w = sw.World(sw.Oscillator(1.3), method, v=v, y=y, dt=0.1)
+    w = sw.World(sw.Oscillator(1.3), method, v=v, y=y, dt=0.1, t0=0.4)
     w.step(7)
+    assert (w.step_number, w.t) == (7, 0.4 + 7 * 0.1)
     v[0] += 0.5
     y[0] -= 0.1
-    expected = sw.integrate(sw.Oscillator(1.3), method, v=v[0], y=y[0], dt=0.1, steps=5, start_step=7)
-    w.step(5)
-    assert (v[0], y[0]) == (expected.v[-1], expected.y[-1])
+    expected = sw.integrate(sw.Oscillator(1.3), method, v=v[0], y=y[0], dt=0.1, t0=0.4, steps=5, start_step=7)
+    again = copy.copy(w)
+    for each in (w, again):
+        each.step(5)
+        each.step(0)
+        assert (each.v[0], each.y[0]) == (expected.v[-1], expected.y[-1])
 
 
 @pytest.mark.parametrize("kind", ["free", "three bodies", "chain of nineteen", "sampled x, sinusoid a"])
-@pytest.mark.parametrize("method", ["false_euler", "verlet", "rk4"])
+@pytest.mark.parametrize("method", ["verlet", "rk4"])
 def test_allocates_nothing(kind: str, method: str) -> None:
     rng = np.random.default_rng(0)
     system = SYSTEMS[kind](rng, 5)
@@ -88,30 +79,22 @@ def test_another_thread_may_step() -> None:
     assert w.step_number == 10
 
 
-def test_the_arrays_cannot_be_swapped() -> None:
-    w = sw.World(sw.Oscillator(1.0), "false_euler", v=np.zeros(3), y=np.ones(3), dt=0.1)
-    with pytest.raises(AttributeError):
-        w.v = np.zeros(3)  # type: ignore[misc]
-
-
-@pytest.mark.parametrize("shape", [(), (1,), (2, 3), (30, 20)])
-def test_any_shape_of_batch(shape: tuple[int, ...]) -> None:
+def test_any_shape_of_batch() -> None:
     """From a lone number to more than are copied."""
-    v, y = np.zeros(shape), np.ones(shape)
-    w = sw.World(sw.Oscillator(1.3), "verlet", v=v, y=y, dt=0.1)
-    w.step(3)
-    expected = sw.integrate(sw.Oscillator(1.3), "verlet", v=0.0, y=np.ones(shape), dt=0.1, steps=3)
-    np.testing.assert_array_equal(y, expected.y[-1])
-    np.testing.assert_array_equal(v, expected.v[-1])
+    for shape in ((), (1,), (2, 3), (30, 20)):
+        v, y = np.zeros(shape), np.ones(shape)
+        w = sw.World(sw.Oscillator(1.3), "verlet", v=v, y=y, dt=0.1)
+        w.step(3)
+        expected = sw.integrate(sw.Oscillator(1.3), "verlet", v=0.0, y=np.ones(shape), dt=0.1, steps=3)
+        np.testing.assert_array_equal((v, y), (expected.v[-1], expected.y[-1]))
 
 
-@pytest.mark.parametrize("name", ["dt", "t", "method", "system", "v", "y", "step", "step_number", "anything"])
-def test_nothing_is_assigned(name: str) -> None:
+def test_nothing_is_assigned() -> None:
     w = sw.World(sw.Oscillator(1.0), "verlet", v=np.zeros(3), y=np.ones(3), dt=0.1)
-    with pytest.raises(
-        FixedError, match=rf"^{name}: a world's {name} cannot be assigned; .* World\(system, method, resume=world\), "
-    ):
-        setattr(w, name, 0.2)
+    for name in ("dt", "t", "method", "system", "v", "y", "step", "step_number", "anything"):
+        match = rf"^{name}: a world's {name} cannot be assigned; .* World\(system, method, resume=world\), "
+        with pytest.raises(FixedError, match=match):
+            setattr(w, name, 0.2)
     assert (w.dt, w.t, w.method.name) == (0.1, 0.0, "verlet")
 
 
@@ -123,25 +106,23 @@ COPIES = {
 }
 
 
-@pytest.mark.parametrize("copying", COPIES)
-@pytest.mark.parametrize("steps", [0, 7])
-@pytest.mark.parametrize("members", [3, 500])
-@pytest.mark.parametrize("method", [m.name for m in sw.methods()])
-def test_a_copy_goes_on_by_itself(method: str, members: int, steps: int, copying: str) -> None:
+@pytest.mark.parametrize("method", KINDS)
+def test_a_copy_goes_on_by_itself(method: str) -> None:
     """To the bit, also of what is carried; and neither sees what becomes of the other."""
-    y = np.linspace(0.5, 1.5, members)
-    w = sw.World(sw.Pendulum(), method, v=np.full(members, 0.1), y=y, dt=0.1, t0=0.3, start_step=4)
-    w.step(steps)
-    again = COPIES[copying](w)
-    before = w.v.copy(), w.y.copy()
-    again.step(20)
-    np.testing.assert_array_equal((w.v, w.y), before)
-    assert (w.step_number, again.step_number) == (4 + steps, 24 + steps)
-    w.step(20)
-    np.testing.assert_array_equal((again.v, again.y), (w.v, w.y))
-    assert again.t == w.t
-    again.v[0] += 1.0
-    assert w.v[0] != again.v[0]
+    for members, steps, copying in itertools.product((3, 500), (0, 7), COPIES):
+        case, y = (members, steps, copying), np.linspace(0.5, 1.5, members)
+        w = sw.World(sw.Pendulum(), method, v=np.full(members, 0.1), y=y, dt=0.1, t0=0.3, start_step=4)
+        w.step(steps)
+        again = COPIES[copying](w)
+        before = w.v.copy(), w.y.copy()
+        again.step(20)
+        np.testing.assert_array_equal((w.v, w.y), before, err_msg=str(case))
+        assert (w.step_number, again.step_number) == (4 + steps, 24 + steps), case
+        w.step(20)
+        np.testing.assert_array_equal((again.v, again.y), (w.v, w.y), err_msg=str(case))
+        assert again.t == w.t, case
+        again.v[0] += 1.0
+        assert w.v[0] != again.v[0], case
 
 
 @pytest.mark.parametrize("method", ["verlet", "leapfrog", "rk4"])
@@ -153,16 +134,6 @@ def test_a_world_goes_on_from_a_run_and_a_run_from_a_world(method: str) -> None:
     w.step(15)
     rest = sw.integrate(system, method, steps=20, **options, resume=w)
     np.testing.assert_array_equal((rest.v, rest.y), (whole.v, whole.y))
-
-
-def test_a_copy_after_a_kick_starts_from_it() -> None:
-    w = sw.World(sw.Oscillator(1.0), "verlet", v=np.zeros(1), y=np.ones(1), dt=0.1)
-    w.step(3)
-    w.v[0] += 0.5
-    again = copy.copy(w)
-    again.step(5)
-    w.step(5)
-    np.testing.assert_array_equal((again.v, again.y), (w.v, w.y))
 
 
 def test_a_controlled_world_keeps_its_energy_when_it_goes_on() -> None:
@@ -193,32 +164,27 @@ def test_a_parameter_that_is_changed_later_changes_nothing() -> None:
     np.testing.assert_array_equal(copy.copy(w).system.omega, 1.0)  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize(
-    ("n", "error", "message"),
-    [
+def test_how_many_steps() -> None:
+    most = "n: expected 0 or more, up to 9007199254740990, got"
+    wrong: list[tuple[Any, Any, str]] = [
         (1.5, sw.errors.DTypeError, "n: expected a whole number, got 1.5 (float)"),
         ("3", sw.errors.DTypeError, "n: expected a whole number, got '3' (str)"),
-        (None, None, ""),
         (True, sw.errors.DTypeError, "n: expected a whole number, got True (bool)"),
-        (2**63, sw.errors.ArgumentError, "n: expected 0 or more, up to 9007199254740990, got 9223372036854775808"),
-        (2**70, sw.errors.ArgumentError, "n: expected 0 or more, up to 9007199254740990, got 1180591620717411303424"),
-        (2**53, sw.errors.ArgumentError, "n: expected 0 or more, up to 9007199254740990, got 9007199254740992"),
+        (2**63, sw.errors.ArgumentError, f"{most} 9223372036854775808"),
+        (2**70, sw.errors.ArgumentError, f"{most} 1180591620717411303424"),
+        (2**53, sw.errors.ArgumentError, f"{most} 9007199254740992"),
         (-1, sw.errors.ArgumentError, "n: expected 0 or more, got -1"),
-        (np.int64(3), None, ""),
-        (np.array(3), None, ""),
-    ],
-)
-def test_how_many_steps(n: Any, error: Any, message: str) -> None:
+    ]
     w = sw.World(sw.Oscillator(1.0), "rk4", v=np.zeros(3), y=np.ones(3), dt=0.1, start_step=2)
-    if error is None:
-        w.step(n)
-        assert w.step_number == 2 + (1 if n is None else int(n))
-        return
-    with pytest.raises(error) as caught:
-        w.step(n)
-    assert str(caught.value) == message
+    for n, error, message in wrong:
+        with pytest.raises(error) as caught:
+            w.step(n)
+        assert str(caught.value) == message
     assert w.step_number == 2
     np.testing.assert_array_equal(w.y, 1.0)
+    for n, step_number in ((None, 3), (np.int64(3), 6), (np.array(3), 9)):
+        w.step(n)  # type: ignore[arg-type]
+        assert w.step_number == step_number
 
 
 def test_steps_are_counted_up_to_what_is_exact() -> None:
