@@ -159,6 +159,10 @@ def test_interp_means_the_same_as_a_linear_sampled() -> None:
     np.testing.assert_array_equal(runs[0].y, other.y)
 
 
+def pushed_by(call: Any) -> Any:
+    return sw.system(lambda t, v, y: call(t))
+
+
 def test_what_interp_refuses() -> None:
     calls: list[Any] = [
         (lambda t: np.interp(t, np.arange(1000.0), np.zeros(1000)), r"at most 256 points.* got 1000; .*sw\.Sampled"),
@@ -168,9 +172,8 @@ def test_what_interp_refuses() -> None:
         (lambda t: np.interp(t, np.array([0.0, 1.0]) * t, [1.0, 2.0]), "known numbers as the places xp"),
     ]
     for call, message in calls:
-        own = sw.system(lambda t, v, y, call=call: call(t))
         with pytest.raises(TraceError, match=message):
-            sw.integrate(own, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+            sw.integrate(pushed_by(call), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
 
 
 def test_a_spline_of_another_package_is_told_from_ones_own_mistakes() -> None:

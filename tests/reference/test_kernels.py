@@ -59,6 +59,12 @@ def executable() -> list[int]:
     return [int(m[2], 16) - int(m[1], 16) for m in maps if m and "x" in m[3] and not m[4]]
 
 
+def in_a_process(code: str, *options: str) -> subprocess.CompletedProcess[str]:
+    """Python text in a process of its own, which imports from where this one does."""
+    command = [sys.executable, *options, "-c", code, json.dumps(sys.path)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT / "tests" / "reference", check=False)
+
+
 # ---- where no page may become executable
 
 HARDENED = """
@@ -78,13 +84,7 @@ else:
 
 @LINUX
 def test_where_no_code_may_be_written_steps_are_interpreted_without_a_word() -> None:
-    out = subprocess.run(
-        [sys.executable, "-W", "error", "-c", HARDENED, json.dumps(sys.path)],
-        capture_output=True,
-        text=True,
-        cwd=ROOT / "tests" / "reference",
-        check=False,
-    )
+    out = in_a_process(HARDENED, "-W", "error")
     assert (out.returncode, out.stderr) == (0, "")
     report = json.loads(out.stdout)
     if "refused" in report:
@@ -215,8 +215,7 @@ def run(steps):
     return len(test_kernels.executable())
 print(run(1), run(200), run(100_000), run(1))
 """
-    command = [sys.executable, "-c", code, json.dumps(sys.path)]
-    out = subprocess.run(command, capture_output=True, text=True, cwd=ROOT / "tests" / "reference", check=True)
+    out = in_a_process(code)
     one, short, long, after = (int(word) for word in out.stdout.split())
     assert one == short == long - 1 == after - 1
 
@@ -228,7 +227,7 @@ print(run(1), run(200), run(100_000), run(1))
 def test_a_step_is_traced_and_compiled_in_time(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """``python -m benches.compile`` shows the times: some tens to some hundreds of µs. A tenth of a frame is bearable."""
     monkeypatch.setattr(compiling, "SYSTEMS", {name: compiling.SYSTEMS[name]})
-    rows = list(compiling.rows(repeats=3))
+    rows = list(compiling.rows(repeats=2))
     assert len(rows) >= 9
     for row in rows:
         # A step that solves equations has ten times as many operations.

@@ -6,6 +6,7 @@ import math
 import runpy
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,7 @@ from stepwell.reference.tape.fused import fused
 from stepwell.reference.tape.lines import listed, needed
 from support import ROOT
 from support.true_functions import arguments, errors
-
-KERNELS = ["interpret", *(level for level in _core.isa_levels() if level != "interpret")]
+from support.ways import assert_equal_ways, kernels
 
 
 def test_the_cores_table_is_that_of_the_specification() -> None:
@@ -71,14 +71,14 @@ def quick(lines: list[Any]) -> int:
     return sines + (names["subtract multiply"] - sines) // 2
 
 
-@pytest.mark.parametrize("what", functions(_core.Tape()))
-def test_where_they_are_used_and_that_both_languages_agree(what: str) -> None:
-    tape = _core.Tape()
-    values, count = functions(tape)[what]
-    plain, roots = listed(tape, values)
-    lines, _ = in_quick_forms(plain, roots)
-    assert quick(lines) == count
-    assert listed(*tape.fused(values)) == needed(*fused(plain, roots))
+def test_where_they_are_used_and_that_both_languages_agree() -> None:
+    for what in functions(_core.Tape()):
+        tape = _core.Tape()
+        values, count = functions(tape)[what]
+        plain, roots = listed(tape, values)
+        lines, _ = in_quick_forms(plain, roots)
+        assert quick(lines) == count, what
+        assert listed(*tape.fused(values)) == needed(*fused(plain, roots)), what
 
 
 @pytest.mark.parametrize("i", range(2), ids=["sin", "exp"])
@@ -106,12 +106,7 @@ def in_quick_form(function: Callable[[Any], Any], x: np.ndarray) -> np.ndarray:
     return np.asarray(values)
 
 
-def quick_sine(x: np.ndarray) -> np.ndarray:
-    return in_quick_form(fn.sin, x)
-
-
-def quick_exponential(x: np.ndarray) -> np.ndarray:
-    return in_quick_form(fn.exp, x)
+quick_sine, quick_exponential = partial(in_quick_form, fn.sin), partial(in_quick_form, fn.exp)
 
 
 def test_errors_of_the_exponential_are_below_a_unit_in_the_last_place() -> None:
@@ -157,22 +152,18 @@ def swinging(t: Any, v: Any, y: Any, *, omega: float = 1.0) -> Any:
     return -(omega * omega) * np.sin(y)
 
 
-@pytest.mark.parametrize("kernels", KERNELS)
-def test_a_bad_member_touches_no_other(kernels: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("STEPWELL_KERNELS", kernels)
+def test_a_bad_member_touches_no_other() -> None:
     y = np.linspace(-3.0, 3.0, 37)
-    ask: dict[str, Any] = {"v": 0.0, "dt": 0.05, "steps": 40, "fused": True}
-    well = sw.integrate(swinging(), "rk4", y=y, **ask)
-    other = sw.integrate(swinging(), "rk4", y=y, backend="numpy", **ask)
-    assert np.array_equal(well.y, other.y)
-    assert np.array_equal(well.v, other.v)
+    ask: dict[str, Any] = {"v": np.zeros(37), "dt": 0.05, "steps": 40, "fused": True}
+    well = assert_equal_ways(swinging(), "rk4", ways=("by the reference", "at each level"), y=y, **ask)
     far = y.copy()
     far[5], far[20] = 2.0**50, 2.0**51  # a sine on this side of its limit, and none on the other
-    with pytest.warns(sw.DivergenceWarning, match="1 of 37"):
-        ill = sw.integrate(swinging(), "rk4", y=far, **ask)
     rest = np.delete(np.arange(37), [5, 20])
-    assert np.array_equal(ill.y[-1][rest], well.y[-1][rest])
-    assert np.isfinite(ill.y[-1][5])
+    for level in sw.isa_levels():
+        with kernels(level), pytest.warns(sw.DivergenceWarning, match="1 of 37"):
+            ill = sw.integrate(swinging(), "rk4", y=far, **ask)
+        assert np.array_equal(ill.y[-1][rest], well.y[-1][rest]), level
+        assert np.isfinite(ill.y[-1][5])
 
 
 @sw.system(order=1)
@@ -181,14 +172,11 @@ def opening(t: Any, y: Any, *, width: float = 0.01) -> Any:
 
 
 @pytest.mark.parametrize("fused", [False, True])
-@pytest.mark.parametrize("kernels", KERNELS)
-def test_exponentials_of_all_sizes_have_the_same_bits(kernels: str, fused: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("STEPWELL_KERNELS", kernels)
+def test_exponentials_of_all_sizes_have_the_same_bits(fused: bool) -> None:
     y = np.concatenate([np.linspace(-9.0, 9.0, 301), [0.0, -0.0, 5e-324]])
-    ask: dict[str, Any] = {"y": y, "dt": 0.01, "steps": 20, "fused": fused}
-    other = sw.integrate(opening(), "rk4", backend="numpy", **ask)
-    assert np.isfinite(other.y).all()
-    assert np.array_equal(sw.integrate(opening(), "rk4", **ask).y, other.y)
+    ways = ("by the reference", "at each level")
+    run = assert_equal_ways(opening(), "rk4", ways=ways, y=y, dt=0.01, steps=20, fused=fused)
+    assert np.isfinite(run.y).all()
 
 
 def test_a_run_is_as_accurate_as_a_plain_one() -> None:

@@ -10,12 +10,16 @@ RUNS = recorded.runs()
 WRITTEN = recorded.written()
 
 
-@pytest.mark.parametrize("name", WRITTEN)
-def test_the_bits_are_those_that_were_recorded(name: str) -> None:
-    assert name in RUNS, f"{name}: recorded, but no run of that name is made any more"
-    bits, values = recorded.hashes(recorded.made(RUNS[name]))
-    assert values == WRITTEN[name][1], f"{name}: other values than were recorded"
-    assert bits == WRITTEN[name][0], f"{name}: the values that were recorded, but the sign of a zero is another"
+@pytest.mark.parametrize("part", range(8))
+def test_the_bits_are_those_that_were_recorded(part: int) -> None:
+    wrong = []
+    for name in sorted(WRITTEN)[part::8]:
+        assert name in RUNS, f"{name}: recorded, but no run of that name is made any more"
+        bits, values = recorded.hashes(recorded.made(RUNS[name]))
+        if bits != WRITTEN[name][0]:
+            same = values == WRITTEN[name][1]
+            wrong.append(f"{name}: {'the values are the same, but the sign of a zero is another' if same else 'other values'}")
+    assert not wrong
 
 
 def test_so_many_are_recorded() -> None:

@@ -68,15 +68,9 @@ def test_errors_are_within_their_bounds_and_reach_them(name: str) -> None:
 
 def test_operations_are_counted() -> None:
     assert {name: operations(each) for name, each in BY_NAME.items()} == {
-        "root and division": (3, 3),
-        "4 × Newton, y³": (22, 15),
-        "degree 2": (14, 8),
-        "degree 3": (16, 9),
-        "degree 4": (18, 9),
-        "degree 2, Newton": (18, 11),
-        "degree 5": (19, 10),
-        "fused=True": (15, 12),
-    }
+        "root and division": (3, 3), "4 × Newton, y³": (22, 15), "degree 2": (14, 8), "degree 3": (16, 9), "degree 4": (18, 9),
+        "degree 2, Newton": (18, 11), "degree 5": (19, 10), "fused=True": (15, 12),
+    }  # fmt: skip
 
 
 MUTANTS = [

@@ -12,6 +12,7 @@ from stepwell.model.parameters import flat
 from stepwell.reference import adaptive, contact
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
+from support import families
 from support.cases import ADAPTIVE, SOME, SYSTEMS, drawn, few_implicit, fits, has_branches
 from support.symbols import Symbol, Tape, evaluate
 from support.tracing import ABLE, CONTROLS, MEMBERS, METHODS, H, T, assert_computes, made
@@ -41,7 +42,7 @@ def numbers(system: sw.System, tape: Tape, symbols: list[Symbol], *state: Any, h
 def test_every_method_on_every_system(name: str) -> None:
     system, v, y = made(name)
     large = v.size + y.size > 150 * MEMBERS
-    for method in METHODS[:3] if large else few_implicit(METHODS, 1, "step", name):
+    for method in METHODS[:3] if large else drawn(METHODS, None if families.LONG else 8, "step", name):
         if fits(system, method):
             tape = Tape()
             symbols = Tracer(system, tape).step(method)
@@ -122,7 +123,7 @@ def test_every_attempt(name: str, some: int | None) -> None:
         ),
     )
     paces = [pace, pace._replace(target=row(9.0, T, 9.0), relative=row(9.0, 1.0, 9.0)), pace._replace(extra=row(0.01, 0.0, 0.02))]
-    for method in drawn(ABLE, some, "attempt", name):
+    for method in drawn([method for method in ABLE if fits(system, method)], some and 1, "attempt", name):
         tape = Tape()
         symbols = Tracer(system, tape).attempt(method)
         if method.has_series and has_branches(system):
