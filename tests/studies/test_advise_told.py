@@ -16,6 +16,7 @@ from stepwell.scenes import Scene
 from stepwell.studies.advice import Row
 from stepwell.studies.advice.costs import Times, single_name
 from stepwell.studies.advice.motion import motion_of
+from stepwell.studies.advice.predict import Rates
 from stepwell.studies.advice.trials import Trials
 from stepwell.views import cli
 from support.advised import _times_are_measured_once, brute_of, scene_of, unmeasured  # noqa: F401
@@ -55,6 +56,12 @@ def test_frequency_and_damping_errors_are_those_of_the_series() -> None:
     assert rows["false_euler"].damping_error == pytest.approx(0.0, abs=1e-12)
     assert rows["semi_false_heun"].frequency_error == pytest.approx(-(0.1**2) / 12 + 7 * 0.1**4 / 160, rel=1e-3)
     assert rows["semi_false_heun"].damping_error == pytest.approx(0.1**4 / 8 / 0.1, rel=1e-3)
+
+
+def test_the_fastest_rate_is_that_of_what_does_not_grow() -> None:
+    rates = Rates(np.array([0.0, 1.0]), np.array([[-1.0 + 2.0j, 5.0], [-3.0, 0.1]]))
+    assert rates.fastest == (-3.0, 1.0)
+    assert Rates(np.array([0.0]), np.array([[1.0 + 0.0j]])).fastest is None
 
 
 def test_no_prediction_where_it_makes_no_sense() -> None:

@@ -90,33 +90,26 @@ def example(step: sw.ExportedStep) -> str:
     return "\n".join(line[5:] for line in shown) + "\n"
 
 
-def shown(step: sw.ExportedStep, folder: Path) -> float:
-    """What it prints, run as the head of the file says."""
-    match step.language:
-        case "C":
-            step.save(folder / f"{step.name}.c")
-            (folder / "example.c").write_text(example(step), encoding="utf-8")
-            executed(["cc", *C_FLAGS, "example.c", "-lm", "-o", "example"], folder)
-            command: list[Any] = [folder / "example"]
-        case "C#":
-            step.save(folder / f"{step.name}.cs")
-            (folder / "example.cs").write_text(example(step), encoding="utf-8")
-            executed(["mcs", *CSHARP_FLAGS, "example.cs", f"{step.name}.cs"], folder)
-            command = ["mono", "example.exe"]
-        case "JavaScript":
-            step.save(folder / f"{step.name}.mjs")
-            (folder / "example.mjs").write_text(example(step), encoding="utf-8")
-            command = ["node", "example.mjs"]
-        case "Rust":
-            step.save(folder / f"{step.name}.rs")
-            (folder / "example.rs").write_text(example(step), encoding="utf-8")
-            executed(["rustc", *RUST_FLAGS, "example.rs", "-o", "example_rust"], folder)
-            command = [folder / "example_rust"]
-        case _:
-            step.save(folder / f"{step.name}.py")
-            (folder / "example.py").write_text(example(step), encoding="utf-8")
-            command = [sys.executable, "example.py"]
+def printed(step: sw.ExportedStep, program: str, folder: Path) -> float:
+    """The number that a program prints which uses the step, run as the head of the file says."""
+    ending = {"JavaScript": ".mjs"}.get(step.language, step.endings[0])
+    step.save(folder / f"{step.name}{ending}")
+    (folder / f"program{ending}").write_text(program, encoding="utf-8")
+    compiler, command = {
+        "C": (["cc", *C_FLAGS, "program.c", "-lm", "-o", "program"], [folder / "program"]),
+        "C#": (["mcs", *CSHARP_FLAGS, "program.cs", f"{step.name}.cs"], ["mono", "program.exe"]),
+        "JavaScript": ([], ["node", "program.mjs"]),
+        "Rust": (["rustc", *RUST_FLAGS, "program.rs", "-o", "program"], [folder / "program"]),
+        "Python": ([], [sys.executable, "program.py"]),
+    }[step.language]
+    if compiler:
+        executed(compiler, folder)
     return float(executed(command, folder))
+
+
+def shown(step: sw.ExportedStep, folder: Path) -> float:
+    """What the example at the head prints."""
+    return printed(step, example(step), folder)
 
 
 # ---- sets of journeys; ``every`` takes every so many-th of each
@@ -129,17 +122,14 @@ def of_all_methods_and_systems(language: str, every: int = 1) -> list[Journey]:
         (each for each in pairs(series=False) if each[0] in wanted),
         key=lambda each: number(language, each[0], each[1].name, each[2]),
     )
-    chosen: list[tuple[str, sw.Method, str | None]] = []
-    systems: set[str] = set()
-    methods: set[str] = set()
+    chosen, seen = [], set[str]()
     # First pairs of a new system and a new method, then what is left of either.
-    for is_wanted in (lambda s, m: s and m, lambda s, m: s or m):
+    for news in (2, 1):
         for name, method, start in able:
-            if is_wanted(name not in systems, method.name not in methods):
+            if len({name, method.name} - seen) >= news:
                 chosen.append((name, method, start))
-                systems.add(name)
-                methods.add(method.name)
-    chosen += [(name, sw.method("false_euler"), None) for name in sorted(wanted - systems)]
+                seen |= {name, method.name}
+    chosen += [(name, sw.method("false_euler"), None) for name in sorted(wanted - seen)]
     return [journey(*each) for each in chosen[::every]]
 
 
@@ -169,25 +159,15 @@ def diverging(language: str, every: int = 1) -> list[Journey]:
 
 def changed(language: str, every: int = 1) -> list[Journey]:
     """Parameters that are changed in the code that was exported."""
-    driven = {"a": sw.Sinusoid(1.0, 2.0, 0.3)}
+    driven, held = sw.Pendulum(1.0, 0.1, a=sw.Sinusoid(1.0, 2.0, 0.3)), sw.Oscillator(x=sw.Sampled([1.0, 2.0, 3.0], 0.4))
+    others = sw.Pendulum(1.3, 0.4, a=sw.Sinusoid(0.3, 2.0, -1.0)), sw.Oscillator(x=sw.Sampled([1.0, 2.0, 3.0], 0.7, 0.9))
+    of_drive = {"omega": 1.3, "damping": 0.4, "a_amplitude": 0.3, "a_phase": -1.0}
+    single: dict[str, Any] = {"dtype": "float32"}
     return [
         Journey(sw.Oscillator(1.0), "rk4", 0.5, 1.0, changed={"omega": 1.7}, twin=sw.Oscillator(1.7)),
-        Journey(
-            sw.Pendulum(1.0, 0.1, **driven),
-            "merson",
-            0.5,
-            1.0,
-            changed={"omega": 1.3, "damping": 0.4, "a_amplitude": 0.3, "a_phase": -1.0},
-            twin=sw.Pendulum(1.3, 0.4, a=sw.Sinusoid(0.3, 2.0, -1.0)),
-        ),
-        Journey(
-            sw.Oscillator(1.0, x=sw.Sampled([1.0, 2.0, 3.0], 0.4)),
-            "standard_heun",
-            0.5,
-            1.0,
-            changed={"x_start": 0.9, "x_interval": 0.7},
-            twin=sw.Oscillator(1.0, x=sw.Sampled([1.0, 2.0, 3.0], 0.7, 0.9)),
-        ),
+        Journey(driven, "merson", 0.5, 1.0, changed=of_drive, twin=others[0]),
+        Journey(held, "standard_heun", 0.5, 1.0, changed={"x_start": 0.9, "x_interval": 0.7}, twin=others[1]),
+        Journey(driven, "standard_euler", 0.5, 1.0, options=single, changed=of_drive, twin=others[0]),
     ][::every]
 
 
@@ -205,7 +185,7 @@ def single(system: sw.System, method: str, v: Any = 0.3, y: Any = 1.1, steps: in
 
 
 def singles(language: str = "c", every: int = 1) -> list[Journey]:
-    """Every kind of rates and of methods: what carries something, controls, inputs, what diverges, what is changed."""
+    """Every kind of rates and of methods: what carries something, controls, inputs, what diverges."""
     rng = np.random.default_rng(5)
     drive = {"a": sw.Sinusoid(1.0, 2.0, 0.3)}
     masses = sw.LinearSystem([[-0.1, 0.0, -1.0, 0.0], [0.0, -0.2, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
@@ -225,17 +205,6 @@ def singles(language: str = "c", every: int = 1) -> list[Journey]:
         # The smallest numbers, which have fewer digits.
         single(sw.Pendulum(1.0), "false_euler", 1e-42, 3e-41),
     ]
-    journeys.append(
-        Journey(
-            sw.Pendulum(1.0, 0.1, **drive),
-            "standard_euler",
-            0.5,
-            1.0,
-            options={"dtype": "float32"},
-            changed={"omega": 1.3, "damping": 0.4, "a_amplitude": 0.3},
-            twin=sw.Pendulum(1.3, 0.4, a=sw.Sinusoid(0.3, 2.0, 0.3)),
-        )
-    )
     return journeys[::every]
 
 
