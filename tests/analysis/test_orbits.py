@@ -104,6 +104,7 @@ def test_anomalies_and_sizes_are_of_one_orbit(e: float) -> None:
     mu, q = 2.0, 0.7
     v, y = sw.orbits.state(mu, periapsis=q, e=e, true_anomaly=1.1, argument_of_periapsis=0.4)
     orbit = sw.orbits.of_state(mu, v, y, t=5.0)
+    assert orbit.apoapsis == (pytest.approx(q * (1.0 + e) / (1.0 - e), rel=1e-10) if e < 1.0 else math.inf)
     ways = {
         "mean_anomaly": orbit.mean_anomaly,
         "eccentric_anomaly": orbit.eccentric_anomaly,
