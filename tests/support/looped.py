@@ -1,4 +1,4 @@
-"""Cases within one test, where each takes less than the item that pytest would make of it; and samples of products of cases."""
+"""Samples of cases: what is looped over every day and what in the long run, products by turns; and what is refused."""
 
 from __future__ import annotations
 
@@ -11,30 +11,28 @@ from typing import Any
 import pytest
 
 from support.families import family
+from support.for_each import for_each
 
 Test = Callable[..., None]
 
 
 def looped(names: str, cases: Iterable[Any], long: Iterable[Any] = ()) -> Callable[[Test], Test]:
-    """As ``pytest.mark.parametrize``, but in one item, and another for ``long`` cases. A failure says of which case it is."""
-    labels, groups = names.split(", "), {"every day": list(cases), "long": list(long)}
+    """As ``for_each``, and of ``long`` cases another item, in the long run."""
+    many = list(long)
+    if not many:
+        return for_each(names, cases)
+    groups = {"every day": for_each(names, cases), "long": for_each(names, many)}
 
     def decorate(test: Test) -> Test:
-        @functools.wraps(test)
-        def of_all(**fixtures: Any) -> None:
-            for case in groups[fixtures.pop("which", "every day")]:
-                values = dict(zip(labels, case if len(labels) > 1 else (case,), strict=True))
-                try:
-                    test(**fixtures, **values)
-                except BaseException as error:
-                    error.add_note(f"{names}: {case!r}")
-                    raise
+        of_group = {name: loop(test) for name, loop in groups.items()}
 
-        which = [inspect.Parameter("which", inspect.Parameter.KEYWORD_ONLY)] * bool(groups["long"])
-        rest = [each for name, each in inspect.signature(test).parameters.items() if name not in labels]
-        vars(of_all)["__signature__"] = inspect.Signature([*rest, *which])
-        if not which:
-            return of_all
+        @functools.wraps(test)
+        def of_all(which: str, **fixtures: Any) -> None:
+            of_group[which](**fixtures)
+
+        signature = inspect.signature(of_group["long"])
+        which = inspect.Parameter("which", inspect.Parameter.KEYWORD_ONLY)
+        vars(of_all)["__signature__"] = signature.replace(parameters=[*signature.parameters.values(), which])
         return pytest.mark.parametrize("which", family(groups, lambda group: group != "long", str))(of_all)
 
     return decorate
