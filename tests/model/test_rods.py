@@ -1,23 +1,95 @@
-"""Rods: the pendulum in space against known periods, chains of rods against equations in angles, control against resetting."""
+"""Rods: the pendulum in space against known periods, chains of rods against equations in angles, control against resetting.
+
+What cannot be is refused, what is doubtful is told, and deliberately wrong formulas are noticed.
+"""
 
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.errors import UnsupportedError
-from stepwell.reference.systems import rods
+from stepwell.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, UnsupportedError
+from stepwell.reference.systems import pendulum_3d, rods
 from stepwell.scenes.elliptic import quarter
-from support.cases import assert_same
-from support.rods import CONTROL, RESETTING, TWO, apart_from_angles, cone, hanging, quiet
+from support.cases import SYSTEMS, assert_same
+from support.looped import looped
+from support.mistakes import mistaken
+from support.ways import assert_same_run
 
 STEPPED = [m.name for m in sw.methods() if not m.needs_acceleration]
+
+
+CONTROL, RESETTING = sw.LengthControl(0.5), sw.Projection("length")
 KEPT = {"free": None, "control": CONTROL, "resetting": RESETTING}
 
+#: Two rods of length 1 with unit masses below the origin in a plane, and three.
+TWO = sw.Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0)
 THREE = sw.Rods([1.0, 1.0, 1.0], [((0.0, 0.0), 0), (0, 1), (1, 2)], 1.0)
+
+
+def hanging(*angles: float) -> Any:
+    """Places of a chain of rods of length 1, each at an angle from straight down."""
+    return np.cumsum([[math.sin(a), -math.cos(a)] for a in angles], axis=0)
+
+
+def quiet(*arguments: Any, **options: Any) -> sw.Run:
+    """A run of which it is known that it diverges, or that its rods do not keep their lengths."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sw.DivergenceWarning)
+        warnings.simplefilter("ignore", sw.AccuracyWarning)
+        return sw.integrate(*arguments, **options)
+
+
+def cone(degrees: float = 60.0) -> tuple[dict[str, Any], float]:
+    """A start that circles at an angle from below, and its period 2π√(l·cosθ/g)."""
+    angle = math.radians(degrees)
+    omega = 1.0 / math.sqrt(math.cos(angle))
+    y = [math.sin(angle), 0.0, -math.cos(angle)]
+    return {"v": [0.0, omega * math.sin(angle), 0.0], "y": y}, 2.0 * math.pi / omega
+
+
+@sw.system
+def in_angles(t: Any, v: Any, y: Any, *, m: float = 2.0, long: float = 0.7) -> Any:
+    """The double pendulum of rods 1 and ``long`` with masses 1 and m, gravity 1, by Lagrange's equations for its angles."""
+    sine, cosine = np.sin(y[0] - y[1]), np.cos(y[0] - y[1])
+    first = -m * long * v[1] ** 2 * sine - (1.0 + m) * np.sin(y[0])
+    second = v[0] ** 2 * sine - np.sin(y[1])
+    bottom = 1.0 + m * sine**2
+    return np.array([(first - m * cosine * second) / bottom, ((1.0 + m) * second - cosine * first) / (long * bottom)])
+
+
+def places(angles: Any, rates: Any, long: float = 0.7) -> tuple[Any, Any]:
+    """v and y of the points, from angles and their rates."""
+    lengths = np.array([1.0, long])
+    y = np.stack([lengths * np.sin(angles), -lengths * np.cos(angles)], axis=-1)
+    v = rates[..., None] * np.stack([lengths * np.cos(angles), lengths * np.sin(angles)], axis=-1)
+    return np.cumsum(v, axis=-2), np.cumsum(y, axis=-2)
+
+
+DOUBLE = sw.Rods([1.0, 2.0], [((0.0, 0.0), 0), (0, 1)], [1.0, 0.7])
+
+
+ANGLES, RATES = np.array([1.5, -0.4]), np.array([0.3, 0.9])
+
+
+def apart_from_angles(backend: str = "rust") -> float:
+    """How far rods are from the same motion in angles, at t = 10, both to a tight tolerance."""
+    v, y = places(ANGLES, RATES)
+    options: dict[str, Any] = {"tolerance": 1e-13, "at": [10.0]}
+    known = sw.integrate(in_angles(), "dop853", v=RATES, y=ANGLES, **options)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run = sw.integrate(DOUBLE, "dop853", v=v, y=y, backend=backend, max_steps=2000, **options)
+    except ArgumentError:
+        return math.inf
+    apart = [np.abs(a - b).max() for a, b in zip((run.v[-1], run.y[-1]), places(known.y[-1], known.v[-1]), strict=True)]
+    return float(np.nan_to_num(max(apart), nan=math.inf))
 
 
 def swing(degrees: float) -> dict[str, Any]:
@@ -37,7 +109,7 @@ def period(run: sw.Run) -> float:
 # ---- the pendulum in space
 
 
-@pytest.mark.parametrize(("degrees", "dt", "facts"), [(10, 0.01, 6.2951685), (90, 0.01, 7.416303), (170, 0.005, 15.327010)])
+@looped("degrees, dt, facts", [(10, 0.01, 6.2951685), (90, 0.01, 7.416303), (170, 0.005, 15.327010)])
 def test_planar_periods(degrees: float, dt: float, facts: float) -> None:
     """FACTS §4 and §5. Control makes RK4 a method of order 2 (see below), resetting leaves its own error, far smaller."""
     true = 4.0 * quarter(math.sin(math.radians(0.5 * (180.0 - degrees))))
@@ -62,7 +134,7 @@ def test_periods_scale_with_length_and_gravity() -> None:
         np.testing.assert_array_equal(batch.y[..., i], run.y)
 
 
-@pytest.mark.parametrize("control", KEPT.values(), ids=KEPT)
+@looped("control", KEPT.values())
 def test_the_conical_pendulum_returns(control: Any) -> None:
     start, turn = cone()
     assert turn == pytest.approx(4.442883, abs=1e-6)
@@ -75,8 +147,8 @@ def test_the_conical_pendulum_returns(control: Any) -> None:
     assert wrong[1] < (4e-6 if control is CONTROL else 1e-8)
 
 
-@pytest.mark.parametrize(
-    ("method", "left"),
+@looped(
+    "method, left",
     [
         *((name, 2) for name in ("standard_heun", "fehlberg", "merson", "rk4")),
         *((name, 1) for name in ("false_euler", "semi_false_heun", "fehlberg_5")),
@@ -103,7 +175,7 @@ def test_control_leaves_coordinates_order_two_or_one(method: str, left: int) -> 
     assert (wrong["control"][0] < wrong["resetting"][0]) == (method == "false_euler")
 
 
-@pytest.mark.parametrize("control", KEPT.values(), ids=KEPT)
+@looped("control", KEPT.values())
 def test_energy_and_the_spin_about_the_vertical_stay(control: Any) -> None:
     """To the order of the method, or to that of the control, 2; the start is along the sphere, 0.8·0.15 = 0.6·0.2."""
     start: dict[str, Any] = {"v": [0.15, 0.6, 0.2], "y": [0.8, 0.0, -0.6]}
@@ -169,7 +241,7 @@ def test_the_limits_of_the_facts() -> None:
     assert not stays("rk4", 2.78, 10.0, 0.01)  # an error near 1 in a thousand is already too large for the linear limit
 
 
-@pytest.mark.parametrize("method", STEPPED)
+@looped("method", STEPPED)
 def test_every_method_has_the_limit_of_its_damped_oscillator(method: str) -> None:
     """From both sides, for a swing so small and a step so short that the rod's error is that of a linear oscillator.
 
@@ -189,7 +261,7 @@ def test_a_wide_swing_has_a_lower_limit() -> None:
     assert stays("rk4", 2.70, 90.0, 0.001)
 
 
-@pytest.mark.parametrize("method", ["false_euler", "rk4"])
+@looped("method", ["false_euler", "rk4"])
 def test_a_rod_of_a_wrong_length_returns(method: str) -> None:
     """From 1 % too long, at rest hanging: C = C₀(1 + αt)e^(−αt), with α = c/h; after 40 units of αt nothing is left."""
     for c in (0.1, 0.5):
@@ -230,7 +302,7 @@ def test_control_against_resetting() -> None:
 # ---- resetting
 
 
-@pytest.mark.parametrize("name", ["pendulum", "two", "three", "triangle"])
+@looped("name", ["pendulum", "two", "three", "triangle"])
 def test_resetting_is_exact(name: str) -> None:
     """Lengths and Ċ to rounding, from errors of the length of a step that is far too long."""
     system, y = {
@@ -299,7 +371,7 @@ def test_two_rods_are_the_double_pendulum() -> None:
     assert apart_from_angles() < 1e-9
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 5])
+@looped("n", [1, 2, 3, 5])
 def test_small_swings_of_a_chain(n: int) -> None:
     """n equal rods and masses swing at √(g/l·x), x a zero of Laguerre's polynomial of degree n: for two 2 ± √2."""
     chain = sw.Rods(np.ones(n), [((0.0, 0.0), 0), *((i, i + 1) for i in range(n - 1))], 0.5, gravity=2.0)
@@ -311,7 +383,7 @@ def test_small_swings_of_a_chain(n: int) -> None:
     np.testing.assert_allclose(frequencies, known, rtol=1e-9)
 
 
-@pytest.mark.parametrize("control", KEPT.values(), ids=KEPT)
+@looped("control", KEPT.values())
 def test_the_energy_of_a_triple_pendulum_stays_to_the_order(control: Any) -> None:
     lost = []
     for steps in (400, 800):
@@ -356,44 +428,20 @@ def test_a_gain_and_masses_of_each_member_equal_single_runs() -> None:
     """c, masses, lengths and gravity over the batch, each member alone, with either backend."""
     rng = np.random.default_rng(2)
     c, masses, lengths = rng.uniform(0.0, 0.7, 7), rng.uniform(0.5, 2.0, (2, 7)), rng.uniform(0.9, 1.1, (2, 7))
-    gravity = rng.uniform(0.5, 2.0, 7)
-    ends = [((0.0, 0.0), 0), (0, 1)]
+    gravity, ends, y = rng.uniform(0.5, 2.0, 7), [((0.0, 0.0), 0), (0, 1)], hanging(1.0, 2.0)
     options: dict[str, Any] = {"v": 0.0, "dt": 0.01, "steps": 60, "every": 20, "record": ["length_error", "energy"]}
-    y = np.repeat(hanging(1.0, 2.0)[..., None], 7, axis=-1)
-    whole = sw.integrate(
-        sw.Rods(masses, ends, lengths, gravity=gravity), "rk4", y=y, **options, control=sw.LengthControl(c), threads=2
-    )
+    rods, starts = sw.Rods(masses, ends, lengths, gravity=gravity), np.repeat(y[..., None], 7, axis=-1)
+    whole = sw.integrate(rods, "rk4", y=starts, **options, control=sw.LengthControl(c), threads=2)
     for i in range(7):
         alone = sw.Rods(masses[:, i], ends, lengths[:, i], gravity=gravity[i])
         for backend in ("rust", "numpy"):
-            run = sw.integrate(alone, "rk4", y=y[..., i], **options, control=sw.LengthControl(c[i]), backend=backend)
-            np.testing.assert_array_equal(run.y, whole.y[..., i])
+            run = sw.integrate(alone, "rk4", y=y, **options, control=sw.LengthControl(c[i]), backend=backend)
+            assert_same_run(run, whole, i)
             for name, values in run.recorded.items():
-                np.testing.assert_array_equal(values, whole.recorded[name][..., i])
                 np.testing.assert_array_equal(values, run.quantity(name))
 
 
-@pytest.mark.parametrize("control", [CONTROL, RESETTING], ids=repr)
-def test_a_world_and_pieces_are_the_run(control: Any) -> None:
-    y = hanging(1.0, 2.0)
-    whole = sw.integrate(TWO, "rk4", v=0.0, y=y, dt=0.01, steps=30, every=1, control=control, backend="numpy")
-    first = sw.integrate(TWO, "rk4", v=0.0, y=y, dt=0.01, steps=12, control=control)
-    rest = sw.integrate(TWO, "rk4", resume=first, steps=18)
-    np.testing.assert_array_equal(rest.y[-1], whole.y[-1])
-    world = sw.World(TWO, "rk4", v=np.zeros((2, 2)), y=y.copy(), dt=0.01, control=control)
-    world.step(12)
-    on = sw.World(TWO, "rk4", dt=0.01, resume=world)
-    on.step(18)
-    np.testing.assert_array_equal(on.y, whole.y[-1])
-    assert repr(control) in repr(on.system)
-    fused = [
-        sw.integrate(TWO, "rk4", v=0.0, y=y, dt=0.01, steps=30, control=control, fused=True, backend=b) for b in ("rust", "numpy")
-    ]
-    assert_same(*fused)
-    assert not np.array_equal(fused[0].y[-1], whole.y[-1])
-
-
-@pytest.mark.parametrize("control", [CONTROL, RESETTING], ids=repr)
+@looped("control", [CONTROL, RESETTING])
 def test_an_exported_step_and_its_explanation_have_the_control(control: Any) -> None:
     """Without a state, which neither needs; the numbers of a step in plain Python are those of the run."""
     scope: dict[str, Any] = {}
@@ -426,3 +474,207 @@ def test_a_long_chain_has_no_term_too_many() -> None:
         ]
         assert_same(*runs)
         assert runs[0].recorded["length_error"][-1] < (1e-14 if control is RESETTING else 1e-3)
+
+
+# ---- what is refused, and what is doubted
+
+
+@looped(
+    "make, error, message",
+    [
+        (lambda: sw.Rods([1.0], [], 1.0), ArgumentError, "rods: expected 1 to 100, got 0"),
+        (lambda: sw.Rods([1.0, 1.0], [(0, 2)], 1.0), ArgumentError, r"rods\[0\]\[1\]: expected a point, 0 to 1, .*, got 2"),
+        (lambda: sw.Rods([1.0, 1.0], [(0, -1)], 1.0), ArgumentError, "expected a point, 0 to 1, .*, got -1"),
+        (lambda: sw.Rods([1.0, 1.0], [(0, True)], 1.0), ArgumentError, "expected a point, 0 to 1, .*, got True"),
+        (lambda: sw.Rods([1.0, 1.0], [(0, "b")], 1.0), DTypeError, "expected a point, 0 to 1, .*, got 'b'"),
+        (lambda: sw.Rods([1.0, 1.0], [(0, 0)], 1.0), ArgumentError, "expected two different points, got 0 twice"),
+        (lambda: sw.Rods([1.0, 1.0], [(0, 1), (1, 0)], 1.0), ArgumentError, r"rods\[1\]: expected each rod once"),
+        (lambda: sw.Rods([1.0, 1.0], [(0, 1, 2)], 1.0), ShapeError, "expected two ends, got 3"),
+        (lambda: sw.Rods([1.0, 1.0], [0, 1], 1.0), DTypeError, r"rods\[0\]: expected a list of two ends"),
+        (lambda: sw.Rods([1.0, 1.0], 7, 1.0), DTypeError, "rods: expected a list of pairs of ends"),
+        (lambda: sw.Rods([1.0], [((0, 0), (1, 1))], 1.0), ArgumentError, "expected a point at one end, got two anchors"),
+        (lambda: sw.Rods([1.0], [((0, 0, 0, 0), 0)], 1.0), ShapeError, "expected an anchor of 2 or 3 coordinates"),
+        (lambda: sw.Rods([1.0], [((0, math.nan), 0)], 1.0), NotFiniteError, r"rods\[0\]\[0\]: expected finite"),
+        (
+            lambda: sw.Rods([1.0], [((0, 0), 0)], 1.0, dim=3),
+            ShapeError,
+            "rods, dim: expected one number of dimensions, got 2 and 3",
+        ),
+        (lambda: sw.Rods([1.0, 1.0], [((0, 0), 0)], 1.0), ArgumentError, "every point at the end of one, got none for point 1"),
+        (lambda: sw.Rods([1.0], [((0, 0), 0)], 0.0), ArgumentError, "lengths: expected numbers above zero"),
+        (lambda: sw.Rods([1.0], [((0, 0), 0)], [1.0, 1.0]), ShapeError, "lengths: expected one for each of 1 rods"),
+        (lambda: sw.Rods([0.0], [((0, 0), 0)], 1.0), ArgumentError, "masses: expected numbers above zero"),
+        (lambda: sw.Rods(1.0, [((0, 0), 0)], 1.0), ShapeError, "masses: expected one for each point"),
+        (
+            lambda: sw.Rods([1.0], [((0, 0), 0), ((1, 0), 0), ((0, 1), 0)], 1.0),
+            ArgumentError,
+            "rods: expected at most as many as coordinates, 2, got 3",
+        ),
+        (lambda: sw.Rods(np.ones(102), [(i, i + 1) for i in range(101)], 1.0), ArgumentError, "rods: expected 1 to 100, got 101"),
+        (lambda: sw.Pendulum3D(0.0), ArgumentError, "length: expected numbers above zero"),
+        (lambda: sw.Pendulum3D(1.0, [math.inf]), NotFiniteError, "gravity"),
+    ],
+)
+def test_wrong_rods_are_refused(make: Callable[[], Any], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        make()
+
+
+@looped(
+    "system, y, message",
+    [
+        (TWO, np.zeros((2, 2)), r"y: expected the ends of each rod apart, got those of the rod \(\(0.0, 0.0\), 0\)"),
+        (TWO, np.ones((2, 2)), r"got those of the rod \(0, 1\) in one place"),
+        (TWO, np.ones((2, 3)), r": expected shape \(2, 2, batch…\)"),
+        (TWO, np.ones(2), r": expected shape \(2, 2, batch…\)"),
+        (sw.Pendulum3D(), np.zeros(3), "y: expected the mass away from the origin"),
+        (sw.Pendulum3D(), np.ones(2), r"y: expected shape \(3, batch…\)"),
+        (
+            sw.Rods(np.ones(4), [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2), (1, 3)], 1.0),
+            np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
+            r"rods: expected each to restrict the motion, but at the start the rod \(1, 3\) adds nothing",
+        ),
+        (sw.Rods([1.0], [((-1.0, 0.0), 0), ((1.0, 0.0), 0)], 1.0), np.zeros((1, 2)), "restrict the motion"),
+    ],
+)
+def test_starts_without_a_solution_are_refused_before_any_work(system: sw.System, y: Any, message: str) -> None:
+    for call in (
+        lambda: sw.integrate(system, "rk4", v=0.0, y=y, dt=0.1, steps=1),
+        lambda: sw.World(system, "rk4", v=np.zeros(y.shape), y=y.copy(), dt=0.1),
+    ):
+        with pytest.raises(ArgumentError, match=message):
+            call()
+
+
+def test_a_rod_of_a_wrong_length_is_doubted() -> None:
+    """Without control it stays as it started; control returns it, and then nothing is to be said."""
+    start: dict[str, Any] = {"v": 0.0, "y": [0.0, 0.5, -1.2], "dt": 0.01, "steps": 1000}
+    with pytest.warns(sw.AccuracyWarning, match=r"a rod is 30 % off its length in a saved state"):
+        run = sw.integrate(sw.Pendulum3D(), "rk4", **start)
+    assert np.sqrt((run.y[-1] ** 2).sum()) == pytest.approx(1.3, rel=1e-8)
+    for control in (CONTROL, RESETTING):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            sw.integrate(sw.Pendulum3D(), "rk4", **start, control=control)
+    with pytest.warns(sw.AccuracyWarning, match=r"a rod is 50 % off"):
+        sw.integrate(TWO, "rk4", v=0.0, y=[[0.0, -1.0], [0.0, -1.5]], dt=0.01, steps=2)
+
+
+def test_controls_go_with_what_they_keep() -> None:
+    with pytest.raises(UnsupportedError, match="has no such constraint"):
+        sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=CONTROL)
+    with pytest.raises(UnsupportedError, match=r"NormControl.* keeps a norm"):
+        sw.integrate(TWO, "rk4", v=0.0, y=hanging(1.0, 2.0), dt=0.1, steps=1, control=sw.NormControl(1.0))
+    for control in (sw.EnergyControl(0.1), sw.Projection("nacozy")):
+        with pytest.raises(UnsupportedError, match="has no energy control"):
+            sw.integrate(TWO, "rk4", v=0.0, y=hanging(1.0, 2.0), dt=0.1, steps=1, control=control)
+
+
+def test_they_say_what_they_are() -> None:
+    assert repr(sw.Pendulum3D(2.0)) == "Pendulum3D(length=2.0, gravity=1.0)"
+    assert repr(TWO) == "Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], gravity=1.0)"
+    assert repr(TWO.under(CONTROL, ())).endswith("LengthControl(0.5))")
+    assert not TWO.has_loops
+    assert sw.Rods([1.0], [(0, (1, 2))], 1.0).anchors == ((1.0, 2.0),)
+
+
+# ---- mistakes that must be noticed
+
+
+#: Module, what to replace, by what, and what kind of mistake it is.
+MUTANTS = [
+    (rods, "self.fall * d[k][-1]", "self.fall * d[k][0]", "gravity along the wrong axis"),
+    (rods, "pull = pull - self.fall", "pull = pull + self.fall", "a wrong sign of the weight"),
+    (rods, "push[-1:] - self.fall", "push[-1:]", "no weight"),
+    (rods, "self.minus[b] if b == first", "self.inverse[b] if b == first", "a wrong sign where rods meet"),
+    (rods, "return self.minus[a]", "return self.inverse[a]", "a wrong sign where rods follow each other"),
+    (rods, "self.inverse[b] + self.inverse[a] if", "self.inverse[b] if", "the mass of one end only"),
+    (rods, "pull = self.h * dot(u[k], u[k])", "pull = self.h * dot(v[0], v[0])", "the wrong velocity"),
+    (rods, "sums[a] - along", "sums[a] + along", "a pull the wrong way"),
+    (rods, "2.0 * strength, 0.5 *", "strength, 0.5 *", "half the damping"),
+    (rods, "0.5 * ((strength", "1.0 * ((strength", "twice the stiffness"),
+    (rods, "off = [0.5 * (", "off = [1.0 * (", "corrections twice as large"),
+    (
+        rods,
+        "for k, (first, _) in enumerate(self.rods):",
+        "for k, first in ((k, 0) for k in range(len(self.rods))):",
+        "no anchors",
+    ),
+    (pendulum_3d, "- self.fall * y[2]", "+ self.fall * y[2]", "a wrong sign of the weight"),
+    (pendulum_3d, "(pull / square) * y", "(pull / self.square) * y", "the length that it should have"),
+    (pendulum_3d, "2.0 * strength, 0.5 *", "strength, 0.5 *", "half the damping"),
+    (pendulum_3d, "0.5 * ((strength", "1.0 * ((strength", "twice the stiffness"),
+    (pendulum_3d, "dot(y, v) / self.square", "dot(y, v)", "a length forgotten"),
+]
+IDS = [f"{module.__name__.rpartition('.')[2]}: {mistake}" for module, _, _, mistake in MUTANTS]
+
+
+def equal_to_the_core() -> bool:
+    try:
+        for name in SYSTEMS:
+            system = SYSTEMS[name](np.random.default_rng(1), 3)
+            if system.constraint != "length":
+                continue
+            rng = np.random.default_rng(2)
+            v, y = (rng.normal(size=(*shape, 3)) for shape in (system.v_shape, system.y_shape))
+            runs = [quiet(system, "rk4", v=v, y=y, dt=0.01, steps=3, backend=b) for b in ("rust", "numpy")]
+            assert_same(*runs)
+    except AssertionError:
+        return False
+    return True
+
+
+def true_by_the_reference() -> bool:
+    """The truths above, of the reference alone: angles, a free triangle, a control that decays, a cone, and lengths reset."""
+    if not apart_from_angles("numpy") < 1e-9:
+        return False
+    options: dict[str, Any] = {"dt": 0.01, "backend": "numpy"}
+    triangle = sw.Rods([1.0, 2.0, 0.5], [(0, 1), (1, 2), (2, 0)], 1.0, gravity=0.0)
+    v, y = np.array([[0.3, 0.1], [0.3, 0.9], [-0.4, 0.766]]), np.array([[0, 0], [1, 0], [0.5, 0.75**0.5]])
+    run = quiet(triangle, "rk4", v=v, y=y, steps=100, **options)
+    s = triangle.for_state_shapes(0.0, y).reference_at_step(0.01, ())
+    begun, off = (
+        [abs(float(rods.dot(d, u))) for d, u in zip(s.spans(places), s.closing(velocities), strict=True)]
+        for velocities, places in ((v, y), (run.v[-1], run.y[-1]))
+    )
+    if max(abs(a - b) for a, b in zip(off, begun, strict=True)) > 1e-6:  # C̈ = 0 keeps every Ċ
+        return False
+    start, turn = cone()
+    run = quiet(sw.Pendulum3D(), "rk4", **start, dt=turn / 400, steps=400, backend="numpy")
+    if not np.abs(run.y[-1] - start["y"]).max() < 1e-6:
+        return False
+    pendulums = [
+        (sw.Pendulum3D(2.0), np.array([0.0, 0.0, -2.02])),
+        (sw.Rods([2.0], [((0.0, 0.0), 0)], 2.0), np.array([[0.0, -2.02]])),
+    ]
+    for system, y in pendulums:
+        sideways = np.zeros(y.shape)
+        sideways[..., 0] = 0.7
+        run = quiet(system, "rk4", v=sideways, y=y, steps=300, **options)
+        if abs(np.sqrt((run.y[-1] ** 2).sum()) - 2.02) > 1e-6:  # C̈ = 0, so a rod that begins too long stays so
+            return False
+        run = quiet(system, "rk4", v=0.0, y=y, dt=1e-3, steps=10, backend="numpy", control=sw.LengthControl(0.1))
+        known = 0.5 * (2.02**2 - 4.0) * 2.0 * math.exp(-1.0)
+        if 0.5 * ((run.y[-1] ** 2).sum() - 4.0) != pytest.approx(known, rel=0.02):
+            return False
+        v = np.full(y.shape, 0.3)
+        run = quiet(system, "rk4", v=v, y=y, dt=1e-9, steps=1, backend="numpy", control=RESETTING)
+        if max(abs(np.sqrt((run.y[-1] ** 2).sum()) - 2.0), abs((run.y[-1] * run.v[-1]).sum())) > 1e-12:
+            return False
+    return True
+
+
+@pytest.mark.mutant
+@pytest.mark.parametrize(("module", "old", "new", "mistake"), MUTANTS, ids=IDS)
+def test_mistakes_are_noticed(module: Any, old: str, new: str, mistake: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the comparison with the core, and by truths even if both languages had the same mistake."""
+    public = sw.Rods if module is rods else sw.Pendulum3D
+    monkeypatch.setattr(public, "reference", getattr(mistaken(module, old, new), public.__name__))
+    assert not equal_to_the_core()
+    assert not true_by_the_reference()
+
+
+@pytest.mark.mutant
+def test_without_a_mistake_nothing_is_noticed() -> None:
+    assert equal_to_the_core()
+    assert true_by_the_reference()

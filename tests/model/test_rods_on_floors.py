@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -13,26 +12,37 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.reference import joined, rod_contact
 from support import rod_contacts
-from support.cases import assert_same
+from support.families import family
+from support.looped import looped
+from support.mistakes import mistaken
 from support.rod_contacts import METHODS, RESETTING, ROUNDING, G, dumb_bell, tilted
+from support.ways import assert_equal_ways
 
 KEPT = {"free": None, "control": sw.LengthControl(0.5), "resetting": RESETTING}
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("check", rod_contacts.ALL)
+@looped("method", METHODS)
 def test_it_holds(method: str, check: str) -> None:
     rod_contacts.ALL[check](method)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("control", KEPT)
-@pytest.mark.parametrize("friction", [None, 0.4])
-def test_no_contact_adds_energy(method: str, control: str, friction: float | None) -> None:
-    rod_contacts.adds_no_energy(method, control=KEPT[control], friction=friction)
+#: Each method with two of the controls and frictions, and Runge-Kutta 4 with all.
+ALL_KEPT = list(itertools.product(KEPT.values(), [None, 0.4]))
+TURNS = itertools.chain(
+    zip(METHODS, itertools.cycle(ALL_KEPT), strict=False),
+    zip(METHODS, itertools.cycle(ALL_KEPT[::-1]), strict=False),
+    [("rk4", kept) for kept in ALL_KEPT],
+)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@looped("method, kept", TURNS, long=itertools.product(METHODS, ALL_KEPT))
+def test_no_contact_adds_energy(method: str, kept: tuple[Any, float | None]) -> None:
+    control, friction = kept
+    rod_contacts.adds_no_energy(method, control=control, friction=friction)
+
+
+@pytest.mark.parametrize("method", family(METHODS, lambda method: method in ("standard_euler", "rk4", "linearly_implicit_euler")))
 def test_bowls_and_balls_add_no_energy(method: str) -> None:
     """Over 300 steps in which points slide, stick and bounce, in a plane and in space; a contact of two points among them."""
     rng = np.random.default_rng(2)
@@ -71,7 +81,7 @@ def test_the_loss_of_an_elastic_impact_is_of_second_order() -> None:
         assert lost.max() <= (h * turning) ** 2 * run.energy.max()
 
 
-@pytest.mark.parametrize(("method", "order"), [("false_euler", 1), ("standard_heun", 3), ("rk4", 4), ("dop853", 4)])
+@looped("method, order", [("false_euler", 1), ("standard_heun", 3), ("rk4", 4), ("dop853", 4)])
 def test_an_end_that_slides_on_a_smooth_floor_leaves_the_order(method: str, order: int) -> None:
     """Up to 4: the energy that a toppling dumb-bell loses; Heun's is wrong by one order less than its places.
 
@@ -127,23 +137,14 @@ def rope(n: int, dim: int) -> tuple[sw.Rods, Any]:
     return sw.Rods(np.ones(n), [(i, i + 1) for i in range(n - 1)], lengths, gravity=G, floor=floor), y
 
 
-@pytest.mark.parametrize("method", ["false_euler", "rk4"])
-@pytest.mark.parametrize(("n", "dim"), [(3, 2), (7, 3)])
-def test_large_and_small_a_world_and_a_run_in_pieces(method: str, n: int, dim: int) -> None:
-    """Seven points in space with friction are a large system, resolved member by member; bits are the same everywhere."""
-    rods, y = rope(n, dim)
-    arguments: dict[str, Any] = {"v": 0.0, "dt": 1 / 60, "control": RESETTING}
-    whole = sw.integrate(rods, method, y=y, steps=60, every=10, **arguments)
-    assert_same(whole, sw.integrate(rods, method, y=y, steps=60, every=10, **arguments, backend="numpy"))
-    many = sw.integrate(rods, method, y=np.repeat(y[..., np.newaxis], 5, axis=-1), steps=60, every=10, **arguments, threads=2)
-    assert np.array_equal(many.y[..., 3], whole.y)
-    half = sw.integrate(rods, method, y=y, steps=20, **arguments)
-    rest = sw.integrate(rods, method, resume=half, steps=40)
-    assert np.array_equal(rest.y[-1], whole.y[-1])
-    world = sw.World(rods, method, v=np.zeros(y.shape), y=y.copy(), dt=1 / 60, control=RESETTING)
-    for _ in range(6):
-        world.step(10)
-    assert np.array_equal(world.y, whole.y[-1])
+@looped("method", ["false_euler", "rk4"])
+def test_a_large_system_has_the_same_bits_in_every_way(method: str) -> None:
+    """Seven points in space with friction are one, resolved member by member."""
+    rods, y = rope(7, 3)
+    v = np.random.default_rng(7).normal(0.0, 0.1, (3, 5)) + np.zeros((7, 1, 1))
+    options: dict[str, Any] = {"dt": 1 / 60, "steps": 30, "every": 10, "control": RESETTING}
+    ways = ("by the reference", "alone", "in company", "in pieces", "in a world")
+    assert_equal_ways(rods, method, v=v, y=y[..., np.newaxis] + np.zeros(5), **options, ways=ways)
 
 
 def test_a_rope_falls_on_a_ball_and_a_floor_and_rests() -> None:
@@ -233,12 +234,9 @@ MISTAKES = [
 def changed(old: str, new: str) -> dict[str, Any]:
     """The names of the module in which this stands once, with a change in its text."""
     for module in (rod_contact, joined):
-        source = Path(str(module.__file__)).read_text(encoding="utf-8")
-        if source.count(old) == 1:
-            wrong = ModuleType(module.__name__)
-            wrong.__package__ = "stepwell.reference"
-            exec(compile(source.replace(old, new), "contact of rods with a mistake", "exec"), vars(wrong))
-            return {name: vars(wrong)[name] for name in ("RodContacts", "Joined", "added", "groups") if name in vars(wrong)}
+        if Path(str(module.__file__)).read_text(encoding="utf-8").count(old) == 1:
+            wrong = vars(mistaken(module, old, new))
+            return {name: wrong[name] for name in ("RodContacts", "Joined", "added", "groups") if name in wrong}
     pytest.fail(f"the text is not there, or more than once: {old}")
 
 
@@ -274,5 +272,6 @@ def test_a_mistake_is_noticed(old: str, new: str, monkeypatch: Any) -> None:
     assert is_noticed()
 
 
+@pytest.mark.mutant
 def test_nothing_is_noticed_without_a_mistake() -> None:
     assert not is_noticed()
