@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import warnings
 from typing import Any
 
@@ -11,9 +12,11 @@ import pytest
 import stepwell as sw
 from stepwell.errors import UnsupportedError
 from support.cases import assert_same
+from support.looped import looped
+from support.ways import assert_equal_ways
 
 QUANTITIES = ("energy", "momentum", "angular_momentum", "closest")
-CONTROLS = (None, sw.EnergyControl(0.7, "limited", target=0.1), sw.Projection("nacozy", target=0.1), sw.Projection(target=0.1))
+CONTROLS = (sw.EnergyControl(0.7, "limited", target=0.1), sw.Projection("nacozy", target=0.1), sw.Projection(target=0.1))
 #: Where bodies with mass may stand among the others: which of so many.
 PLACES = {
     "first": lambda n, massive: np.arange(massive),
@@ -31,70 +34,56 @@ def bodies(n: int, massive: int, place: str = "mixed", dim: int = 3, force: Any 
     return system, 0.3 * rng.normal(size=(n, dim)), rng.normal(size=(n, dim))
 
 
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize(
-    ("n", "massive"), [(1, 0), (2, 1), (3, 2), (5, 0), (9, 1), (12, 9), (40, 3), (67, 0), (67, 1), (100, 66), (1300, 5)]
-)
-def test_equal_to_the_reference(n: int, massive: int, place: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tapes and the kernel of many bodies, under every control, with all that can be recorded, at every CPU level."""
-    for i, (force, dim) in enumerate([("newton", 3), ("logarithmic", 2), ("printed", 3)]):
+NUMBERS = [(1, 0), (2, 1), (3, 2), (5, 0), (9, 1), (12, 9), (40, 3), (67, 0), (67, 1), (100, 66), (1300, 5)]
+FORCES = [("newton", 3, "leapfrog"), ("logarithmic", 2, "rk4"), ("printed", 3, "verlet")]
+
+
+@pytest.mark.parametrize("level", sw.isa_levels())
+def test_equal_to_the_reference(level: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tapes and the kernel of many bodies, with all that can be recorded; forces and controls take turns."""
+    monkeypatch.setenv("STEPWELL_KERNELS", level)
+    for i, ((n, massive), place) in enumerate(itertools.product(NUMBERS, PLACES)):
+        force, dim, method = FORCES[(i + i // 3) % 3]
         system, v, y = bodies(n, massive, place, dim, force)
-        for control in CONTROLS if massive else CONTROLS[:1]:
-            method = "false_euler" if control is not None else ("leapfrog", "rk4", "verlet")[i]
+        for control in (None, CONTROLS[i % 3]) if massive else (None,):
             ask: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 4, "every": 2, "control": control, "record": QUANTITIES}
-            reference = sw.integrate(system, method, **ask, backend="numpy")
+            core, reference = (
+                sw.integrate(system, method if control is None else "false_euler", **ask, backend=backend)
+                for backend in ("rust", "numpy")
+            )
             assert np.isfinite(reference.y).all()
-            for level in sw.isa_levels():
-                monkeypatch.setenv("STEPWELL_KERNELS", level)
-                core = sw.integrate(system, method, **ask)
-                assert_same(core, reference)
-                for name in QUANTITIES:
-                    np.testing.assert_array_equal(core.recorded[name], reference.recorded[name])
+            assert_same(core, reference)
+            for name in QUANTITIES:
+                np.testing.assert_array_equal(core.recorded[name], reference.recorded[name], err_msg=f"{n}, {massive}, {place}")
 
 
-@pytest.mark.parametrize("n", [6, 45])
-def test_equal_to_the_reference_with_every_option(n: int) -> None:
-    """In batches, with a force, fused, in float32, by chosen steps, and in pieces; in a world, too."""
-    system, v, y = bodies(n, 3)
-    rng = np.random.default_rng(n)
-    many = {"v": np.repeat(v[..., np.newaxis], 5, axis=-1), "y": y[..., np.newaxis] + 0.1 * rng.normal(size=(n, 3, 5))}
-    steps: dict[str, Any] = {"dt": 0.01, "steps": 6}
-    one: dict[str, Any] = {"v": v, "y": y}
-    calls: list[dict[str, Any]] = [
-        many | steps,
-        one | steps | {"force": rng.normal(size=(n, 3))},
-        one | steps | {"fused": True},
-        many | steps | {"dtype": "float32"},
-        one | {"tolerance": 1e-8, "at": [0.1, 0.3]},
-        many | {"tolerance": 1e-8, "at": [0.1, 0.3]},
-    ]
-    for call in calls:
-        method = "dop853" if "tolerance" in call else "leapfrog"
-        assert_same(*(sw.integrate(system, method, **call, backend=backend) for backend in ("rust", "numpy")))
-    whole = sw.integrate(system, "leapfrog", **one, **steps)
-    rest = sw.integrate(system, "leapfrog", dt=0.01, steps=4, resume=sw.integrate(system, "leapfrog", **one, dt=0.01, steps=2))
-    world = sw.World(system, "leapfrog", v=v.copy(), y=y.copy(), dt=0.01)
-    world.step(6)
-    np.testing.assert_array_equal(rest.y, whole.y)
-    np.testing.assert_array_equal(world.y, whole.y[-1])
+def test_the_same_bits_in_every_way() -> None:
+    system, v, y = bodies(45, 3)
+    rng = np.random.default_rng(45)
+    many = {"v": np.repeat(v[..., np.newaxis], 5, axis=-1), "y": y[..., np.newaxis] + 0.1 * rng.normal(size=(45, 3, 5))}
+    ways = ("by the reference", "alone", "in pieces", "in a world")
+    for options in ({"force": rng.normal(size=(45, 3, 5))}, {"fused": True}, {"dtype": "float32"}):
+        assert_equal_ways(system, "leapfrog", **many, dt=0.01, steps=6, **options, ways=ways)
+    assert_equal_ways(system, "dop853", **many, tolerance=1e-6, at=np.array([0.1, 0.2]), ways=ways[:3])
     floored = sw.NBody(system.masses, force="newton", softening=0.1, floor=sw.Floor(offset=-1.0), dim=3)
-    assert_same(*(sw.integrate(floored, "false_euler", **one, **steps, backend=backend) for backend in ("rust", "numpy")))
+    assert_equal_ways(floored, "false_euler", **many, dt=0.01, steps=6, ways=ways)
 
 
-@pytest.mark.parametrize("threads", [1, 2, 3, 7])
-def test_threads_share_them(threads: int) -> None:
+def test_threads_share_them() -> None:
     """Pairs enough for threads: with many of either kind, and of both."""
     for n, massive in [(70_000, 8), (1500, 1100)]:
         system, v, y = bodies(n, massive)
-        runs = [sw.integrate(system, "leapfrog", v=v, y=y, dt=0.01, steps=2, threads=k) for k in (1, threads)]
-        assert_same(*runs)
-    assert_same(runs[0], sw.integrate(system, "leapfrog", v=v, y=y, dt=0.01, steps=2, backend="numpy"))
+        ask: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 2}
+        run = sw.integrate(system, "leapfrog", **ask, threads=1)
+        for threads in (2, 3, 7):
+            assert_same(run, sw.integrate(system, "leapfrog", **ask, threads=threads))
+    assert_same(run, sw.integrate(system, "leapfrog", **ask, backend="numpy"))
 
 
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize(("n", "massive"), [(4, 2), (7, 3), (80, 5), (120, 70)])
-def test_no_body_notices_them(n: int, massive: int, place: str) -> None:
+@looped("numbers, place", itertools.product([(4, 2), (7, 3), (80, 5), (120, 70)], PLACES))
+def test_no_body_notices_them(numbers: tuple[int, int], place: str) -> None:
     """To the bit: those with mass go as they do alone, with their energy, and each of the others as if alone with those."""
+    n, massive = numbers
     system, v, y = bodies(n, massive, place)
     ask: dict[str, Any] = {"dt": 0.01, "steps": 20, "every": 5, "record": QUANTITIES[:3]}
     run = sw.integrate(system, "leapfrog", v=v, y=y, **ask)
@@ -126,7 +115,7 @@ def test_a_little_mass_makes_a_little_difference() -> None:
     np.testing.assert_allclose(run.y, other.y, rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize("n", [4, 50])
+@looped("n", [4, 50])
 def test_two_of_them_in_one_place(n: int) -> None:
     """Without softening, where a body with mass in the place of another makes numbers that are not finite."""
     rng = np.random.default_rng(n)
@@ -209,7 +198,7 @@ def test_masses_of_each_member_decide_no_operations() -> None:
 def test_sweeps_over_masses_that_begin_at_zero() -> None:
     pytest.importorskip("xarray")
     y, v = [[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]], [[0.0, 0.0], [0.0, 1.0], [0.7, 0.0]]
-    found = [
+    datasets = [
         sw.sweep(
             lambda mass: sw.NBody(np.stack(np.broadcast_arrays(1.0, mass, 0.0)), force="newton"),
             {"mass": np.linspace(0.0, 0.1, 5)},
@@ -222,9 +211,8 @@ def test_sweeps_over_masses_that_begin_at_zero() -> None:
         )
         for chunk in (1, 2, 5)
     ]
-    assert found[0].attrs["bits"] == found[1].attrs["bits"] == found[2].attrs["bits"]
-    for other in found[1:]:
-        assert other.equals(found[0])
+    assert len({dataset.attrs["bits"] for dataset in datasets}) == 1
+    assert all(dataset.equals(datasets[0]) for dataset in datasets[1:])
 
 
 def test_masses_that_a_world_is_given() -> None:

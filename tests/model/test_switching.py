@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pickle
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -11,6 +11,8 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ToleranceWarning
 from stepwell.model.equations import switching
+from support.looped import looped
+from support.ways import WAYS, assert_equal_ways
 
 PAIRS = ["merson", "fehlberg", "fehlberg_5", "dop853"]
 
@@ -54,14 +56,14 @@ SOLVED: dict[str, tuple[Callable[..., Any], list[float]]] = {
 }
 
 
-@pytest.mark.parametrize("what", SOLVED)
+@looped("what", SOLVED)
 def test_times_are_solved(what: str) -> None:
     """To the roundings of the time, and of what is computed of it on the way: the comparison itself switches there."""
     function, expected = SOLVED[what]
     assert np.unique(times_of(function)) == pytest.approx(expected, rel=1e-15, abs=1e-15)
 
 
-@pytest.mark.parametrize("what", [each for each, (_, times) in SOLVED.items() if times and "middle" not in each])
+@looped("what", [each for each, (_, times) in SOLVED.items() if times and "middle" not in each])
 def test_rates_switch_there(what: str) -> None:
     """A time that is solved is one at which another piece is taken, or a kink: both one-sided slopes or values differ."""
     function = SOLVED[what][0]
@@ -105,7 +107,7 @@ def solution(t: Any, a: Any, w: Any) -> Any:
     return np.exp(-t) + 20.0 * -np.expm1(-lasted) * np.exp(-np.maximum(t - a - w, 0.0))
 
 
-@pytest.mark.parametrize("method", PAIRS)
+@looped("method", PAIRS)
 def test_no_pulse_is_missed(method: str) -> None:
     """However short, and however far a state that is nearly at rest lets steps go.
 
@@ -137,8 +139,7 @@ SMOOTH: dict[str, tuple[Callable[..., Any], float]] = {
 }
 
 
-@pytest.mark.parametrize("method", PAIRS)
-@pytest.mark.parametrize("what", SMOOTH)
+@looped("what, method", itertools.product(SMOOTH, PAIRS[::3]), long=itertools.product(SMOOTH, PAIRS[1:3]))
 def test_no_smooth_push_is_missed(what: str, method: str) -> None:
     """Of a width w, y becomes ∫f dt·(1 + O(w)) at its end, and decays by less than 1 % in the 40 w that pass until then.
 
@@ -150,7 +151,7 @@ def test_no_smooth_push_is_missed(what: str, method: str) -> None:
     assert run.y[0] / (integral * w) == pytest.approx(np.exp(-30 * w) * np.ones(m.shape), rel=0.1)
 
 
-@pytest.mark.parametrize("method", PAIRS)
+@looped("method", PAIRS)
 def test_a_state_that_grows_out_of_zero(method: str) -> None:
     """Through the smallest numbers there are, of few bits: it is not held up there by errors that are roundings.
 
@@ -170,7 +171,7 @@ def test_a_stop_at_the_smallest_numbers_is_told() -> None:
         sw.integrate(sw.system(order=1)(lambda t, y: -y)(), "merson", y=1e-318, tolerance=1e-6, at=[100.0], max_steps=3)
 
 
-@pytest.mark.parametrize("method", PAIRS)
+@looped("method", PAIRS)
 def test_an_excitable_cell_is_pulsed_at_its_equilibrium(method: str) -> None:
     """FitzHugh and Nagumo's equations from where nothing moves, with a push from 60 to 66: as with its jumps given."""
 
@@ -186,23 +187,19 @@ def test_an_excitable_cell_is_pulsed_at_its_equilibrium(method: str) -> None:
     assert run.y[0, 0] > -0.9
 
 
-@pytest.mark.parametrize("method", PAIRS)
-def test_one_number_for_all_ways(method: str) -> None:
-    """Alone, in a batch, by NumPy, in pieces and out of a file that is pickled: the same bits."""
-    a, w, at = np.array([50.0, 51.9, 20.0]), np.array([[0.3], [0.01]]), [10.0, 49.0, 50.1, 52.0]
-    run = sw.integrate(pulsed(a=a, w=w), method, y=1.0, tolerance=1e-7, at=at)
-    assert np.array_equal(sw.integrate(pulsed(a=a, w=w), method, y=1.0, tolerance=1e-7, at=at, backend="numpy").y, run.y)
-    for i, j in np.ndindex(2, 3):
-        alone = pulsed(a=a[j], w=w[i, 0])
-        assert np.array_equal(sw.integrate(alone, method, y=1.0, tolerance=1e-7, at=at).y, run.y[:, i, j])
-        for cut in (1, 2, 3):
-            first = sw.integrate(alone, method, y=1.0, tolerance=1e-7, at=at[:cut])
-            assert np.array_equal(sw.integrate(alone, method, at=at[cut:], resume=first).y, run.y[cut:, i, j])
-    again = pickle.loads(pickle.dumps(pulsed(a=a, w=w)))
-    assert np.array_equal(sw.integrate(again, method, y=1.0, tolerance=1e-7, at=at).y, run.y)
+@looped("method", PAIRS[::3])
+def test_the_same_bits_in_every_way(method: str) -> None:
+    a, w = np.array([50.0, 51.9, 20.0, 20.0, 50.0]), np.array([0.3, 0.01, 0.01, 0.3, 0.01])
+    options: dict[str, Any] = {
+        "v": np.zeros((0, 5)),
+        "y": np.ones(5),
+        "tolerance": 1e-7,
+        "at": np.array([10.0, 49.0, 50.1, 52.0]),
+    }
+    assert_equal_ways(pulsed(a=a, w=w), method, **options, ways=[way for way in WAYS if way != "in a world"])
 
 
-@pytest.mark.parametrize("method", PAIRS)
+@looped("method", PAIRS)
 def test_periodic_pulses_in_pieces(method: str) -> None:
     """A run that ends goes on to switches that lay beyond its end: the next of them was its wall already."""
 

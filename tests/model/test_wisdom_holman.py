@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.reference import corrector, kepler
+from support.looped import looped
 from support.mistakes import mistaken
+from support.ways import assert_equal_ways
 
 #: The unit roundoff.
 U = 2.0**-53
@@ -67,15 +69,15 @@ def follows_kepler(moved: Any) -> bool:
         true_v, true_y = sw.orbits.state(mu, t=before + h, **shape)
         with np.errstate(all="ignore"):
             dv, dy = moved(mu, h, v.T, y.T)
-        made = np.isfinite(dy).all(axis=1) & np.isfinite(dv).all(axis=1)
-        if made.mean() < at_least:
+        finite = np.isfinite(dy).all(axis=1) & np.isfinite(dv).all(axis=1)
+        if finite.mean() < at_least:
             return False
         # Roundings of the times are as those of the places, and grow as the orbit shears them, by the revolutions in h.
         scale = np.sqrt((y * y).sum(axis=0)) + np.abs(h) * np.sqrt((v * v).sum(axis=0)) + 1.0
         off_y = np.sqrt(((dy.T + y - true_y) ** 2).sum(axis=0)) / scale
         off_v = np.sqrt(((dv.T + v - true_v) ** 2).sum(axis=0)) / (np.sqrt((true_v**2).sum(axis=0)) + np.sqrt((v**2).sum(axis=0)))
         sheared = 1.0 + scale * np.sqrt((v * v).sum(axis=0)) * a
-        if not ((off_y[made] < 1e3 * U * sheared[made]) & (off_v[made] < 1e3 * U * sheared[made] ** 2)).all():
+        if not ((off_y[finite] < 1e3 * U * sheared[finite]) & (off_v[finite] < 1e3 * U * sheared[finite] ** 2)).all():
             return False
     return True
 
@@ -105,21 +107,16 @@ def test_a_mistake_in_keplers_motion_is_noticed(old: str, new: str) -> None:
 # ---- the method
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("bodies", [1, 2, 3, 5])
-@pytest.mark.parametrize("fused", [False, True])
-def test_equals_the_reference(dim: int, bodies: int, fused: bool) -> None:
+@looped("bodies, dim, fused", [(1, 3, False), (2, 2, True), (2, 3, False), (3, 2, False), (5, 3, False)])
+def test_the_same_bits_in_every_way(bodies: int, dim: int, fused: bool) -> None:
     elements = {name: value[: bodies - 1] for name, value in ELEMENTS.items() if dim == 3 or name not in ("inclination", "node")}
     if bodies == 1:
         system, v, y = sw.NBody([1.0], force="newton"), np.full((1, dim), 0.3), np.ones((1, dim))
     else:
         system, v, y = sw.orbits.system(MASSES[:bodies], G=G, **elements)
-    for members in (1, 9):
-        arguments: dict[str, Any] = {"dt": DT, "steps": 7, "every": 3, "fused": fused, "record": ["energy"]}
-        arguments |= {"v": v[..., None] * np.linspace(1.0, 1.1, members), "y": y[..., None] * np.ones(members)}
-        run, other = (sw.integrate(system, "wisdom_holman", **arguments, backend=backend) for backend in ("rust", "numpy"))
-        for one, two in ((run.v, other.v), (run.y, other.y), (run.energy, other.energy), (run.carry, other.carry)):
-            assert np.array_equal(one, two)
+    start: dict[str, Any] = {"v": v[..., None] * np.linspace(1.0, 1.1, 9), "y": y[..., None] * np.ones(9)}
+    ways = ("by the reference", "alone", "in pieces", "in a world")
+    assert_equal_ways(system, "wisdom_holman", **start, dt=DT, steps=7, every=3, fused=fused, record=["energy"], ways=ways)
 
 
 def test_two_bodies_move_exactly() -> None:
@@ -158,7 +155,7 @@ def test_the_error_is_a_hundredth_of_leapfrogs() -> None:
     assert wisdom_holman < leapfrog / 500.0
 
 
-@pytest.mark.parametrize("order", corrector.TIMES)
+@looped("order", corrector.TIMES)
 def test_a_corrector_has_its_order(order: int) -> None:
     """Σ 2·b·sinh(a·x) is half of ((x/2)·coth(x/2) − 1)/x up to that power of x, since each term is applied twice."""
     mp = pytest.importorskip("mpmath")
@@ -207,18 +204,6 @@ def test_without_kepler_motions_it_is_leapfrog() -> None:
         assert np.array_equal(runs[0].v, runs[1].v)
 
 
-def test_a_world_and_an_exported_step_have_the_same_bits() -> None:
-    bodies, v, y = planets()
-    run = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=DT, steps=20)
-    arrays = v.copy(), y.copy()
-    world = sw.World(bodies, "wisdom_holman", v=arrays[0], y=arrays[1], dt=DT)
-    world.step(20)
-    assert np.array_equal(arrays[1], run.y[-1])
-    assert np.array_equal(arrays[0], run.v[-1])
-    half = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=DT, steps=10)
-    assert np.array_equal(sw.integrate(bodies, "wisdom_holman", resume=half, steps=10).y[-1], run.y[-1])
-
-
 def test_errors_are_those_of_rebound() -> None:
     """WHFast's, whose drifts are at the ends: half without a corrector, and the same with one."""
     rebound = pytest.importorskip("rebound")
@@ -265,7 +250,7 @@ def close(run: sw.Run, masses: Any) -> int:
     return int(np.argmax(near)) + 1 if near.any() else -1
 
 
-@pytest.mark.parametrize("masses", [(1.0, 1e-3, 1e-3), (1.0, 1e-3, 0.0)])
+@looped("masses", [(1.0, 1e-3, 1e-3), (1.0, 1e-3, 0.0)])
 def test_a_close_encounter_is_named(masses: Any) -> None:
     """Also of a planet and a test particle, from a run that saves its end alone, and by ``run.encounters``."""
     bodies, v, y = pair(5.6, masses=masses)
