@@ -45,6 +45,6 @@ def test_the_core_has_the_same_order() -> None:
 
 def test_what_is_no_part_is_refused() -> None:
     with pytest.raises(sw.errors.DTypeError, match=r"part: expected something around a system, got 0\.5 \(float\)"):
-        sw.Pendulum().surrounded(0.5)  # type: ignore[arg-type]
+        sw.Pendulum().surrounded(0.5)
     with pytest.raises(sw.errors.ShapeError):
         sw.Pendulum(omega=[1.0, 2.0, 3.0]).surrounded(StickFriction(np.ones(2)))

@@ -23,6 +23,7 @@ from support.export import assert_same as assert_same_bits
 from support.export import languages
 from support.graphs import assert_one_graph
 from support.looped import looped
+from support.mistakes import mistaken
 from support.own_methods import adams_bashforth_2
 from support.ways import assert_equal_ways
 
@@ -332,17 +333,19 @@ def test_a_long_step_is_one_tape() -> None:
     assert_same(*runs)
 
 
-@pytest.mark.parametrize("mistake", [{"last": 1.0}, {"waiting": 1}, {"later": -1.0}])
-def test_a_reference_with_a_mistake_is_noticed(monkeypatch: pytest.MonkeyPatch, mistake: dict[str, float]) -> None:
-    """A period that is a step too long, a result that waits a sample less, and one that is put out a step too soon."""
-    right, system = sampled.Loop.step, loop(10, 13)
-
-    def wrong(self: sampled.Loop, t: Any, v: Any, y: Any, memory: list[Any]) -> Any:
-        changes = {name: getattr(self, name) + by for name, by in mistake.items() if name != "waiting"}
-        out, after = right(self._replace(**changes), t, v, y, memory)
-        return (after[1 + 1 + self.sets : 1 + 1 + 2 * self.sets], after) if "waiting" in mistake else (out, after)
-
-    monkeypatch.setattr(sampled.Loop, "step", wrong)
+@pytest.mark.mutant
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("bits.at_most(self.last, steps)", "bits.at_most(self.last + 1.0, steps)"),
+        ("held = out = queue[: self.sets]", "held = out = queue[self.sets : 2 * self.sets]"),
+        ("at_most(steps, self.later) & bits.at_most(self.later, steps)", "at_most(steps, self.later) & True"),
+    ],
+    ids=["a period that is a step too long", "a result that waits a sample less", "one that is put out too soon"],
+)
+def test_a_reference_with_a_mistake_is_noticed(old: str, new: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    system = loop(10, 13)
+    monkeypatch.setattr(sampled.Loop, "step", mistaken(sampled, old, new).Loop.step)
     assert not np.array_equal(run_of(system, backend="numpy").y, run_of(system).y)
 
 

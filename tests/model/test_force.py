@@ -20,6 +20,7 @@ from stepwell.runs import engine
 from support.cases import ADAPTIVE, SOME, SYSTEMS, assert_same, drawn, fits
 from support.graphs import assert_one_graph, methods
 from support.looped import looped
+from support.mistakes import mistaken
 from support.springs import lattice
 from support.tracing import made
 from support.ways import assert_equal_ways
@@ -126,7 +127,7 @@ def test_a_force_may_change_between_steps(method: str) -> None:
 
 
 def springs_in_space(n: int) -> sw.System:
-    return SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().for_state_shapes(None, np.zeros((n, 3)))  # type: ignore[attr-defined]
+    return SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().for_state_shapes(None, np.zeros((n, 3)))
 
 
 MATRIX = sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80)
@@ -183,33 +184,23 @@ def test_under_control(control: Any, bodies: int) -> None:
 
 
 @pytest.mark.mutant
-def test_wrong_forces_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those tests would fail if the reference added the force once, without h, or with another sign."""
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("np.asarray(dv + self.push)", "np.asarray(dv + self.push + self.push)"),
+        ("pushed = np.asarray(dv + self.push)", "pushed, self.push = np.asarray(dv + self.push), 0.0 * self.push"),
+        ("self.push = h * force", "self.push = force"),
+        ("self.push = h * force", "self.push = -h * force"),
+    ],
+    ids=["twice", "in the first stage alone", "without the step", "against it"],
+)
+def test_wrong_forces_are_noticed(old: str, new: str, monkeypatch: pytest.MonkeyPatch) -> None:
     system, v, y, force = forced("pendulum, damped")
     arguments: dict[str, Any] = {"v": v, "y": y, "dt": 0.1, "steps": 3, "force": force}
     right = sw.integrate(system, "rk4", **arguments).y
-
-    class Twice(around.Forced):
-        def dv(self, t: Any, v: Any, y: Any) -> Any:
-            return super().dv(t, v, y) + self.push
-
-    class Once(around.Forced):
-        def dv(self, t: Any, v: Any, y: Any) -> Any:
-            self.push, push = 0.0 * self.push, self.push
-            return self.s.dv(t, v, y) + push
-
-    class Without(around.Forced):
-        def __init__(self, s: Any, h: float, force: Any) -> None:
-            super().__init__(s, 1.0, force)
-
-    class Against(around.Forced):
-        def __init__(self, s: Any, h: float, force: Any) -> None:
-            super().__init__(s, h, -force)
-
     np.testing.assert_array_equal(sw.integrate(system, "rk4", backend="numpy", **arguments).y, right)
-    for wrong in (Twice, Once, Without, Against):
-        monkeypatch.setattr(around, "Forced", wrong)
-        assert not np.array_equal(sw.integrate(system, "rk4", backend="numpy", **arguments).y, right)
+    monkeypatch.setattr(around, "Forced", mistaken(around, old, new).Forced)
+    assert not np.array_equal(sw.integrate(system, "rk4", backend="numpy", **arguments).y, right)
 
 
 # ---- what it does
@@ -312,7 +303,7 @@ def test_which_bodies_collided_is_found_under_the_force_too() -> None:
 def test_it_cannot_be_assigned() -> None:
     world = sw.World(sw.Oscillator(), "rk4", v=np.zeros(2), y=np.ones(2), dt=0.1, force=np.zeros(2))
     with pytest.raises(FixedError, match="force: a world's force cannot be assigned; write into"):
-        world.force = np.ones(2)  # type: ignore[misc]
+        world.force = np.ones(2)
     assert sw.World(sw.Oscillator(), "rk4", v=np.zeros(2), y=np.ones(2), dt=0.1).force is None
 
 

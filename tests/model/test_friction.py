@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, UnsupportedError
-from stepwell.reference import bits, friction
+from stepwell.reference import friction
 from stepwell.views import charts
 from stepwell.views.charts.verlet_friction import secant_verlet
 from support.looped import looped
+from support.mistakes import mistaken
 from support.ways import assert_equal_ways
 
 ABLE = [method for method in sw.methods() if not method.needs_acceleration]
@@ -37,7 +38,7 @@ def test_where_a_block_stops_by_eulers_methods(method: str, stop: float) -> None
     run = sw.integrate(block(), method, v=3.0, y=0.0, dt=1 / 60, steps=60, every=1)
     assert round(float(run.y[-1]), 4) == stop
     scene = sw.scenes.sliding_block()
-    assert round(float(scene.exact(np.array([2.0]))[1][0]), 4) == 0.9174  # type: ignore[misc]
+    assert round(float(scene.exact(np.array([2.0]))[1][0]), 4) == 0.9174
     assert run.t[np.argmax(run.v == 0.0)] == pytest.approx(3.0 / 4.905, abs=1 / 60)
 
 
@@ -211,40 +212,24 @@ def test_core_and_reference_where_most_members_rest() -> None:
 # ---- what is wrong would be noticed
 
 
-class ByTheSignOfV(friction.Rubbing):
-    """Friction against v, whatever the step does: it chatters."""
+REST = "return friction.stopped(new_v, friction.stops(v, self.s.dv(t, v, y)))"
+SCALED = "Separate(h * deceleration)"
+
+
+class Chattering(mistaken(friction, REST, "return new_v").Rubbing):
+    """Friction against v, whatever the step does."""
 
     def dv(self, t: Any, v: Any, y: Any) -> Any:
         return self.s.dv(t, v, y) - self.common.limit * np.sign(v)
 
-    def bring_to_rest(self, t: Any, v: Any, y: Any, new_v: Any) -> Any:
-        return new_v
 
-
-class NeverAtRest(friction.Rubbing):
-    """The increments alone: several stages only divide v."""
-
-    def bring_to_rest(self, t: Any, v: Any, y: Any, new_v: Any) -> Any:
-        return new_v
-
-
-class HoldsEverything(friction.Rubbing):
-    """At rest it stays, whatever the force."""
-
-    def bring_to_rest(self, t: Any, v: Any, y: Any, new_v: Any) -> Any:
-        f = self.s.dv(t, v, y)
-        return bits.where(self.common._within(v + f) | (np.asarray(v) == 0.0), 0.0, new_v)
-
-
-class WithoutTheStep(friction.Rubbing):
-    def __init__(self, s: Any, h: float, deceleration: Any) -> None:
-        super().__init__(s, 1.0, deceleration)
-
-
-class Forward(friction.Rubbing):
-    def __init__(self, s: Any, h: float, deceleration: Any) -> None:
-        super().__init__(s, h, deceleration)
-        self.common.limit = -self.common.limit
+WRONG = {
+    "against v, whatever the step does": Chattering,
+    "the increments alone": mistaken(friction, REST, "return new_v").Rubbing,
+    "at rest whatever the force": mistaken(friction, REST, REST.replace("return", "return 0.0 * v if v == 0.0 else")).Rubbing,
+    "without the step": mistaken(friction, SCALED, "Separate(deceleration)").Rubbing,
+    "forward": mistaken(friction, SCALED, "Separate(-h * deceleration)").Rubbing,
+}
 
 
 def rests_at(method: str) -> tuple[float, bool]:
@@ -257,7 +242,8 @@ def test_the_reference_is_right() -> None:
     assert rests_at("rk4") == rests_at("false_euler") == (-0.04, True)
 
 
-@pytest.mark.parametrize("wrong", [ByTheSignOfV, NeverAtRest, HoldsEverything, WithoutTheStep, Forward])
+@pytest.mark.mutant
+@pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
 def test_a_wrong_friction_does_not_rest_there(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(friction, "Rubbing", wrong)
     with np.errstate(all="ignore"):
@@ -269,7 +255,7 @@ def test_a_wrong_friction_does_not_rest_there(wrong: Any, monkeypatch: pytest.Mo
 
 @looped("method, named", itertools.product(REFUSED, ["friction", "drag"]))
 def test_methods_for_accelerations_refuse_it_by_name(method: str, named: str) -> None:
-    system = sw.Oscillator(1.0, **{named: 0.1})  # type: ignore[arg-type]
+    system = sw.Oscillator(1.0, **{named: 0.1})
     for call in (
         lambda: sw.integrate(system, method, v=0.0, y=1.0, dt=0.1, steps=1),
         lambda: sw.World(system, method, v=np.zeros(1), y=np.ones(1), dt=0.1),

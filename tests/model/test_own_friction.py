@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, StepwellError, TraceError, UnsupportedError
-from stepwell.reference import friction as reference
+from stepwell.reference import friction
+from stepwell.reference.systems import equations
 from support import own_systems as own
 from support.looped import looped
+from support.mistakes import mistaken
 from support.ways import assert_equal_ways
 
 ABLE = [method.name for method in sw.methods() if not method.needs_acceleration]
@@ -233,23 +235,19 @@ def test_an_exported_step_has_its_bits(name: str) -> None:
 # ---- what is wrong would be noticed
 
 
-class ByComponents(reference.OnVectors):
-    """Each component on its own: a puck does not go straight."""
-
-    def reduced(self, v: Any, f: Any) -> Any:
-        return reference.Separate(np.expand_dims(self.limit, self.axis)).reduced(v, f)
-
-
-class LongerVectors(reference.OnVectors):
-    """The first number alone, for the length."""
-
-    def _lengths(self, x: Any) -> Any:
-        return np.abs(np.moveaxis(x, self.axis, 0)[0])
-
-
-def test_friction_by_components_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from stepwell.reference.systems import equations
-
+@pytest.mark.mutant
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (
+            "return np.asarray(bits.where(np.expand_dims(bits.at_most(length, self.limit), self.axis), -v, forward))",
+            "return Separate(np.expand_dims(self.limit, self.axis)).reduced(v, f)",
+        ),
+        ("square = square + each * each", "pass"),
+    ],
+    ids=["each component on its own", "the first number alone for the length"],
+)
+def test_friction_by_components_is_noticed(old: str, new: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def is_right() -> bool:
         v = np.array([1.0, 2.0])
         run = sw.integrate(puck(), "false_euler", v=v, y=np.zeros(2), dt=0.01, steps=100, backend="numpy")
@@ -257,23 +255,22 @@ def test_friction_by_components_is_noticed(monkeypatch: pytest.MonkeyPatch) -> N
         return bool(straight and abs(np.hypot(*run.y[-1]) - 5.0 / G) < 0.02)
 
     assert is_right()
-    for wrong in (ByComponents, LongerVectors):
-        monkeypatch.setattr(equations, "OnVectors", wrong)
-        assert not is_right()
+    monkeypatch.setattr(equations, "OnVectors", mistaken(friction, old, new).OnVectors)
+    assert not is_right()
 
 
+@pytest.mark.mutant
 def test_a_pole_left_behind_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from stepwell.reference.systems import equations
-
-    def off(method: str) -> float:
+    def off() -> float:
         start: dict[str, Any] = {"y": [0.5, 0.3], "dt": 0.01, "steps": 100}
-        run = sw.integrate(own.cart(mu=50.0), method, v=[0.0, 0.0], **start, backend="numpy")
-        pole = sw.integrate(own.pendulum(omega=np.sqrt(2.0)), method, v=0.0, y=0.3 - np.pi, dt=0.01, steps=100)
+        run = sw.integrate(own.cart(mu=50.0), "false_euler", v=[0.0, 0.0], **start, backend="numpy")
+        pole = sw.integrate(own.pendulum(omega=np.sqrt(2.0)), "false_euler", v=0.0, y=0.3 - np.pi, dt=0.01, steps=100)
         return float(abs(run.y[-1, 1] - pole.y[-1] - np.pi))
 
-    assert off("false_euler") < 1e-12
-    monkeypatch.setattr(equations, "OnOne", lambda limit, at, along: reference.OnOne(limit, at, None))
-    assert off("false_euler") > 1e-3
+    assert off() < 1e-12
+    wrong = mistaken(friction, "self.at, self.along = at, along", "self.at, self.along = at, None")
+    monkeypatch.setattr(equations, "OnOne", wrong.OnOne)
+    assert off() > 1e-3
 
 
 # ---- refusals

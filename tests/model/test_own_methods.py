@@ -436,8 +436,8 @@ WRONG: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
     (lambda: sw.method(np.sin), StepwellError, "method: there is no <ufunc"),
     (lambda: sw.method(start=max)(without_start), DTypeError, "start: expected a function of Python"),
     (lambda: sw.method(without_start), ArgumentError, "start: expected a function .* that returns dv1, dy1"),
-    (lambda: sw.method("rk4", start=one_before), ArgumentError, "start: expected with a function"),  # type: ignore[call-overload]
-    (keeping(midpoint.programs.whole.run, one_before), ArgumentError, "expected a function"),  # type: ignore[attr-defined]
+    (lambda: sw.method("rk4", start=one_before), ArgumentError, "start: expected with a function"),
+    (keeping(midpoint.programs.whole.run, one_before), ArgumentError, "expected a function"),
     (keeping(growing, lambda s, t, h, v, y: a_step_back(s, t, h, v, y)), UnsupportedError, "not zero-stable"),
     (keeping(without_start, lambda s, t, h, v, y: s.dv(t, v, y)), ShapeError, "start: expected 2 blocks"),
     (keeping(without_start, lambda s, t, h, v, y: (y, v)), ShapeError, "expected two blocks of velocities or two of coordinates"),

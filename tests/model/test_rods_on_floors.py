@@ -167,7 +167,7 @@ def test_a_state_that_is_not_finite_stays_so() -> None:
 def test_what_does_not_go_together_is_refused() -> None:
     for way in ({"way": "flip"}, {"way": "restitution"}, {"way": "spring", "omega": 9.0}):
         with pytest.raises(UnsupportedError, match='floor 0: expected way="safe", got'):
-            dumb_bell(floor=sw.Floor(**way))  # type: ignore[arg-type]
+            dumb_bell(floor=sw.Floor(**way))
     with pytest.raises(ShapeError, match="floor 0: expected vectors of 2 components, got 3"):
         dumb_bell(floor=sw.Floor(normal=(0.0, 0.0, 1.0)))
     with pytest.raises(ShapeError, match="floor 1: expected vectors of 3 components, got 2"):
@@ -180,9 +180,9 @@ def test_what_does_not_go_together_is_refused() -> None:
         sw.Rods(np.ones(60), [(i, i + 1) for i in range(59)], 1.0, floor=[sw.Floor()] * 2)
     bell, start = dumb_bell(floor=sw.Floor()), {"v": 0.0, "y": tilted(0.3)}
     with pytest.raises(UnsupportedError, match="tolerance: the estimated error of a step does not include a bounce"):
-        sw.integrate(bell, "dop853", **start, tolerance=1e-6, at=[1.0])  # type: ignore[arg-type]
+        sw.integrate(bell, "dop853", **start, tolerance=1e-6, at=[1.0])
     with pytest.raises(UnsupportedError, match="meets surfaces"):
-        sw.integrate(bell, "rk4", **start, dt=0.1, steps=1, control=sw.EnergyControl(0.1))  # type: ignore[arg-type]
+        sw.integrate(bell, "rk4", **start, dt=0.1, steps=1, control=sw.EnergyControl(0.1))
 
 
 # ---- mistakes that must be noticed
