@@ -499,11 +499,7 @@ WRONG: list[tuple[Any, type[StepwellError], str]] = [
         UnsupportedError,
         "tolerance: does not go with a sampled controller: a controller samples at whole numbers of steps",
     ),
-    (
-        lambda: run_of(loop(), events=lambda t, v, y: y - 0.5),
-        UnsupportedError,
-        "events: does not go with a sampled controller",
-    ),
+    (lambda: run_of(loop(), events=lambda t, v, y: y - 0.5), UnsupportedError, "events: does not go with a sampled controller"),
     (
         lambda: sw.World(loop(), "rk4", v=np.zeros(3), y=np.zeros(3), dt=0.01, events=lambda t, v, y: y),
         UnsupportedError,

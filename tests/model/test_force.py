@@ -165,10 +165,7 @@ def test_a_rate_that_was_kept_is_not_used_with_another_force(bodies: int, method
     assert_a_world_goes_as_pieces(system, method, *blocks, (1, 1, 1), "numpy", dt=0.01, control=sw.Projection())
 
 
-@looped(
-    "control, bodies",
-    itertools.product([sw.EnergyControl(0.3), sw.Projection(), sw.Projection("nacozy")], [3, 30, 60]),
-)
+@looped("control, bodies", itertools.product([sw.EnergyControl(0.3), sw.Projection(), sw.Projection("nacozy")], [3, 30, 60]))
 def test_under_control(control: Any, bodies: int) -> None:
     """The force is no part of the energy that is kept: by each way of stepping, on one tape and over rows by a kernel."""
     rng = np.random.default_rng(5)

@@ -294,11 +294,7 @@ RUBBED = sw.Oscillator(friction=0.1)
             UnsupportedError,
             "rates: .* has friction that sticks; what it does depends on the step",
         ),
-        (
-            lambda: sw.analyse(RUBBED, "rk4", dt=0.1, v=0.0, y=1.0),
-            UnsupportedError,
-            "rates: .* has friction that sticks",
-        ),
+        (lambda: sw.analyse(RUBBED, "rk4", dt=0.1, v=0.0, y=1.0), UnsupportedError, "rates: .* has friction that sticks"),
         (lambda: sw.Oscillator(1.0, 0.1, drag=0.2), ArgumentError, "damping, drag: expected one of them, got both"),
         (lambda: sw.Oscillator(friction=[0.1, -1.0]), ArgumentError, "friction: expected numbers of zero or more, got -1"),
         (lambda: sw.Oscillator(drag=-1.0), ArgumentError, "drag: expected numbers of zero or more, got -1"),

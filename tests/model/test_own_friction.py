@@ -328,18 +328,10 @@ REFUSALS: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
     (lambda: pair.friction(rubbing), ArgumentError, "pair: expected one function for friction, and rubbing is declared"),
     (lambda: fresh()(3), DTypeError, "bare: expected a function as friction, got int"),
     (lambda: fresh()(lambda v, y: 1.0), ArgumentError, r"expected a function \(t, v, y, \*, …\), got \(v, y\)"),
-    (
-        lambda: fresh()(lambda t, v, y, mu: 1.0),
-        ArgumentError,
-        "parameters of the system, got 'mu'. Known: k",
-    ),
+    (lambda: fresh()(lambda t, v, y, mu: 1.0), ArgumentError, "parameters of the system, got 'mu'. Known: k"),
     (lambda: fresh(of="body"), ArgumentError, "of: there is no 'body'. Known: component, row"),
     (lambda: fresh(of="row", component=0), ArgumentError, "component: one number of v is no row"),
-    (
-        declared(lambda t, v, y: 1.0, component=2),
-        TraceError,
-        r"component=2 is no number of a v of shape \(2,\)",
-    ),
+    (declared(lambda t, v, y: 1.0, component=2), TraceError, r"component=2 is no number of a v of shape \(2,\)"),
     (declared(lambda t, v, y: 1.0, v=0.0, of="row"), TraceError, 'of="row" needs vectors along the last axis of v'),
     (
         declared(lambda t, v, y: np.ones(3)),

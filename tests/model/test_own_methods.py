@@ -386,12 +386,7 @@ def keeping(step: Callable[..., Any], start: Callable[..., Any]) -> Callable[[],
 def growing(s: Any, t: Any, h: Any, v: Any, y: Any, v1: Any, y1: Any) -> Any:
     """Of third order, and not zero-stable: z² + 4z − 5 has the root −5."""
     dv, dy = s.dv(t, v, y), s.dy(t, v, y)
-    return (
-        -4 * v + 5 * v1 + 4 * dv + 2 * s.dv(t - h, v1, y1),
-        -4 * y + 5 * y1 + 4 * dy + 2 * s.dy(t - h, v1, y1),
-        v,
-        y,
-    )
+    return (-4 * v + 5 * v1 + 4 * dv + 2 * s.dv(t - h, v1, y1), -4 * y + 5 * y1 + 4 * dy + 2 * s.dy(t - h, v1, y1), v, y)
 
 
 def without_start(s: Any, t: Any, h: Any, v: Any, y: Any, dv1: Any, dy1: Any) -> Any:
@@ -454,11 +449,7 @@ def test_what_a_method_cannot_be_is_said_in_words(make: Callable[[], Any], error
 def test_a_start_that_is_too_rough_is_refused() -> None:
     def again(s: Any, t: Any, h: Any, v: Any, y: Any, dv1: Any, dy1: Any, dv2: Any, dy2: Any) -> Any:
         dv, dy = s.dv(t, v, y), s.dy(t, v, y)
-        return (
-            v + 23 / 12 * dv - 4 / 3 * dv1 + 5 / 12 * dv2,
-            y + 23 / 12 * dy - 4 / 3 * dy1 + 5 / 12 * dy2,
-            *(dv, dy, dv1, dy1),
-        )
+        return (v + 23 / 12 * dv - 4 / 3 * dv1 + 5 / 12 * dv2, y + 23 / 12 * dy - 4 / 3 * dy1 + 5 / 12 * dy2, *(dv, dy, dv1, dy1))
 
     with pytest.raises(UnsupportedError, match="start: expected blocks with which the first step has an error of h to the power"):
         sw.method(start=rough)(again)

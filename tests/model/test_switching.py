@@ -132,10 +132,7 @@ SMOOTH: dict[str, tuple[Callable[..., Any], float]] = {
         lambda t, y, *, m=7.0, w=0.01: 1 / (1 + np.exp((m - t) / w)) - 1 / (1 + np.exp((m + 5 * w - t) / w)) - y,
         5.0,
     ),
-    "a ramp up and down": (
-        lambda t, y, *, m=7.0, w=0.01: 0.5 * (np.tanh((t - m) / w) - np.tanh((t - m - 5 * w) / w)) - y,
-        5.0,
-    ),
+    "a ramp up and down": (lambda t, y, *, m=7.0, w=0.01: 0.5 * (np.tanh((t - m) / w) - np.tanh((t - m - 5 * w) / w)) - y, 5.0),
 }
 
 
