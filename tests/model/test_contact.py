@@ -156,16 +156,6 @@ def test_in_a_field_that_is_not_uniform_the_error_of_an_impact_is_of_second_orde
 # ---- one member, many members, large systems
 
 
-@looped("method", ["verlet", "pefrl"])
-def test_members_do_not_touch_each_other(method: str) -> None:
-    rng = np.random.default_rng(3)
-    v, y = rng.normal(size=(2, 2, 9)), rng.uniform(0.0, 1.0, (2, 2, 9))
-    floor = sw.Floor(restitution=rng.uniform(0.3, 1.0, 9), offset=rng.uniform(-0.5, 0.0, 9))
-    balls = sw.Particles([1.0, 2.0], floor=[floor, sw.Floor(normal=(1.0, 0.2), offset=-2.0)])
-    ways = ("by the reference", "alone", "in company")
-    assert_equal_ways(balls, method, v=v, y=y, dt=0.02, steps=100, every=1, ways=ways)
-
-
 @looped("method", ["leapfrog", "verlet", "rk4"])
 def test_a_large_system_has_the_same_bits_in_every_way(method: str) -> None:
     rng = np.random.default_rng(70)

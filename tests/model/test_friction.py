@@ -16,7 +16,6 @@ from stepwell.views import charts
 from stepwell.views.charts.verlet_friction import secant_verlet
 from support.looped import looped
 from support.mistakes import mistaken
-from support.ways import assert_equal_ways
 
 ABLE = [method for method in sw.methods() if not method.needs_acceleration]
 REFUSED = [method.name for method in sw.methods() if method.needs_acceleration]
@@ -199,14 +198,6 @@ def test_a_push_within_a_live_loop(method: sw.Method) -> None:
     world.step(100)
     assert y[0] > place[0]
     assert y[1] == place[1]
-
-
-def test_core_and_reference_where_most_members_rest() -> None:
-    friction, y = np.linspace(0.05, 0.5, 37), np.linspace(-2.0, 2.0, 37)
-    for method, fused in (("false_euler", True), ("rk4", False), ("semi_false_heun", True), ("linearly_implicit_euler", False)):
-        options: dict[str, Any] = {"v": np.zeros(37), "y": y, "dt": 0.05, "steps": 250, "every": 50, "fused": fused}
-        run = assert_equal_ways(sw.Oscillator(friction=friction), method, **options, ways=("by the reference", "alone"))
-        assert (run.v[-1] == 0.0).sum() > 15
 
 
 # ---- what is wrong would be noticed

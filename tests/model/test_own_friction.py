@@ -15,7 +15,6 @@ from stepwell.reference.systems import equations
 from support import own_systems as own
 from support.looped import looped
 from support.mistakes import mistaken
-from support.ways import assert_equal_ways
 
 ABLE = [method.name for method in sw.methods() if not method.needs_acceleration]
 G = 9.81
@@ -74,12 +73,10 @@ def of_no_weight(t: Any, v: Any, y: Any) -> Any:
 # ---- closed forms
 
 
-@looped("method, stop", [("false_euler", 0.8926), ("standard_euler", 0.9426)])
-def test_a_block_stops_where_the_built_in_one_does(method: str, stop: float) -> None:
-    run = sw.integrate(block(), method, v=3.0, y=0.0, dt=1 / 60, steps=60, every=1)
-    assert round(float(run.y[-1]), 4) == stop
-    built_in = sw.Oscillator(0.0, friction=0.5 * G, form="physical")
-    same = sw.integrate(built_in, method, v=3.0, y=0.0, dt=1 / 60, steps=60, every=1)
+@looped("method", ["false_euler", "standard_euler"])
+def test_a_block_stops_where_the_built_in_one_does(method: str) -> None:
+    systems = (block(), sw.Oscillator(0.0, friction=0.5 * G, form="physical"))
+    run, same = (sw.integrate(each, method, v=3.0, y=0.0, dt=1 / 60, steps=60, every=1) for each in systems)
     np.testing.assert_array_equal(run.v, same.v)
     np.testing.assert_array_equal(run.y, same.y)
 
@@ -170,22 +167,7 @@ def test_a_number_alone_changes_no_other() -> None:
     assert (run.v[-1] != 0.0).tolist() == [True, False]
 
 
-# ---- with all options
-
-
-#: How it is made of a coefficient, and the shape of its state; with each a method and numbers.
-CASES: dict[str, tuple[Callable[[Any], Any], tuple[int, ...], str, dict[str, Any]]] = {
-    "slope": (lambda mu: own.sloping(mu=mu), (), "merson", {"fused": True, "dtype": "float32"}),
-    "pucks": (lambda mu: own.pucks(mu=mu), (3, 2), "rosenbrock23", {}),
-    "cart": (lambda mu: own.cart(mu=mu), (2,), "rk4", {"dtype": "float32"}),
-}
-
-
-@looped("name", CASES)
-def test_it_has_the_same_bits_in_every_way(name: str) -> None:
-    make, shape, method, numbers = CASES[name]
-    v, y = np.random.default_rng(7).normal(size=(2, *shape, 5))
-    assert_equal_ways(make(np.linspace(0.0, 0.3, 5)), method, v=v, y=y, dt=0.05, steps=40, every=10, **numbers)
+# ---- with other parts of the package: test_ways.py has its bits with all options
 
 
 def test_a_world_takes_another_coefficient() -> None:
@@ -217,10 +199,8 @@ def test_it_is_pickled_and_has_its_own_digest() -> None:
     assert plain().digest != block().digest
 
 
-@looped("name", CASES)
-def test_an_exported_step_has_its_bits(name: str) -> None:
-    make, shape, *_ = CASES[name]
-    one = make(0.1)
+@looped("one, shape", [(own.sloping(mu=0.1), ()), (own.pucks(mu=0.1), (3, 2)), (own.cart(mu=0.1), (2,))])
+def test_an_exported_step_has_its_bits(one: Any, shape: tuple[int, ...]) -> None:
     v, y = np.random.default_rng(7).normal(size=(2, *shape))
     space: dict[str, Any] = {}
     exec(sw.export(one, "rk4", "python", v=v, y=y, dt=0.05, name="one").source, space)
