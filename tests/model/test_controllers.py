@@ -178,17 +178,24 @@ def test_without_saturation_it_is_the_loop_of_samples(samples: int) -> None:
         state = steps.P @ state
 
 
-def test_with_other_parameters_it_goes_on_with_what_it_remembers() -> None:
-    """As one would who turns a knob; with another period, or another controller, it begins anew."""
-    before = run_of(loop(10, 13), 23)
-    turned = sw.integrate(loop(10, 13, gain=2.0 * GAINS), "rk4", resume=before, steps=37, every=1)
+def world_of_23_steps() -> tuple[sw.World, Any, Any]:
     v, y = np.zeros(3), np.zeros(3)
     world = sw.World(loop(10, 13), "rk4", v=v, y=y, dt=0.01)
     world.step(23)
-    world.set(gain=2.0 * GAINS)
-    world.step(37)
-    np.testing.assert_array_equal(turned.y[-1], y)
+    return world, v, y
+
+
+def test_with_other_parameters_it_goes_on_with_what_it_remembers() -> None:
+    """As one would who turns a knob, also in a world; with another period, or another controller, it begins anew."""
+    before = run_of(loop(10, 13), 23)
+    turned = sw.integrate(loop(10, 13, gain=2.0 * GAINS), "rk4", resume=before, steps=37, every=1)
     assert not np.array_equal(turned.y[-1], run_of(loop(10, 13), 60).y[-1])
+    for turn in (lambda world: world.set(gain=2.0 * GAINS), lambda world: np.copyto(world.parameters["gain"], 2.0 * GAINS)):
+        world, _, y = world_of_23_steps()
+        turn(world)
+        world.step(37)
+        np.testing.assert_array_equal(turned.y[-1], y)
+        np.testing.assert_array_equal(world.system.controller.values["gain"], 2.0 * GAINS)
     anew = sw.integrate(loop(9, 13), "rk4", resume=before, steps=37)
     fresh = sw.integrate(loop(9, 13), "rk4", v=before.v[-1], y=before.y[-1], dt=0.01, steps=37, start_step=23)
     np.testing.assert_array_equal(anew.y, fresh.y)
@@ -212,9 +219,7 @@ def test_a_world_that_is_copied_or_goes_on_from_a_run_is_the_same(period: int, d
 
 def test_a_push_in_a_world_is_seen_at_the_next_sample_and_forgets_nothing() -> None:
     """A user who writes to v or y changes the state, not the time of the controller, nor what it has computed."""
-    v, y = np.zeros(3), np.zeros(3)
-    world = sw.World(loop(10, 13), "rk4", v=v, y=y, dt=0.01)
-    world.step(23)
+    world, v, _ = world_of_23_steps()
     v += 0.5
     world = copy.deepcopy(world)
     world.step(37)
@@ -226,29 +231,15 @@ def test_a_push_in_a_world_is_seen_at_the_next_sample_and_forgets_nothing() -> N
 
 
 def test_members_that_are_reset_begin_with_a_sample() -> None:
-    v, y = np.zeros(3), np.zeros(3)
-    world = sw.World(loop(10, 13), "rk4", v=v, y=y, dt=0.01)
-    world.step(23)
+    world, _, y = world_of_23_steps()
     world.reset([1], v=0.0, y=0.0)
     world.step(37)
     np.testing.assert_array_equal(y[[0, 2]], run_of(loop(10, 13), 60).y[-1, [0, 2]])
     assert y[1] == run_of(loop(10, 13), 37).y[-1, 1]
 
 
-def test_its_parameters_live_in_a_world() -> None:
-    v, y = np.zeros(3), np.zeros(3)
-    world = sw.World(loop(10, 13), "rk4", v=v, y=y, dt=0.01)
-    gain = world.parameters["gain"]
-    world.step(23)
-    gain[...] *= 2.0
-    world.step(37)
-    before = run_of(loop(10, 13), 23)
-    np.testing.assert_array_equal(y, sw.integrate(loop(10, 13, gain=2.0 * GAINS), "rk4", resume=before, steps=37).y[-1])
-    np.testing.assert_array_equal(world.system.controller.values["gain"], 2.0 * GAINS)
-
-
 def test_what_the_controller_sets_cannot_be_set() -> None:
-    world = sw.World(loop(10, 13), "rk4", v=np.zeros(3), y=np.zeros(3), dt=0.01)
+    world, _, _ = world_of_23_steps()
     assert "u" not in list(world.parameters)
     for call in (lambda: world.set(u=1.0), lambda: world.parameters["u"], lambda: world.reset([0], y=0.0, u=1.0)):
         with pytest.raises(UnsupportedError, match="u: the sampled controller sets it"):
@@ -274,16 +265,13 @@ def test_friction_of_own_equations_sees_what_it_sets() -> None:
 
 
 def test_a_sweep_over_its_parameters_and_its_period() -> None:
-    def make(gain: Any, period: Any) -> Any:
-        return mass().surrounded(limited(gain=gain, period=period, delay=0.1))
-
     for period in (0.1, 0.2):
 
         def of_gain(gain: Any, period: float = period) -> Any:
-            return make(gain, period)
+            return mass().surrounded(limited(gain=gain, period=period, delay=0.1))
 
-        made = sw.sweep(of_gain, {"gain": GAINS}, method="rk4", v=0.0, y=0.0, dt=0.01, steps=97)
-        np.testing.assert_array_equal(made["y_last"].values.reshape(-1), run_of(make(GAINS, period)).y[-1])
+        dataset = sw.sweep(of_gain, {"gain": GAINS}, method="rk4", v=0.0, y=0.0, dt=0.01, steps=97)
+        np.testing.assert_array_equal(dataset["y_last"].values.reshape(-1), run_of(of_gain(GAINS)).y[-1])
 
 
 def test_its_times_are_those_of_the_steps() -> None:

@@ -250,7 +250,7 @@ def close(run: sw.Run, masses: Any) -> int:
     return int(np.argmax(near)) + 1 if near.any() else -1
 
 
-@looped("masses", [(1.0, 1e-3, 1e-3), (1.0, 1e-3, 0.0)])
+@looped("masses", [(1.0, 1e-3, 1e-3), (1.0, 1e-3, 0.0), (1.0, 1e-6, 1e-3)])
 def test_a_close_encounter_is_named(masses: Any) -> None:
     """Also of a planet and a test particle, from a run that saves its end alone, and by ``run.encounters``."""
     bodies, v, y = pair(5.6, masses=masses)

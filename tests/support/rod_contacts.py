@@ -292,16 +292,7 @@ def comes_to_rest(method: str, backend: str = "rust") -> None:
     assert run.y[:, :, 1].min() >= -1e-9
 
 
-ALL = {
-    f.__name__: f
-    for f in (
-        drops_as_a_ball,
-        strikes,
-        strikes_together,
-        returns_from_a_wall,
-        adds_no_energy,
-        topples,
-        slides_to_rest,
-        comes_to_rest,
-    )
-}
+CHECKS = (
+    drops_as_a_ball, strikes, strikes_together, returns_from_a_wall, adds_no_energy, topples, slides_to_rest, comes_to_rest,
+)  # fmt: skip
+ALL = {check.__name__: check for check in CHECKS}
