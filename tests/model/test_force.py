@@ -91,10 +91,10 @@ def test_without_a_force_the_step_is_the_one_before(name: str, some: int | None)
         # h·force once for each number of v, and a sum for each that is computed; equal ones are one.
         assert pushed["multiply"] - without["multiply"] == numbers
         sums = ("add", "subtract", "negate")  # of which one may be written as another
-        # A rate −x with a force is force − x, and its series has −xₖ from order 1 on, whose sign goes into the sums with it.
+        # A rate −x with a force is force − x; series and derivatives have the sign of x in their sums then.
         # Likewise where friction takes a rate from v and from what v becomes, so that it stands in a sum twice.
         rubs = "friction" in name
-        counted = sums[:2] if method.has_series or rubs else sums
+        counted = sums[:2] if method.has_derivatives or rubs else sums
         assert 0 < sum(pushed[each] - without[each] for each in counted) <= (1 + rubs) * numbers * method.evaluations
         others = set(without) - {"multiply", "parameter", "step", *sums}
         assert {each: without[each] for each in others} == {each: pushed[each] for each in others}
