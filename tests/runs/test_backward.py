@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, UnsupportedError
-from support.cases import SYSTEMS, Case, assert_same, cases, number, representative
+from support.cases import SYSTEMS, Case, assert_same, cases, representative
 from support.families import family
 
-#: A method of each kind of step.
-KINDS = ("false_euler", "rk4", "leapfrog", "verlet", "pefrl", "dop853", "taylor", "rodas4")
 #: Symmetric methods: the step of −h undoes that of h.
 SYMMETRIC = ("leapfrog", "verlet", "pefrl")
 #: Their step is a function of the matrix of the rates, so that of −h commutes with it.
@@ -42,13 +40,6 @@ def quietly(case: Case, **options: Any) -> sw.Run:
 
 
 BACK = [case for case in cases() if goes_back(SYSTEMS[case.system](np.random.default_rng(), 1))]
-
-
-@pytest.mark.parametrize("case", family(BACK, lambda case: number(case, "backward") % 64 == 0, str))
-def test_the_core_equals_the_reference(case: Case) -> None:
-    run, reference = quietly(case), quietly(case, backend="numpy")
-    assert_same(run, reference)
-    np.testing.assert_array_equal(run.t, 1.7 + np.array([0, 5, 10, 15, 20, 23]) * -0.1)
 
 
 @pytest.mark.parametrize(

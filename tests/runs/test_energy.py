@@ -83,9 +83,7 @@ def with_reference(system: sw.System, method: Any, **options: Any) -> sw.Run:
 
 OTHERS: dict[str, dict[str, Any]] = {
     "adaptive": {"tolerance": 1e-5, "at": [0.05, 0.1]},
-    "adaptive, every": {"tolerance": 1e-5, "at": [0.1], "every": 1},
     "float32": {"dt": 0.01, "steps": 4, "every": 2, "dtype": "float32"},
-    "float32, adaptive": {"tolerance": 1e-3, "at": [0.05], "dtype": "float32"},
 }
 
 
@@ -102,15 +100,6 @@ def test_adaptive_steps_and_float32(name: str, other: str) -> None:
     np.testing.assert_array_equal(run.recorded["energy"], plain.energy)
     if system.kernel not in OF_A_STEP:
         np.testing.assert_array_equal(run.recorded["energy"], of_state(system, run))
-
-
-@pytest.mark.parametrize("form", ["matrix", "power"])
-@pytest.mark.parametrize("name", ["free", "damped, physical", "chain of nineteen"])
-def test_matrix_forms(name: str, form: Any) -> None:
-    system, v, y = made(name)
-    options: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 40, "every": 20, "form": form}
-    run = sw.integrate(system, "rk4", record="energy", **options)
-    assert_energy(system, run, sw.integrate(system, "rk4", **options))
 
 
 LARGE = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import functools
+import itertools
 import pickle
 import re
 import warnings
@@ -36,12 +37,10 @@ KINDS = ("false_euler", "rk4", "leapfrog", "verlet", "dop853", "taylor", "trapez
 BESIDE = ("by the reference", "at each level", "alone", "in company")
 
 
-@pytest.mark.parametrize("method", KINDS)
-@pytest.mark.parametrize("fused", [False, True])
-def test_two_axes_of_members_forward_and_back(method: str, fused: bool) -> None:
+def test_two_axes_of_members_forward_and_back() -> None:
     """Of many members, of which machine code steps whole vectors."""
     begins = np.linspace(-3.0, 4.0, 70).reshape(7, 10)
-    for dt in (0.1, -0.1):
+    for method, fused, dt in itertools.product(("rk4", "leapfrog", "taylor"), (False, True), (0.1, -0.1)):
         start = {"v": 0.3, "y": np.linspace(0.5, 1.5, 10), "dt": dt, "steps": 60, "fused": fused}
         run = sw.integrate(swept(), method, t0=begins, **start)
         assert run.y.shape == run.t.shape == (1, 7, 10)
@@ -80,12 +79,12 @@ EVENTS: dict[str, list[sw.Event]] = {
 @pytest.mark.parametrize("kind", EVENTS)
 def test_events_are_at_the_times_of_their_members(kind: str, method: str) -> None:
     """Of many members the core notices changes of sign by itself, where it knows their times; of a system without time, too."""
-    many = 40 if kind == "both change" else 200
+    many = 16 if kind == "both change" else 200
     for system, members, every, backend in (
         (swept(), 3, None, "rust"), (swept(), 3, 7, "numpy"), (swept(), many, 7, "rust"), (sw.Pendulum(1.5), many, None, "rust"),
     ):  # fmt: skip
         begins, y = np.linspace(-2.0, 3.0, members), np.linspace(0.5, 1.5, members)
-        start: dict[str, Any] = {"v": 0.3, "dt": 0.1, "steps": 90, "every": every, "events": EVENTS[kind], "backend": backend}
+        start: dict[str, Any] = {"v": 0.3, "dt": 0.1, "steps": 70, "every": every, "events": EVENTS[kind], "backend": backend}
         run = sw.integrate(system, method, y=y, t0=begins, **start)
         for i in (0, members // 2, members - 1):
             alone = sw.integrate(system, method, y=y[i], t0=float(begins[i]), **start)
@@ -162,15 +161,6 @@ def driven(t: Any, v: Any, y: Any) -> Any:
 @driven.invariant
 def energy(v: Any, y: Any) -> Any:
     return 0.5 * v * v - np.cos(y)
-
-
-@pytest.mark.parametrize("method", ["rk4", "leapfrog"])
-def test_forces_controls_and_records(method: str) -> None:
-    options: dict[str, Any] = {"v": np.full(4, 0.3), "y": np.ones(4), "dt": 0.1, "steps": 15, "every": 7, "record": "energy"}
-    options |= {"t0": np.array([0.0, 1.0, 2.5, -4.0]), "force": np.array([0.1, 0.2, 0.3, 0.4])}
-    if method == "rk4":
-        options["control"] = sw.Control("energy", gain=0.5)
-    assert_equal_ways(driven(), method, ways=BESIDE, **options)
 
 
 @pytest.mark.parametrize("backend", ["rust", "numpy"])
