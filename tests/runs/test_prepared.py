@@ -180,13 +180,15 @@ def test_adaptive_runs_are_those_of_integrate(method: str, every: int) -> None:
                     assert warned == said
 
 
-def test_arrays_among_the_options_are_copied() -> None:
+def test_arrays_and_lists_among_the_options_are_copied() -> None:
     """What is written into them later is not seen."""
-    at, push = np.array([1.0, 2.0]), np.array(1.0)
-    run = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-6, at=at, force=push)
-    expected = run(0.0, 1.0).y.copy()
-    at[...], push[...] = 5.0, 7.0
-    assert run(0.0, 1.0).y.tobytes() == expected.tobytes()
+    for at in (np.array([1.0, 2.0]), [1.0, 2.0]):
+        push = np.array(1.0)
+        run = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-6, at=at, force=push)
+        expected = run(0.0, 1.0).y.copy()
+        at[1], push[...] = 5.0, 7.0
+        for _ in range(2):
+            assert run(0.0, 1.0).y.tobytes() == expected.tobytes()
 
 
 def test_systems_of_first_order_have_no_velocities() -> None:
