@@ -126,17 +126,6 @@ def test_projection_works_against_the_drift() -> None:
     assert run.recorded["energy"][1] == pytest.approx(run.recorded["energy"][0], rel=1e-14)
 
 
-def test_the_energy_of_a_chain_for_each_member() -> None:
-    """Springs that differ from member to member, which a state without a batch does not fit."""
-    ask: dict[str, Any] = {"v": 0.0, "y": np.arange(3.0)[:, np.newaxis], "dt": 0.1, "steps": 4, "every": 2}
-    stiffness = np.array([[1.0, 2.0], [1.0, 3.0], [2.0, 2.0], [1.0, 1.0]])
-    run = sw.integrate(sw.Chain(3, stiffness=stiffness), "rk4", record="energy", **ask)
-    assert run.recorded["energy"].shape == (3, 2)
-    for member in (0, 1):
-        alone = sw.integrate(sw.Chain(3, stiffness=stiffness[:, member]), "rk4", **(ask | {"y": ask["y"][:, 0]}))
-        np.testing.assert_allclose(run.recorded["energy"][:, member], alone.energy, rtol=1e-15)
-
-
 def test_what_is_not_there_is_refused_before_any_work() -> None:
     for system, record, message in (
         (sw.NBody(), "speed", "record: .*'speed'"),

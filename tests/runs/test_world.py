@@ -61,24 +61,6 @@ def test_members_are_independent() -> None:
     np.testing.assert_array_equal(np.isfinite(y), omega < 2)
 
 
-def test_arrays_outlive_their_names() -> None:
-    """The world holds its arrays: deleting every other reference is harmless."""
-    w = sw.World(sw.Oscillator(1.0), "false_euler", v=np.zeros(3), y=np.ones(3), dt=0.1)
-    y = w.y
-    w.step(10)
-    assert y[0] != 1.0
-
-
-def test_another_thread_may_step() -> None:
-    from concurrent.futures import ThreadPoolExecutor
-
-    v, y = np.zeros(3), np.ones(3)
-    w = sw.World(sw.Oscillator(1.0), "false_euler", v=v, y=y, dt=0.1)
-    with ThreadPoolExecutor(1) as pool:
-        pool.submit(w.step, 10).result()
-    assert w.step_number == 10
-
-
 def test_any_shape_of_batch() -> None:
     """From a lone number to more than are copied."""
     for shape in ((), (1,), (2, 3), (30, 20)):
