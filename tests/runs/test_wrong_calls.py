@@ -110,7 +110,7 @@ def test_calls_work_or_say_what_is_wrong(name: str, share: int) -> None:
         for junk in list(JUNK)[(i + number(name)) % share :: share]
         if (name, argument, junk) not in KNOWN and (text := wrong(call, options, argument, JUNK[junk])) is not None
     }
-    assert not bad
+    assert not bad, "\n" + "\n".join(f"{strange}: {text}" for strange, text in bad.items())
 
 
 @timer
