@@ -42,7 +42,8 @@ TESTS_ON_WINDOWS := windows recorded_bits kernels fixed saved_runs output cli in
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: .venv/demo ## set up, build, and chart error against cost for two scenes into out/
+demo: $(BIN)/python$(EXE) ## set up, build, and chart error against cost for two scenes into out/
+	@$(MAKE) --no-print-directory -j2 .venv/demo
 	$(BIN)/stepwell chart oscillator clover -o $(OUT)
 
 docs: .venv/docs ## build the site into out/docs, without a network; a warning is an error
