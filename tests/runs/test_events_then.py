@@ -219,6 +219,16 @@ def test_members_that_an_event_changes_have_common_jumps(jumps: list[float]) -> 
     assert (run.events["ground"].count > 0).all()
 
 
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_an_event_at_the_end_of_a_step_leaves_nothing_of_it(backend: str) -> None:
+    """Verlet divided by what was left of the step: v was NaN. Its motion is leapfrog's, to some roundings in each of 16 steps."""
+    kick = sw.Event(lambda t, v, y: t - 1.0, then=lambda t, v, y: (v + 0.1, y), name="kick")
+    ask: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.125, "steps": 16, "every": 1, "events": kick, "backend": backend}
+    verlet, leapfrog = (sw.integrate(sw.Pendulum(), method, **ask) for method in ("verlet", "leapfrog"))
+    np.testing.assert_allclose(verlet.y, leapfrog.y, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(verlet.v, leapfrog.v, rtol=0.0, atol=1e-12)  # a difference of y by dt
+
+
 @pytest.mark.parametrize(
     "method", family(["rk4", "leapfrog", "verlet", "false_euler", "standard_heun"], "rk4 verlet".__contains__)
 )

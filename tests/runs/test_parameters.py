@@ -388,6 +388,7 @@ def test_refusals() -> None:
         (lambda: bodies.reset(0, y=0.0), ArgumentError, "members: expected a world with a batch"),
         (lambda: world.reset(0), ArgumentError, "got none"),
         (lambda: world.reset(2, y=0.0), ArgumentError, "members: expected an index"),
+        (lambda: world.reset([[0], [0, 1]], y=0.0), ArgumentError, "members: expected an index"),
         (lambda: world.reset([0, 0], y=0.0), ArgumentError, "each member once"),
         (lambda: world.reset([0, 1], y=[1.0, 2.0, 3.0]), ShapeError, "y: expected shape () or (2,), got (3,)"),
         (lambda: linear.set(A=[[-0.1, -1.0], [1.0, 0.0]]), UnsupportedError, "A: expected matrices of the structure"),

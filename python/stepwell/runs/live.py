@@ -73,13 +73,12 @@ def members_at(members: Any, batch: Shape) -> Whole:
     """The places in the flattened batch of the members that an index, a slice, a mask or an array of indices chooses."""
     if not batch:
         raise ArgumentError("members: expected a world with a batch, got one of a single member; write into world.v and world.y")
-    if isinstance(members, list):
-        members = np.asarray(members)
     try:
-        places = np.arange(int(np.prod(batch))).reshape(batch)[members]
-    except (IndexError, TypeError, ValueError) as error:
+        index = np.asarray(members) if isinstance(members, list) else members
+        places = np.arange(int(np.prod(batch))).reshape(batch)[index]
+    except (IndexError, TypeError, ValueError, RuntimeError, MemoryError) as error:
         text = f"members: expected an index, a slice, a mask or an array of indices of a batch {batch}, got "
-        kind = ArgumentError if isinstance(error, (IndexError, ValueError)) else DTypeError
+        kind = DTypeError if isinstance(error, TypeError) else ArgumentError
         raise kind(f"{text}{checks.short(members)} ({error})") from None
     places = np.asarray(places)
     if len(np.unique(places)) != places.size:

@@ -253,7 +253,9 @@ class Resets:
         """The rest of the steps, from the new states on."""
         t, v, y = ahead.t[which], ahead.v[..., which], ahead.y[..., which]
         h = self._way * np.maximum(self._way * (end - t), 0.0)
-        return Stretch(member, step, t, h, v, y, *self._run.trials.step(member, t, h, v, y), ahead.at[:, which])
+        # Where nothing is left of a step, Verlet would divide by its length.
+        v_end, y_end = (np.where(h == 0.0, *each) for each in zip((v, y), self._run.trials.step(member, t, h, v, y), strict=True))
+        return Stretch(member, step, t, h, v, y, v_end, y_end, ahead.at[:, which])
 
     def _ahead(self, stretch: Stretch, step: Array) -> tuple[Ahead, Whole]:
         """Note what happens up to the first end of each stretch. Returns the ends, and the event that holds a member, else −1."""
