@@ -105,8 +105,7 @@ licences: ## write the licences of the crates in a wheel into THIRD-PARTY.txt
 
 # Recorded bits cover every method, system and form; of the tests of kernels those that start no program and measure no time. The
 # folder of its builds is its own, so that they wait for no other.
-RECORDED_ON_AARCH64 := recorded
-TESTS_ON_AARCH64 = tests/reference/test_recorded_bits.py tests/reference/test_kernels.py -k "$(RECORDED_ON_AARCH64) or threads or parent or border"
+TESTS_ON_AARCH64 := tests/reference/test_recorded_bits.py tests/reference/test_kernels.py -k "recorded or threads or parent or border"
 test-aarch64: .venv/maturin ## run the package's tests of bits, threads and processes on AArch64: a wheel under an emulator
 	@for tool in qemu-aarch64 aarch64-linux-gnu-gcc rustup; do command -v $$tool > /dev/null || \
 	  { echo "there is no $$tool here: Debian's packages are qemu-user and gcc-aarch64-linux-gnu; rustup is of https://rustup.rs"; exit 1; }; done

@@ -18,13 +18,13 @@ from support.abroad import Journey, run
 from support.export import assert_same as assert_same_bits
 from support.export import languages
 from support.looped import looped
-from support.own_methods import a_step_back, adams_bashforth_2, adams_bashforth_3, heun_euler, midpoint, one_before
+from support.own_methods import a_step_back, adams_bashforth_2, adams_bashforth_3, halfway, heun_euler, one_before
 from support.ways import assert_equal_ways
 
 RNG = np.random.default_rng(20)
 
 
-ALL = [midpoint, heun_euler, adams_bashforth_2, adams_bashforth_3]
+ALL = [halfway, heun_euler, adams_bashforth_2, adams_bashforth_3]
 KEEPING = ALL[2:]
 
 
@@ -83,19 +83,19 @@ SYSTEMS: dict[str, Callable[[], tuple[Any, Any, Any, float]]] = {
 
 def test_the_record_follows_from_the_operations() -> None:
     assert [(m.name, m.order, m.evaluations, m.attempt_evaluations, m.error_order) for m in ALL] == [
-        ("midpoint", 2, 2, 0, None),
+        ("halfway", 2, 2, 0, None),
         ("heun_euler", 2, 2, 2, 2),
         ("adams_bashforth_2", 2, 1, 0, None),
         ("adams_bashforth_3", 3, 1, 0, None),
     ]
-    assert midpoint.nodes == (0.0, 0.5)
+    assert halfway.nodes == (0.0, 0.5)
     assert adams_bashforth_3.kept == ("dv1", "dy1", "dv2", "dy2")
-    assert "The explicit midpoint rule." in (midpoint.__doc__ or "")
+    assert "The explicit midpoint rule." in (halfway.__doc__ or "")
 
 
 def test_limits_are_those_of_the_books() -> None:
     """Heun's and Adams-Bashforth's of second order grow with any step; that of third order is stable to 0.7236 on the axis."""
-    assert [midpoint.limit, heun_euler.limit, adams_bashforth_2.limit] == [0.0, 0.0, 0.0]
+    assert [halfway.limit, heun_euler.limit, adams_bashforth_2.limit] == [0.0, 0.0, 0.0]
     # On the imaginary axis z³ = (1 + 23/12·iΦ)·z² − 4/3·iΦ·z + 5/12·iΦ reaches |z| = 1 at Φ = 0.72361…
     limit = adams_bashforth_3.limit
     phi = 1j * limit
@@ -131,14 +131,14 @@ def test_a_built_in_method_written_again_has_its_bits(name: str) -> None:
     [
         ("own", [heun_euler], {"dtype": "float32"}),
         ("first order", [adams_bashforth_3], {"fused": True}),
-        ("driven", [midpoint, adams_bashforth_3], {}),
+        ("driven", [halfway, adams_bashforth_3], {}),
         ("driven, linear", [heun_euler, adams_bashforth_2], {}),
         ("rigid body", [adams_bashforth_3], {"dtype": "float32"}),
         ("few bodies", [heun_euler, adams_bashforth_3], {"fused": True}),
-        ("many bodies", [midpoint, adams_bashforth_3], {}),
+        ("many bodies", [halfway, adams_bashforth_3], {}),
         ("long chain", [heun_euler, adams_bashforth_2], {}),
-        ("large matrix", [midpoint, adams_bashforth_2], {}),
-        ("points on a floor", [midpoint, adams_bashforth_3], {}),
+        ("large matrix", [halfway, adams_bashforth_2], {}),
+        ("points on a floor", [halfway, adams_bashforth_3], {}),
         ("many points on a floor", ALL, {}),
     ],
 )
@@ -299,7 +299,7 @@ def test_a_bounce_on_rods_is_refused_since_it_ends_what_is_kept() -> None:
     """The core does not tell which points it changed."""
     rods = sw.Rods([1.0, 0.5], [(0, 1)], 1.0, floor=sw.Floor(normal=[0.0, 1.0]))
     options: dict[str, Any] = {"v": [[0.0, -1.0], [0.0, -1.0]], "y": [[0.0, 0.3], [0.8, 0.9]], "dt": 0.01, "steps": 60}
-    sw.integrate(rods, midpoint, **options)
+    sw.integrate(rods, halfway, **options)
     with pytest.raises(UnsupportedError, match="which do not hold after a bounce"):
         sw.integrate(rods, adams_bashforth_2, **options)
 
@@ -311,8 +311,8 @@ def test_explanations_name_what_is_kept() -> None:
 
 
 def test_charts_and_sweeps_take_them(tmp_path: Any) -> None:
-    chart = sw.charts.work_precision(sw.scenes.oscillator(), [midpoint, adams_bashforth_3, "rk4"], [40, 80])
-    assert {"midpoint", "adams_bashforth_3", "rk4"} <= {row["method"] for row in chart.rows()}
+    chart = sw.charts.work_precision(sw.scenes.oscillator(), [halfway, adams_bashforth_3, "rk4"], [40, 80])
+    assert {"halfway", "adams_bashforth_3", "rk4"} <= {row["method"] for row in chart.rows()}
     chart.plot(tmp_path / "chart.png")
     pytest.importorskip("xarray")
     axes = {"beta": np.linspace(0.5, 2.0, 5)}
@@ -432,7 +432,7 @@ WRONG: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
     (lambda: sw.method(start=max)(without_start), DTypeError, "start: expected a function of Python"),
     (lambda: sw.method(without_start), ArgumentError, "start: expected a function .* that returns dv1, dy1"),
     (lambda: sw.method("rk4", start=one_before), ArgumentError, "start: expected with a function"),
-    (keeping(midpoint.programs.whole.run, one_before), ArgumentError, "expected a function"),
+    (keeping(halfway.programs.whole.run, one_before), ArgumentError, "expected a function"),
     (keeping(growing, lambda s, t, h, v, y: a_step_back(s, t, h, v, y)), UnsupportedError, "not zero-stable"),
     (keeping(without_start, lambda s, t, h, v, y: s.dv(t, v, y)), ShapeError, "start: expected 2 blocks"),
     (keeping(without_start, lambda s, t, h, v, y: (y, v)), ShapeError, "expected two blocks of velocities or two of coordinates"),

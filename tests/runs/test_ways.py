@@ -33,7 +33,7 @@ def system_of(name: str) -> Any:
 def methods() -> dict[str, Any]:
     """A method of each structure that a step can have, drawn by the seed."""
     structures: dict[tuple[bool, ...], list[Any]] = defaultdict(list)
-    for method in (*sw.methods(), sw.method("exact"), own_methods.midpoint, own_methods.adams_bashforth_2):
+    for method in (*sw.methods(), sw.method("exact"), own_methods.halfway, own_methods.adams_bashforth_2):
         structures[
             method.is_exact, method.has_series, method.is_implicit, method.needs_acceleration, bool(method.carry),
             bool(method.kept), method.splits, method.error_order is not None,

@@ -8,7 +8,7 @@ import stepwell as sw
 
 
 @sw.method
-def midpoint(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
+def halfway(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
     """The explicit midpoint rule."""
     dv, dy = s.dv(t, v, y), s.dy(t, v, y)
     half, v2, y2 = t + h / 2, v + dv / 2, y + dy / 2
