@@ -56,7 +56,7 @@ MISTAKES = {
     "equations/predators": ("births - hunted * np.exp(v)", "births - hunted * np.exp(v) + 0.001 * y"),
     "equations/reaction": ("        x - z,", "        x - 1.1 * z,"),
     "equations/star_orbits": ("- y[0] ** 2 + y[1] ** 2", "- y[0] ** 2 + 1.01 * y[1] ** 2"),
-    "equations/turing": ("b * u - made + dy", "b * u - made + 0.7 * dy"),
+    "equations/turing": ("b * u - growth + dy", "b * u - growth + 0.7 * dy"),
     "sweeps/axons": ("/ (np.exp(3.0 - 0.1 * v) + 1.0)", "/ (np.exp(3.2 - 0.1 * v) + 1.0)"),
     "sweeps/basins": ("1.0 / (r2 * np.sqrt(r2)) * away", "1.0 / r2 * away"),
     "sweeps/bifurcation": ("- delta * v", "- 1.2 * delta * v"),
