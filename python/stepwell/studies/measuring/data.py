@@ -267,9 +267,9 @@ class WorkPrecision(Drawn, Table, ValueEquality):
         points = [
             (spent, point.error(error), i, curve, point)
             for i, curve in enumerate(self.curves)
-            for dependable in [curve.dependable(error, self.floor)]
+            for dependable in [{id(point) for point in curve.dependable(error, self.floor)}]
             for spent, point in zip(curve.costs(cost), curve.points, strict=True)
-            if point in dependable
+            if id(point) in dependable  # which is not to compare each with all others, number by number
             and math.isfinite(spent)
             and math.isfinite(point.error(error))
             and point.error(error) >= self.floor

@@ -134,7 +134,7 @@ def in_turns(runs: Mapping[str, Timed], effort: Effort, members: int) -> dict[st
 
 
 #: The effort for charts and for ``stepwell bench``: a timed run takes fifty times the cost of a call.
-CHARTS = Effort(members=4096, numbers=131_072, fewest=8, seconds=0.005, repeats=11)
+CHARTS = Effort(members=4096, numbers=131_072, fewest=8, seconds=0.002, repeats=7)
 
 
 def step_times(
